@@ -43,7 +43,7 @@ def fitted(name: str, kind: str) -> Any:
 def counts(kind: str) -> list[np.ndarray]:
     """Return which samples count: all but a stretch of the last run."""
     found = [np.ones(len(run), dtype=bool) for run in recorded(kind)]
-    found[-1][100:160] = False
+    found[-1][60:120] = False
     return found
 
 

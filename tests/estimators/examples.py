@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import numpy as np
-
-from mckibben import GPI, PI, Recording
-from mckibben.blocks.coupled.force_balance import ForceBalance
-from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
-from mckibben.blocks.dynamic.air import Air
-from mckibben.blocks.force.multistate_friction import MultistateFriction
-from mckibben.blocks.force.polynomial_force import PolynomialForce
+from mckibben import Recording
 from mckibben.registry import load, names
-
-STEP = 0.05
-SAMPLES = 240
+from tests.golden.plants import runs
 
 QUICK: dict[str, Any] = {
     "n_operators": 4,
@@ -53,13 +43,12 @@ ORDERS = ("n_poles", "n_noise", "n_noise_poles", "output_lags", "input_lags")
 
 @dataclass(frozen=True)
 class Kind:
-    """Channels that belong together, and how to record runs with them, each with a seed."""
+    """Channels that belong together, and the plant that was recorded with them."""
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    make: Callable[[int], Recording]
+    plant: str
     scheduling: tuple[str, ...] = ()
-    n_runs: int = 2
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -67,99 +56,25 @@ class Kind:
         return (*self.inputs, *self.scheduling, *self.outputs)
 
 
-def cycles(n: int = SAMPLES, first: float = 2.5) -> np.ndarray:
-    """Return decaying cycles from 0, shape (n,)."""
-    t = np.linspace(0, 1, n)
-    return first * (1 - 0.7 * np.floor(4 * t).clip(0, 3) / 3) * (1 - np.cos(8 * np.pi * t))
-
-
-def noise(seed: int, size: float, n: int = SAMPLES) -> np.ndarray:
-    """Return white noise, shape (n,)."""
-    return size * np.random.default_rng(seed).standard_normal(n)
-
-
-def muscle(seed: int) -> Recording:
-    """A saturating loop of pressure and displacement."""
-    p = cycles(first=2.5 - 0.1 * seed)
-    y = GPI.example().simulate(p) + noise(seed, 0.02)
-    return Recording({"pressure": p, "displacement": y}, STEP)
-
-
-def isobaric(seed: int) -> Recording:
-    """Force on a muscle that is pulled under a pressure that hardly changes."""
-    waves = 4.0 + 0.2 * seed + 0.5 * np.sin(np.linspace(0, 9, SAMPLES))
-    given = Recording({"length": 200.0 - 3.0 * cycles(), "pressure": waves}, STEP)
-    friction = MultistateFriction.example().simulate(given, initial="virgin")["force"]
-    law = PolynomialForce((60.0, 20.0), (-20.0, 30.0), 192.0, 8.0).simulate(given)["force"]
-    return given.with_channels(force=friction + law + noise(seed, 1.0))
-
-
-def activated(seed: int) -> Recording:
-    """Pressure that a contraction needs under a constant force."""
-    contraction = 0.02 + 0.05 * cycles()
-    given = {"contraction": contraction, "force": np.full(SAMPLES, 100.0 + 50.0 * seed)}
-    friction = PI((0.0, 0.005, 0.02), (10.0, 3.0, 2.0), 0.5).simulate(contraction)
-    pressure = friction + 20 * contraction**2 + noise(seed, 0.01)
-    return Recording(given | {"pressure": pressure}, STEP)
-
-
-def loaded(seed: int) -> Recording:
-    """A muscle under a load that changes; of two runs the first is without."""
-    volts = cycles()
-    load = seed % 2 * 40.0 * (1 - np.cos(np.linspace(0, 6 * np.pi, SAMPLES)))
-    y = 8.0 * GPI.example().simulate(volts) - 0.05 * load + noise(seed, 0.05)
-    return Recording({"voltage": volts, "force": load, "displacement": y}, STEP)
-
-
-def two_muscles(seed: int) -> Recording:
-    """Two muscles in an arm: of three runs each alone, then both."""
-    alone = ((1, 0), (0, 1), (1, 1))[seed % 3]
-    p = np.column_stack([0.5 * cycles() * on for on in alone])
-    stiffness = np.full(SAMPLES, float(seed // 3))
-    arm = ForceBalance.example().inverse()
-    y = arm.simulate(np.column_stack([p, stiffness])[:, : len(arm.inputs)])
-    channels = {"pressure_1": p[:, 0], "pressure_2": p[:, 1], "pressure_extensor": stiffness}
-    channels |= {f"displacement_{k + 1}": y[:, k] + noise(seed + 9 * k, 0.01) for k in range(2)}
-    return Recording(channels, STEP)
-
-
-def commanded(seed: int) -> Recording:
-    """Pressure behind a regulator that is driven by a voltage."""
-    volts = cycles(first=5.0 - 0.2 * seed)
-    p = Air(0.6, 0.1, 0.06, 0.2, 0.3, 0.1).simulate(volts, sample_time=STEP) + noise(seed, 0.005)
-    return Recording({"voltage": volts, "pressure": p}, STEP)
-
-
-def shaken(seed: int) -> Recording:
-    """A mass on a spring beside an element that remembers, shaken by a force from rest."""
-    rng, t = np.random.default_rng(seed), STEP * np.arange(SAMPLES)
-    waves = rng.uniform(0.4, 1.0, 4), 2 * np.pi * np.array([0.3, 0.7, 1.1, 1.9])
-    force = sum(a * np.sin(w * t) for a, w in zip(*waves, strict=True))
-    y = BoucWenOscillator.example().simulate(force, sample_time=STEP) + noise(seed, 0.02)
-    return Recording({"force": force, "displacement": y}, STEP)
-
-
 KINDS = {
-    "muscle": Kind(("pressure",), ("displacement",), muscle),
-    "isobaric": Kind(("length",), ("force",), isobaric, ("pressure",)),
-    "activated": Kind(("contraction",), ("pressure",), activated, ("force",)),
-    "commanded": Kind(("voltage",), ("pressure",), commanded),
-    "loaded": Kind(("voltage",), ("displacement",), loaded, ("force",), n_runs=4),
-    "shaken": Kind(("force",), ("displacement",), shaken),
+    "muscle": Kind(("pressure",), ("displacement",), "muscle"),
+    "isobaric": Kind(("length",), ("force",), "bench", ("pressure",)),
+    "activated": Kind(("contraction",), ("pressure",), "activated", ("force",)),
+    "commanded": Kind(("voltage",), ("pressure",), "commanded"),
+    "loaded": Kind(("pressure",), ("displacement",), "lifted", ("force",)),
+    "shaken": Kind(("force",), ("displacement",), "shaken"),
     "two muscles": Kind(
         ("pressure_1", "pressure_2"),
         ("displacement_1", "displacement_2"),
-        two_muscles,
+        "arm",
         ("pressure_extensor",),
-        n_runs=6,
     ),
 }
 
 
-@cache
 def recorded(kind: str) -> tuple[Recording, ...]:
     """Return the runs of a kind."""
-    return tuple(KINDS[kind].make(seed) for seed in range(KINDS[kind].n_runs))
+    return runs(KINDS[kind].plant)
 
 
 @cache

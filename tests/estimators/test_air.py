@@ -10,33 +10,27 @@ import pytest
 from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.dynamic.air import Air
 from mckibben.estimators.dynamic.air import AirEstimator
-from tests.cli.conftest import cli as cli  # a fixture
 
 STEP, NOISE = 0.01, 0.005
 REGULATOR = Air(0.6, 0.3, 0.08, 0.05, 0.09, 0.03)
 
 
-def commands(seed: int = 0) -> np.ndarray:
-    rng = np.random.default_rng(seed)
+def recorded(air: Air) -> Recording:
+    rng = np.random.default_rng(0)
     levels = np.repeat(rng.uniform(1.0, 9.0, 60), rng.integers(5, 60, 60))
-    return np.concatenate([np.full(20, levels[0]), levels])
-
-
-def recorded(air: Air, seed: int = 0, volts: np.ndarray | None = None) -> Recording:
-    volts = commands(seed) if volts is None else volts
-    noise = NOISE * np.random.default_rng(seed + 100).standard_normal(volts.size)
+    volts = np.concatenate([np.full(20, levels[0]), levels])
+    noise = NOISE * rng.standard_normal(volts.size)
     pressure = air.simulate(volts, sample_time=STEP) + noise
     return Recording({"voltage": volts, "pressure": pressure}, STEP)
 
 
-def fitted(air: Air, seed: int = 0) -> tuple[Air, AirEstimator]:
-    estimator = AirEstimator().fit(recorded(air, seed))
+def fitted(air: Air) -> tuple[Air, AirEstimator]:
+    estimator = AirEstimator().fit(recorded(air))
     assert isinstance(estimator.model_, Air)
     assert estimator.diagnostics_.rmse < 1.05 * NOISE
     return estimator.model_, estimator
 
 
-@pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize(
     "air",
     [
@@ -46,8 +40,8 @@ def fitted(air: Air, seed: int = 0) -> tuple[Air, AirEstimator]:
     ],
     ids=["regulator", "slow to fill", "short of supply"],
 )
-def test_parameters_are_found_within_three_standard_errors(air: Air, seed: int) -> None:
-    found, estimator = fitted(air, seed)
+def test_parameters_are_found_within_three_standard_errors(air: Air) -> None:
+    found, estimator = fitted(air)
     assert found.dead_time == pytest.approx(air.dead_time)
     errors = np.array(estimator.diagnostics_.standard_errors)
     assert np.isfinite(errors).all()

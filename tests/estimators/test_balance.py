@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +14,6 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, PRESSURE
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.blocks.memoryless.contact import Contact
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_loads import under
@@ -101,13 +99,6 @@ def test_loads_beyond_those_trained_enter_as_they_are(found: BalanceEstimator) -
     assert error(found, recording(4, strongest=140.0)) < 0.15
 
 
-def test_its_inverse_gives_back_the_pressures(found: BalanceEstimator) -> None:
-    run_ = recording(5)
-    moved = found.fitted.simulate(run_)
-    back = found.fitted.inverse().simulate(moved.select(["displacement", "force"]))
-    np.testing.assert_allclose(back["pressure"], run_["pressure"], atol=1e-8)
-
-
 def test_a_dead_zone_is_found_where_there_is_one(found: BalanceEstimator) -> None:
     assert isinstance(found.fitted, Inverse)
     filled = Series((Contact(0.15), MUSCLE.inverse()))
@@ -122,12 +113,6 @@ def test_a_dead_zone_is_found_where_there_is_one(found: BalanceEstimator) -> Non
     (contact, _) = estimator.fitted.parts  # type: ignore[attr-defined]
     assert 0.07 < contact.pressure < 0.3
     assert error(estimator, dead(3)) < 0.1
-    run_ = dead(4)
-    wished = estimator.fitted.simulate(run_)
-    back = estimator.fitted.inverse().simulate(wished.select(["displacement", "force"]))
-    np.testing.assert_allclose(back["pressure"], run_["pressure"], atol=1e-7)
-    told = load_of(estimator.fitted).simulate(wished.select(["displacement", "pressure"]))
-    np.testing.assert_allclose(told["force"], run_["force"], atol=1e-6)
 
 
 def test_a_mass_is_found_by_how_fast_it_swings() -> None:
@@ -139,10 +124,6 @@ def test_a_mass_is_found_by_how_fast_it_swings() -> None:
         errors.append(error(estimator, other))
     assert errors[1] < 3.0 * NOISE < 0.5 * errors[0]
     np.testing.assert_allclose(balance_of(estimator).mass, 0.02, rtol=0.2)
-    # with it the pressures for a motion are as exact as without
-    y = np.column_stack([estimator.predict(other)[0].ravel(), other["force"]])
-    pressures = estimator.fitted.inverse().simulate(y, sample_time=STEP)[:, 0]
-    np.testing.assert_allclose(pressures, other["pressure"], atol=1e-8)
 
 
 def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
@@ -159,15 +140,6 @@ def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
         assert float(np.min(b.springs[0][1] + elastic - p * narrows)) > -1e-6
 
 
-def test_standard_errors_cover_what_is_true(found: BalanceEstimator) -> None:
-    names = found.fitted.parameter_names
-    errors = dict(zip(names, found.diagnostics_.standard_errors, strict=True))
-    values = dict(zip(names, found.fitted.pack(), strict=True))
-    area = next(name for name in names if name.startswith("area"))
-    assert 0 < errors[area] < 3.0
-    assert abs(values[area] - 60.0) < 6.0 * errors[area] + 0.5
-
-
 def test_lengths_that_fall_from_afar_are_the_same_to_it(found: BalanceEstimator) -> None:
     runs = [
         run_.with_channels({}, displacement=250.0 - run_["displacement"])
@@ -175,9 +147,6 @@ def test_lengths_that_fall_from_afar_are_the_same_to_it(found: BalanceEstimator)
     ]
     other = BalanceEstimator().fit(runs)
     assert other.diagnostics_.rmse < 2.5 * NOISE
-    moved = other.fitted.simulate(runs[0])
-    back = other.fitted.inverse().simulate(moved.select(["displacement", "force"]))
-    np.testing.assert_allclose(back["pressure"], runs[0]["pressure"], atol=1e-8)
 
 
 def test_held_muscles_are_learned_from_by_their_force() -> None:
@@ -200,21 +169,21 @@ def test_held_muscles_are_learned_from_by_their_force() -> None:
     np.testing.assert_allclose(balance_of(estimator).lags, MUSCLE.lags, rtol=0.35)
 
 
-def hung(seed: int, weight: float, n: int = 1000, *, measured: bool = False) -> Recording:
+def hung(seed: int, weight: float, n: int = 1000) -> Recording:
     """Return a muscle under a weight, driven at random from rest."""
     time = np.arange(n) * STEP
     p = np.minimum(time / 2.0, 1.0) * random_wave(time, 0.3, 4.0, seed=seed)
     force = np.full(n, weight)
     y = MUSCLE.inverse().simulate(np.column_stack([p, force]), sample_time=STEP)[:, 0]
     y = y + NOISE * np.random.default_rng(seed).standard_normal(n)
-    channels = {"pressure": p, "displacement": y}
-    if measured:
-        channels["force"] = force
-    return Recording(channels, STEP, meta={"name": f"hung-{seed}"})
+    return Recording({"pressure": p, "displacement": y, "force": force}, STEP)
 
 
 def test_weights_that_nobody_measured_are_found() -> None:
-    estimator = BalanceEstimator().fit([hung(1, 0.0), hung(2, 40.0), hung(3, 80.0)])
+    runs = [
+        hung(seed, 40.0 * (seed - 1)).select(["pressure", "displacement"]) for seed in (1, 2, 3)
+    ]
+    estimator = BalanceEstimator().fit(runs)
     found = estimator.loads_[:, 0] * 60.0  # bar on an area at rest of 60 N/bar
     np.testing.assert_allclose(found, [0.0, 40.0, 80.0], atol=1.0)
     assert estimator.diagnostics_.rmse < 2.5 * NOISE
@@ -223,70 +192,6 @@ def test_weights_that_nobody_measured_are_found() -> None:
     other = hung(5, 40.0)
     missed = heavier.simulate(other.select(["pressure"]))["displacement"] - other["displacement"]
     assert np.sqrt(np.mean(missed**2)) < 3.0 * NOISE
-
-
-@pytest.mark.long
-def test_without_evidence_of_other_weights_there_are_none() -> None:
-    runs = [hung(seed, 40.0) for seed in (1, 2, 3)]
-    estimator = BalanceEstimator().fit(runs)
-    assert not estimator.loads_.any()
-    np.testing.assert_array_equal(
-        estimator.fitted.pack(), BalanceEstimator(unknown_load=False).fit(runs).fitted.pack()
-    )
-    forced = BalanceEstimator(unknown_load=True).fit(runs)
-    assert np.abs(forced.loads_ * 60.0).max() < 1.0
-
-
-@pytest.mark.long
-def test_a_recording_without_the_force_that_others_have_hung_under_a_weight() -> None:
-    runs = [recording(1), recording(2), hung(3, 50.0)]
-    estimator = BalanceEstimator().fit(runs)
-    assert estimator.diagnostics_.rmse < 2.5 * NOISE
-    assert error(estimator, recording(4)) < 3.0 * NOISE
-    (weight,) = re.findall(r"([\d.]+) in hung-3", " ".join(estimator.diagnostics_.notes))
-    assert float(weight) == pytest.approx(50.0, abs=1.0)
-    with pytest.raises(DataError, match="force"):
-        BalanceEstimator(unknown_load=False).fit(runs)
-
-
-def test_two_muscles_that_go_slack_and_an_extensor() -> None:
-    arm = replace(
-        Balance.example(),
-        springs=((0.0, 10.0, -7.0, -3.0, 1.0, 0.4), (0.0, -7.0, 11.0, -3.0, 0.4, 1.2)),
-        bladders=(8.0, 8.0),
-        pushes=(3.0, 1.5),
-        loads=((), ()),
-        scheduled=(Balance.example().scheduled[0],),
-        tare=True,
-    )
-    runs = []
-    for seed in (1, 2, 3):
-        time = np.arange(800) * STEP
-        rises = np.minimum(time / 2.0, 1.0)
-        waves = [random_wave(time, 0.3, 4.0, seed=10 * seed + k) * rises for k in (1, 2)]
-        waves.append(random_wave(time, 0.1, 2.0, seed=10 * seed))
-        y = arm.inverse().simulate(np.column_stack(waves), sample_time=STEP)
-        y = y + NOISE * np.random.default_rng(seed).standard_normal(y.shape)
-        names = (
-            "pressure_1",
-            "pressure_2",
-            "pressure_extensor",
-            "displacement_1",
-            "displacement_2",
-        )
-        runs.append(Recording(dict(zip(names, [*waves, *y.T], strict=True)), STEP))
-    estimator = BalanceEstimator(degree=1).fit(runs[:2])
-    balance = balance_of(estimator)
-    assert balance.tare
-    unit = balance.areas[0][0] / arm.areas[0][0]
-    np.testing.assert_allclose(balance.pushes, unit * np.array(arm.pushes), rtol=0.2)
-    wrong = runs[1].with_channels({}, displacement_2=-runs[1]["displacement_2"])
-    with pytest.raises(DataError, match="displacement_2"):
-        BalanceEstimator(degree=1).fit([runs[0], wrong])
-    springs = np.array([[balance.springs[k][1 + j] for j in (0, 1)] for k in (0, 1)])
-    np.testing.assert_allclose(springs, springs.T)
-    missed = estimator.predict(runs[2])[0] - runs[2].matrix(["displacement_1", "displacement_2"])
-    assert np.sqrt(np.mean(missed**2)) < 0.15
 
 
 TAUT = replace(MUSCLE, walls=(0.1,))
@@ -343,16 +248,6 @@ def test_least_squares_within_inequalities_meet_the_conditions_of_optimality() -
         constrained_least_squares(slopes, target, np.eye(6)[[0, 0]] * [[1.0], [-1.0]], np.ones(2))
 
 
-@pytest.mark.long
-def test_what_recordings_that_begin_in_motion_remember_is_found() -> None:
-    cut = [recording(seed).slice(500, 1200) for seed in (1, 2, 6)]
-    estimator = BalanceEstimator().fit([*cut, recording(7, n=700)])
-    assert estimator.diagnostics_.rmse < 2.5 * NOISE < 0.1 * estimator.diagnostics_.rmse_from_rest
-    assert error(estimator, recording(3)) < 0.15
-    from_rest = BalanceEstimator().fit([recording(1), recording(2)]).diagnostics_
-    assert from_rest.rmse == from_rest.rmse_from_rest
-
-
 def test_recordings_that_begin_under_a_pressure_long_held_count_as_a_whole() -> None:
     def held(seed: int) -> Recording:
         time = np.arange(1200) * STEP
@@ -388,7 +283,7 @@ def test_what_has_the_wrong_sign_or_does_not_move_is_refused_by_name() -> None:
     first, second, third = (recording(seed) for seed in (1, 2, 3))
     turned = second.with_channels({}, displacement=-second["displacement"])
     pushed = recording(2, sign=-1.0)
-    weights = [hung(seed, weight, measured=True) for seed, weight in enumerate((0.0, 30.0, 60.0))]
+    weights = [hung(seed, weight) for seed, weight in enumerate((0.0, 30.0, 60.0))]
     both = {"pressure_1": first["pressure"], "pressure_2": first["pressure"][::-1].copy()}
     moved = {
         "displacement_1": first["displacement"],

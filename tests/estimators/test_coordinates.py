@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from mckibben import Recording, load
+from mckibben import Recording
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.signals.broadband import random_wave
 
@@ -47,20 +45,3 @@ def test_two_muscles_at_a_joint_follow_what_was_not_trained(found: BalanceEstima
     other = joint(3)
     missed = found.predict(other)[0].ravel() - other["displacement"]
     assert np.sqrt(np.mean(missed**2)) < 0.02 * np.ptp(other["displacement"])
-
-
-def test_its_inverse_gives_pressures_that_give_the_motion(
-    found: BalanceEstimator, tmp_path: Path
-) -> None:
-    found.fitted.save(tmp_path / "joint.json")
-    model = load(tmp_path / "joint.json")
-    assert model == found.fitted
-    reference = (
-        4.0
-        * np.sin(np.arange(300) * STEP)[:, np.newaxis]
-        * np.linspace(0.2, 1.0, 300)[:, np.newaxis]
-    )
-    inverse = model.inverse()
-    pressures = inverse.simulate(reference, sample_time=STEP)
-    assert pressures.shape == (300, 2)
-    np.testing.assert_allclose(model.simulate(pressures, sample_time=STEP), reference, atol=1e-8)

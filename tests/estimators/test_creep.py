@@ -76,14 +76,6 @@ def test_where_the_muscle_was_settled_nothing_is_made_up() -> None:
     assert begun_places(CreepPIEstimator().fit(run).model_) == []
 
 
-def test_what_falls_is_begun_as_what_rises_is() -> None:
-    run = worked(SLOW, 150, 100, 0.01)
-    falling = run.with_channels(displacement=30 - run["displacement"])
-    one, other = (CreepPIEstimator(settled=False).fit(r) for r in (run, falling))
-    assert begun_places(other.model_)
-    assert other.diagnostics_.rmse == pytest.approx(one.diagnostics_.rmse, rel=0.05)
-
-
 def test_moves_of_what_was_begun_are_those_of_finite_differences() -> None:
     runs = [worked(SLOW, 90, 40), worked(SLOW, 70, 10)]
     data = training_data(runs, "pressure", "displacement")

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from sklearn.base import clone, is_classifier, is_regressor
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from mckibben import GPI, DataError, ModelError, RateDependentPI, Recording
 from mckibben.blocks.core.block import Block
-from mckibben.comparison.offered import defaults, settings_of
+from mckibben.comparison.offered import defaults
 from mckibben.estimators.core.searching import SearchingEstimator
 from mckibben.estimators.core.settings import Setting, settings_with_defaults
 from mckibben.registry import load, names
@@ -30,9 +31,10 @@ SWARMS = tuple(name for name in ALL if isinstance(load("estimators", name)(), Se
 FREE_OF_UNITS = (
     *("activation-memory", "activation-pressure", "arx", "bj", "coupled-memory", "oe", "pi"),
     *("force-bilinear", "force-chou", "force-minh", "force-petrovic", "force-schindele"),
-    *("kp", "maxwell-slip", "mms", "narx", "narx-network", "narx-play", "preisach", "tsfnn"),
+    *("kp", "maxwell-slip", "narx", "narx-network", "narx-play", "preisach", "tsfnn"),
 )
-"""The others have tolerances, bounds or starts in units of their own yet."""
+UNIT_DEPENDENT = ("gpi", "mms", "mpi", "rdpi")
+"""These, and others, have tolerances, bounds or starts in units of their own yet."""
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -76,17 +78,6 @@ def test_settings_are_the_arguments_survive_cloning_and_have_forms(name: str) ->
             assert one.low <= one.default <= one.high
 
 
-def test_kinds_of_settings_and_what_is_beyond_them() -> None:
-    gpi, balance = settings("gpi"), settings("balance")
-    assert (gpi["n_operators"].kind, gpi["n_operators"].high) == ("whole", 1000)
-    assert gpi["envelope"].choices == ("tanh", "piecewise-linear", "exponential")
-    assert gpi["nonnegative"].kind == "flag"
-    assert (balance["slack"].kind, balance["slack"].optional) == ("flag", True)
-    for name, text in (("n_operators", "1001"), ("envelope", "round")):
-        with pytest.raises(ModelError, match=name):
-            settings_of("gpi", [f"{name}={text}"])
-
-
 @pytest.mark.parametrize(
     ("setting", "value"),
     [
@@ -100,12 +91,6 @@ def test_impossible_settings_are_refused(setting: str, value: object) -> None:
         if setting in load("estimators", name)().get_params():
             with pytest.raises(ModelError, match=rf"{setting}.*{value}"):
                 quick(name).set_params(**{setting: value}).fit(example_for(name))
-
-
-def test_settings_may_be_numpy_numbers() -> None:
-    runs = example_for("pi")
-    assert quick("pi", n_operators=np.int64(3)).fit(runs).model_.n_parameters == 4
-    assert quick("pi", thresholds=np.array([0.0, 1.0])).fit(runs).model_.n_parameters == 3
 
 
 # -- data ------------------------------------------------------------------------------------------
@@ -131,7 +116,7 @@ def test_data_that_no_model_is_of_are_refused(name: str) -> None:
     "name",
     [
         *FREE_OF_UNITS,
-        *(pytest.param(n, marks=pytest.mark.xfail(strict=True)) for n in ("gpi", "mpi", "rdpi")),
+        *(pytest.param(n, marks=pytest.mark.xfail(strict=True)) for n in UNIT_DEPENDENT),
     ],
 )
 def test_a_fit_does_not_depend_on_the_unit_of_the_output(name: str) -> None:
@@ -148,6 +133,19 @@ def test_swarms_fit_too_and_repeat(name: str, method: str) -> None:
     first, second = (quick(name, method=method, seed=3).fit(runs) for _ in range(2))
     assert first.model_ == second.model_
     assert first.diagnostics_.rmse < 2 * np.ptp(runs[0][first.output])
+
+
+def threads() -> set[int]:
+    """Return of how many threads linear algebra is now."""
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+
+def test_linear_algebra_has_one_thread_while_fitting_and_as_before_after() -> None:
+    seen: set[int] = set()
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        quick("gpi").fit(example_for("gpi"), progress=lambda *_: seen.update(threads()))
+        assert (seen, threads()) == ({1}, before)
 
 
 # -- models of loops -------------------------------------------------------------------------------

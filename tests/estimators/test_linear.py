@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import approx_fprime
 from scipy.signal import lfilter
 
-from mckibben import DataError, ModelError, Recording, identify
-from mckibben.blocks.core.saving import from_dict
+from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.comparison.free_run import run_free
@@ -93,17 +92,6 @@ def test_box_jenkins_finds_the_truth_whatever_the_noise(seed: int) -> None:
     assert fit.noise_.deviation == pytest.approx(0.3, rel=0.1)
 
 
-@pytest.mark.long
-def test_output_error_recovers_with_intervals() -> None:
-    inside = []
-    for seed in range(12):
-        fit = load("estimators", "oe")(n_starts=6).fit(recorded(seed, 600))
-        truth = np.array([*B, *F])
-        spread = np.array(fit.diagnostics_.standard_errors)[:4]
-        inside.append(np.abs(fit.model_.pack()[:4] - truth) < 1.96 * spread)
-    assert 0.85 < np.mean(inside) <= 1.0
-
-
 def test_arx_is_ordinary_least_squares() -> None:
     recording = recorded(4, 400)
     u, y = recording["pressure"], recording["displacement"]
@@ -116,36 +104,6 @@ def test_arx_is_ordinary_least_squares() -> None:
     np.testing.assert_allclose(model.denominator, -expected[2:4], rtol=1e-6)
 
 
-@pytest.mark.long
-def test_armax_agrees_with_statsmodels() -> None:
-    from statsmodels.tsa.statespace.sarimax import SARIMAX
-
-    rng = np.random.default_rng(5)
-    u, e = rng.standard_normal(1500), 0.3 * rng.standard_normal(1500)
-    y = lfilter([0.5], [1.0, -0.8], u) + lfilter([1.0, 0.4], [1.0, -0.8], e)
-    recording = Recording({"pressure": u, "displacement": y}, STEP)
-    ours: Any = load("estimators", "armax")(n_poles=1, n_zeros=1, n_noise=1).fit(recording).model_
-    # statsmodels lets the input enter statically: the same model, its input filtered by hand
-    theirs = SARIMAX(y, exog=lfilter([1.0], [1.0, -0.8], u), order=(1, 0, 1)).fit(disp=False)
-    assert ours.denominator[0] == pytest.approx(-0.8, abs=0.02)
-    assert ours.numerator[0] == pytest.approx(theirs.params[0], abs=0.02)
-
-
-def test_process_model_recovers_its_own_numbers() -> None:
-    truth = ProcessModel(6.8, (1.5,), 1.4, 0.8, 0.0, 0.0, 2.0)
-    rng = np.random.default_rng(6)
-    u = np.repeat(rng.uniform(0, 5, 60), 20)
-    y = truth.simulate(u, sample_time=0.05) + 0.05 * rng.standard_normal(u.size)
-    fit = load("estimators", "p2uz")().fit(Recording({"pressure": u, "displacement": y}, 0.05))
-    assert fit.diagnostics_.rmse < 0.055
-    model = fit.model_
-    assert isinstance(model, ProcessModel)
-    assert model.gain == pytest.approx(6.8, rel=0.02)
-    np.testing.assert_allclose(
-        np.sort(np.roots(model.denominator())), np.sort(np.roots(truth.denominator())), rtol=0.15
-    )
-
-
 def test_bad_data_and_settings_are_refused() -> None:
     recording = recorded(9, 400)
     with pytest.raises(DataError):
@@ -154,16 +112,6 @@ def test_bad_data_and_settings_are_refused() -> None:
         load("estimators", "oe")(n_poles=10, n_zeros=10).fit(recording.slice(0, 25))
     with pytest.raises(ModelError, match="n_zeros"):
         load("estimators", "oe")(n_zeros=0).fit(recording)
-
-
-def test_identify_chooses_orders_by_cross_validation() -> None:
-    choice = identify(
-        [recorded(s, 300) for s in range(4)], "arx", {"n_poles": (1, 2), "n_zeros": (2,)}
-    )
-    assert choice.orders == {"n_poles": 2, "n_zeros": 2}
-    assert len(choice.tried) == 2
-    with pytest.raises(ModelError, match="eupi"):
-        identify(recorded(1), "eupi")
 
 
 def test_affine_match_by_both_rules() -> None:
@@ -179,19 +127,6 @@ def test_affine_match_by_both_rules() -> None:
 
 
 WARM = ProcessModel(6.8, (5.7,), 9.1, 156.0, 0.0, 0.0, 2.0)
-
-
-def test_a_start_of_which_the_known_outputs_tell_nothing_is_rest() -> None:
-    """A lag's start dies away before them, so that it would be made up of their noise."""
-    lag = TransferFunction((0.2, 0.1), (-0.6,), STEP, initial="fitted")
-    rng = np.random.default_rng(0)
-    u = rng.uniform(0, 4, (400, 1))
-    at_rest = lag.initial_state(u[0], "first_sample")
-    y = lag.simulate(u, sample_time=STEP, initial=(at_rest + 2.0).tolist())[:, 0]
-    y += 0.1 * rng.standard_normal(y.size)
-    late = np.arange(y.size) >= 200
-    np.testing.assert_allclose(lag.fitted_state(u, y, STEP, late), at_rest, atol=1e-12)
-    np.testing.assert_allclose(lag.fitted_state(u, y, STEP), at_rest + 2.0, atol=0.4)
 
 
 def warm(seed: int, n: int = 1000) -> Recording:
@@ -225,18 +160,14 @@ def test_what_is_delivered_is_what_was_optimised(initial: Any) -> None:
 def test_prediction_goes_from_one_step_errors_to_the_free_run() -> None:
     recording = recorded(12, 1000, c=C, d=D)
     fit = load("estimators", "bj")().fit(recording)
-    model = from_dict(fit.model_.to_dict())
+    model = fit.model_
     assert isinstance(model, TransferFunction)
-    assert model == fit.model_
     measured = recording["displacement"]
     rms = [
         float(np.std(model.predict(recording, k)["displacement"] - measured)) for k in (1, 5, 50)
     ]
     assert rms[0] == pytest.approx(fit.noise_.deviation, rel=1e-3)
     assert rms[0] < rms[1] < rms[2] * 1.001
-    for horizon in (0, 1.5):
-        with pytest.raises(ModelError, match="horizon"):
-            model.predict(recording, horizon)  # type: ignore[arg-type]
     beyond, whole = (model.predict(recording, n) for n in (10**9, len(recording)))
     np.testing.assert_array_equal(beyond["displacement"], whole["displacement"])
 

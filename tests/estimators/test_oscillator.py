@@ -23,9 +23,7 @@ Array = NDArray[np.float64]
 BENCHMARK = MEASURED / "bouc_wen_benchmark"
 
 SYSTEMS = {
-    "light": (BoucWenOscillator(5.0, 0.002, 2.0, 6.0, 0.4, 0.3), 0.01, (0.2, 12.0), 1.5),
     "quick": (BoucWenOscillator(0.05, 0.003, 30.0, 10.0, 2.0, 1.0), 5e-4, (5.0, 400.0), 20.0),
-    "hardening": (BoucWenOscillator(10.0, 0.05, 20.0, 100.0, 1.0, -0.9), 0.004, (0.5, 50.0), 60.0),
     "slipping": (BoucWenOscillator(1.0, 0.02, 20.0, 2.0, 1.0, 0.5), 0.002, (1.0, 60.0), 10.0),
 }
 """Oscillator, sample time, band [Hz] and size [N] of the force that shakes it."""
@@ -66,15 +64,7 @@ def missed(model: Any, test: Recording, periodic: bool) -> float:
     return float(np.sqrt(np.mean(error**2)) / test["displacement"].std())
 
 
-@pytest.mark.parametrize(
-    ("name", "periodic"),
-    [
-        ("quick", True),
-        ("slipping", False),
-        pytest.param("light", False, marks=pytest.mark.long),
-        pytest.param("hardening", True, marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.parametrize(("name", "periodic"), [("quick", True), ("slipping", False)])
 def test_numbers_come_back_from_noisy_recordings(name: str, periodic: bool) -> None:
     noisy, test = shaken(name, periodic)
     found = BoucWenOscillatorEstimator(periodic=periodic).fit(noisy)
@@ -87,17 +77,6 @@ def test_an_element_of_unknown_shape_is_found() -> None:
     noisy, test = shaken("slipping", periodic=True)
     found = DuhemOscillatorEstimator(periodic=True).fit(noisy)
     assert missed(found.model_, test, True) < 0.2 * NOISE
-
-
-@pytest.mark.long
-def test_an_offset_is_found_where_there_is_one() -> None:
-    noisy, _ = shaken("hardening", periodic=True)
-    moved = [run.with_channels(displacement=run["displacement"] + 3.0) for run in noisy]
-    found = BoucWenOscillatorEstimator(periodic=True, fit_offset=True).fit(moved)
-    model = found.model_
-    assert isinstance(model, BoucWenOscillator)
-    assert model.output_offset == pytest.approx(3.0, abs=1e-3)
-    assert model.stiffness == pytest.approx(20.0, rel=1e-2)
 
 
 ELEMENTS = [
@@ -140,7 +119,7 @@ def test_runs_with_derivatives_are_those_of_the_block_and_exact(follow: Any, mod
 
 
 def test_what_cannot_be_learned_from_is_refused() -> None:
-    noisy, _ = shaken("hardening", periodic=True)
+    noisy, _ = shaken("quick", periodic=True)
     with pytest.raises(ModelError, match="periodic"):
         BoucWenOscillatorEstimator(initial="fitted").fit(noisy)
     turned = [run.with_channels(displacement=-run["displacement"]) for run in noisy]

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 
-from mckibben import ModelError, Recording
+from mckibben import Recording
 from mckibben.blocks.force.multistate_friction import ELEVEN, MultistateFriction
 from mckibben.blocks.force.polynomial_force import PolynomialForce
 from mckibben.estimators.core.ranges import parameter_ranges
@@ -27,12 +26,6 @@ def test_ranges_of_a_linear_model_are_those_of_least_squares() -> None:
     found = parameter_ranges(block, given, share=0.05)
     np.testing.assert_allclose(np.log(found[:, 0]), np.log(best - spread), atol=0.01)
     np.testing.assert_allclose(np.log(found[:, 1]), np.log(best + spread), atol=0.01)
-
-
-def test_ranges_are_of_positive_parameters() -> None:
-    given = Recording(dict.fromkeys(("length", "pressure", "force"), np.linspace(1, 2, 9)), 0.1)
-    with pytest.raises(ModelError, match="positive"):
-        parameter_ranges(PolynomialForce((1.0,), (-1.0,)), given)
 
 
 def stick() -> Recording:

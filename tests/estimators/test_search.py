@@ -16,7 +16,7 @@ from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.optimisers.descent import Damping, Radius, Trust, descend
 from mckibben.estimators.optimisers.linear import solve_linear
-from mckibben.estimators.optimisers.multi_start import Choice, multi_start
+from mckibben.estimators.optimisers.multi_start import multi_start
 from mckibben.estimators.optimisers.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.registry import load
@@ -120,29 +120,3 @@ def test_descent_falls_at_every_step_and_arrives(trust: Trust) -> None:
     costs = [float(np.sum(valley(point) ** 2)) for point, _ in path]
     assert np.all(np.diff(costs) < 0)
     np.testing.assert_allclose(path[-1][0], [1, 1], atol=1e-6)
-
-
-def rugged(point: np.ndarray) -> np.ndarray:
-    """Residuals with many local minima, and 0 at (3, -2) alone."""
-    away = point - [3.0, -2.0]
-    return np.concatenate([0.3 * away, 2 * np.sin(np.pi * away)])
-
-
-def test_exchange_leads_out_of_local_minima_that_refinement_ends_in() -> None:
-    grid = np.linspace(-4.8, 4.2, 10)[:, None]
-    choices = [Choice(np.array([place]), grid) for place in (0, 1)]
-    found = [
-        multi_start(
-            rugged,
-            [np.array([-3.1, 2.9])],
-            np.full(2, -5.0),
-            np.full(2, 5.0),
-            Tracker(),
-            n_refined=1,
-            max_evaluations=50,
-            choices=tried,
-        )
-        for tried in ([], choices)
-    ]
-    assert np.abs(found[0] - [3.0, -2.0]).max() > 4.0
-    np.testing.assert_allclose(found[1], [3.0, -2.0], atol=1e-6)

@@ -10,9 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben.blocks.dynamic.state_network import StateNetwork
-from mckibben.estimators.dynamic.state_network import StateNetworkEstimator
 from mckibben.estimators.dynamic.state_network_slopes import follow_network
-from tests.estimators.test_oscillator import missed, shaken
 
 Array = NDArray[np.float64]
 
@@ -51,18 +49,3 @@ def test_a_run_that_leaves_all_bounds_ends() -> None:
     given, none = np.empty(50), np.empty((0, 7))
     state, moved = np.ones(1), np.zeros((1, 7))
     assert not follow_network(*weights, 1.0, state, moved, np.zeros(51), 1, 0, given, none)
-
-
-@pytest.mark.long
-def test_hysteresis_in_a_loop_is_learned_without_being_told_of() -> None:
-    noisy, test = shaken("quick", periodic=True, n=1024)
-    several, one = (
-        missed(
-            StateNetworkEstimator(periodic=True, n_units=units, n_steps=15).fit(noisy).model_,
-            test,
-            periodic=True,
-        )
-        for units in (4, 1)
-    )
-    assert several < 0.03
-    assert several < 0.4 * one

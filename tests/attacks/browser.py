@@ -57,19 +57,27 @@ CLICKABLE = (
     " .legendtoggle, .plot a, [class*=dialog] *"
 )
 
+CLICK = """async (which) => {
+    const seen = (window.clickedBefore ??= new WeakSet());
+    const all = [...document.querySelectorAll(which)].filter((e) => !seen.has(e));
+    for (const e of all) {
+        seen.add(e);
+        if (!e.isConnected) continue;
+        for (const kind of ["mousedown", "mouseup", "click"])
+            e.dispatchEvent(new MouseEvent(kind, {bubbles: true, cancelable: true}));
+        await new Promise((next) => setTimeout(next));
+    }
+    return all.length;
+}"""
+
+WINDOWS = """window.windowsOpened = [];
+window.open = (address) => { window.windowsOpened.push(`${address}`); return window; };"""
+"""A browser opens windows for people alone."""
+
 
 @dataclass
 class Watched:
-    """A page, what left it, and what went wrong in it.
-
-    Parameters
-    ----------
-    page : playwright.sync_api.Page
-    left : list of str
-        Addresses asked for that are not of the page itself.
-    errors : list of str
-        What the page complained of: a script that was stopped is one.
-    """
+    """A page, the addresses that left it, and what it complained of: a stopped script is one."""
 
     page: Any
     left: list[str] = field(default_factory=list)
@@ -79,24 +87,7 @@ class Watched:
         """Click whatever can be clicked, and what that opens; return how many clicks it took."""
         clicks = 0
         for _ in range(3):  # what the first clicks open is clicked next
-            found = self.page.evaluate(
-                """async (which) => {
-                    const seen = (window.clickedBefore ??= new WeakSet());
-                    const all = [...document.querySelectorAll(which)].filter((e) => !seen.has(e));
-                    for (const e of all) {
-                        seen.add(e);
-                        if (!e.isConnected) continue;
-                        for (const kind of ["mousedown", "mouseup", "click"])
-                            e.dispatchEvent(new MouseEvent(kind, {bubbles: true, cancelable: true}));
-                        await new Promise((next) => setTimeout(next));
-                    }
-                    return all.length;
-                }""",
-                which,
-            )
-            clicks += int(found)
-            if not found:
-                break
+            clicks += int(self.page.evaluate(CLICK, which))
             self.page.wait_for_timeout(300)
         self.left += self.page.evaluate("window.windowsOpened.splice(0)")
         return clicks
@@ -104,44 +95,29 @@ class Watched:
     def unharmed(self) -> None:
         """Assert that nothing left, and that no name was run."""
         ran = self.page.evaluate(f"window['{PROBE}'] ?? null")
-        assert ran is None, "a name was run as a script"
-        assert not self.left, f"left the machine: {self.left}"
-        assert not self.errors, f"went wrong: {self.errors}"
+        assert (ran, self.left, self.errors) == (None, [], [])
 
 
 @contextmanager
 def watched(own: str) -> Iterator[Watched]:
-    """Open a page of this machine in a browser that can reach nothing else.
-
-    Parameters
-    ----------
-    own : str
-        Address that the page may ask: of a file, or of a server here.
-    """
+    """Open a page of this machine, a file or of a server here, where nothing else is reached."""
     play_with = pytest.importorskip("playwright.sync_api").sync_playwright
     with play_with() as play:
         browser = play.chromium.launch(executable_path=where("chromium"), args=OPTIONS)
         parts = urlsplit(own)
         ours = own if parts.scheme == "file" else f"{parts.scheme}://{parts.netloc}/"
+        here = ours.replace("http", "ws", 1)
         context = browser.new_context(viewport={"width": 1280, "height": 900})
         found = Watched(context.new_page())
 
-        def asked(request: Any) -> None:
-            if not request.url.startswith((ours, "data:", "blob:")):
-                found.left.append(request.url)
+        def asked(url: str, allowed: tuple[str, ...]) -> None:
+            if not url.startswith(allowed):
+                found.left.append(url)
 
         page = found.page
-        context.on("request", asked)
-        # a browser opens windows for people alone
-        context.add_init_script(
-            "window.windowsOpened = [];"
-            "window.open = (address) => { window.windowsOpened.push(`${address}`); return window; };"
-        )
-        here = ours.replace("http", "ws", 1)
-        page.on(
-            "websocket",
-            lambda link: None if link.url.startswith(here) else found.left.append(link.url),
-        )
+        context.on("request", lambda request: asked(request.url, (ours, "data:", "blob:")))
+        context.add_init_script(WINDOWS)
+        page.on("websocket", lambda link: asked(link.url, (here,)))
         page.on("console", lambda m: found.errors.append(m.text) if m.type == "error" else None)
         page.on("pageerror", lambda error: found.errors.append(str(error)))
         page.goto(own)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import socket
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pytest
@@ -29,16 +28,6 @@ def stranger() -> Iterator[socket.socket]:
         made.bind(("127.0.0.1", 0))
         made.settimeout(0.1)
         yield made
-
-
-def test_nobody_is_heard_or_answered_before_a_peer_is_named(stranger: socket.socket) -> None:
-    with UDPLink(size=1) as link:
-        stranger.sendto(packed(1, [5.0]), link.address)
-        assert link.newest(timeout=0.1) is None
-        with pytest.raises(DataError, match="accept"):
-            link.send([1.0])
-        with pytest.raises(TimeoutError):
-            stranger.recv(100)
 
 
 def test_a_stranger_takes_over_neither_ear_nor_mouth(
@@ -73,19 +62,3 @@ def test_what_is_not_finite_is_neither_taken_nor_sent(value: float, peer: socket
         for values in ([value], [], ["a"], [[1.0], [2.0, 3.0]], np.zeros(200), None):
             with pytest.raises(DataError, match="1 to 128"):
                 link.send(values)  # type: ignore[arg-type]  # that is the attack
-
-
-@pytest.mark.parametrize(
-    "named", [("no such host.invalid", 5005), ("127.0.0.1", 0), ("127.0.0.1", 70000), ("a",), 5]
-)
-def test_what_is_no_peer_is_refused(named: Any) -> None:
-    with pytest.raises(DataError):
-        UDPLink(named, size=1)
-
-
-def test_settings_that_do_not_fit_are_refused() -> None:
-    for limits in ([(0.0, 1.0)], [(1.0, 0.0)] * 2, [(0.0, math.nan)] * 2):
-        with pytest.raises(DataError):
-            UDPLink(size=2, limits=limits)
-    with UDPLink(size=1) as link, pytest.raises(DataError, match="bind="):
-        link.accept(("192.0.2.1", 5005))

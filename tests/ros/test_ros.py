@@ -85,7 +85,7 @@ def test_bytes_are_those_of_ros(values: list[float], when: int) -> None:
         ours = values[:1] if kind.single else values
         names = [f"joint_{k}" for k in range(len(ours))]
         data = serialized(message(kind, ours, names, when))
-        theirs = STORE.deserialize_cdr(data, kind.ros)
+        theirs: Any = STORE.deserialize_cdr(data, kind.ros)
         assert bytes(STORE.serialize_cdr(theirs, kind.ros)) == data
         match kind.name:
             case "FluidPressure":

@@ -90,7 +90,7 @@ def black_box(folder: Path) -> Tree:
             found.append(content[key][0, :4096].astype(float))
         channels = {"force": found[0], "displacement": 1000.0 * found[1]}
         parts.append(Recording(channels, 1 / 750))
-    return _chosen(*parts, n_folds=1, n_units=5)
+    return _chosen(parts[0], parts[1], n_folds=1, n_units=5)
 
 
 def _chosen(

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from mckibben import GPI, Banded, DataError, ModelError, ModelWarning, Recording, calibrate, load
+from mckibben import GPI, Banded, DataError, ModelError, ModelWarning, Recording, calibrate
 from mckibben.bands.finding import find_band
 from mckibben.bands.held import Held
 from mckibben.bands.scale import SHAPES
@@ -79,23 +78,6 @@ def test_no_more_runs_than_chance_are_missed_where_a_run_is_off_as_a_whole() -> 
     assert missed > 0
 
 
-def test_it_is_narrow_where_the_model_is_good(banded: Banded) -> None:
-    ends = banded.simulate(noisy(1000))
-    width, high = ends["displacement_upper"] - ends["displacement_lower"], ends["pressure"] > 2.5
-    assert np.median(width[high]) > 2.5 * np.median(width[~high])
-
-
-def test_it_is_the_same_everywhere_where_the_model_is_as_good_everywhere() -> None:
-    rng = np.random.default_rng(0)
-    runs = []
-    for seed in range(12):
-        u = random_wave(STEP * np.arange(200), 0.3, 5.0, seed=seed)
-        y = MODEL.simulate(u) + 0.1 * rng.standard_normal(200)
-        runs.append(Recording({"pressure": u, "displacement": y}, STEP))
-    ends = quietly(MODEL, runs).simulate(runs[0])
-    assert np.ptp(ends["displacement_upper"] - ends["displacement_lower"]) < 1e-9
-
-
 def test_higher_levels_are_wider_and_hold_the_value(banded: Banded) -> None:
     run = noisy(1001)
     before = 0.0
@@ -107,45 +89,6 @@ def test_higher_levels_are_wider_and_hold_the_value(banded: Banded) -> None:
         assert width.mean() > before
         before = width.mean()
     assert np.array_equal(ends["displacement"], MODEL.simulate(run)["displacement"])
-
-
-def test_it_streams_and_saves_to_the_bit(banded: Banded, tmp_path: Path) -> None:
-    u = noisy(1002)["pressure"]
-    whole = banded.simulate(u, sample_time=STEP)
-    stream = banded.stream(STEP)
-    assert np.array_equal([stream.step(x).copy() for x in u], whole)
-    banded.save(tmp_path / "banded.json")
-    again = load(tmp_path / "banded.json")
-    assert again == banded
-    assert np.array_equal(again.simulate(u, sample_time=STEP), whole)
-
-
-def test_it_knows_no_future(banded: Banded) -> None:
-    u = np.array(noisy(1003)["pressure"])
-    other = u.copy()
-    other[80:] = u[80:][::-1]
-    one, two = (banded.simulate(v, sample_time=STEP) for v in (u, other))
-    assert np.array_equal(one[:80], two[:80])
-
-
-def test_beyond_what_calibration_saw_it_widens(banded: Banded) -> None:
-    rising = banded.simulate(np.linspace(0.0, 8.0, 200), sample_time=STEP)
-    width = rising[:, 2] - rising[:, 1]
-    assert width[-1] > 4 * width[:110].max()
-
-
-@pytest.mark.parametrize("level", [0.0, 1.0, -1.0, 7.0, float("nan")])
-def test_a_level_that_is_none_is_refused(banded: Banded, level: float) -> None:
-    with pytest.raises(ModelError, match="level"):
-        banded.at(level)
-
-
-def test_few_runs_are_cut_into_blocks_and_warned_of() -> None:
-    with pytest.warns(ModelWarning):
-        banded = calibrate(MODEL, [noisy(seed) for seed in range(5)])
-    assert banded.band.unit == "block"
-    assert banded.band.units > 5
-    assert quietly(MODEL, [noisy(seed) for seed in range(5)], exchangeable="run").band.units == 5
 
 
 def test_runs_off_as_a_whole_count_once_each() -> None:

@@ -54,38 +54,10 @@ def test_what_another_input_does_is_not_taken_for_the_own() -> None:
     assert apart.n_stretches > 1
 
 
-def test_inputs_that_never_move_alone_are_told_without_what_others_do() -> None:
-    other = 2 + 2 * np.sin(2 * np.pi * np.arange(4000) * STEP / 13)
-    clean = characterize(two(np.zeros(4000)), "pressure_1", "displacement")
-    found = characterize(two(other), "pressure_1", "displacement", beside=["pressure_2"])
-    assert found.loop_width == pytest.approx(clean.loop_width, rel=0.2)
-    assert [effect.change for effect in found.effects] == pytest.approx([28.0], rel=0.05)
-
-
 def test_inputs_that_move_as_one_are_refused() -> None:
     one = two(0.5 * np.concatenate([SLOW, np.zeros(1000)])).slice(0, 3000)
     with pytest.raises(DataError, match="pressure_2"):
         characterize(one, "pressure_1", "displacement", beside=["pressure_2"])
-
-
-def loaded(force: np.ndarray) -> Recording:
-    """Return three cycles of the muscle, which gives way to a load whose sensor hisses."""
-    rng = np.random.default_rng(4)
-    y = MUSCLE.simulate(SLOW) - 0.02 * force + 0.01 * rng.standard_normal(TIME.size)
-    hiss = force + 0.5 * rng.standard_normal(TIME.size)
-    return Recording({"pressure": SLOW, "displacement": y, "force": hiss}, STEP)
-
-
-def test_a_load_that_is_held_in_each_recording_moves_the_output_and_not_the_loop() -> None:
-    clean = characterize(loaded(np.zeros(TIME.size)), beside=["force"])
-    assert (clean.n_stretches, clean.effects) == (None, ())  # it rests throughout
-    held = [loaded(np.full(TIME.size, load)) for load in (0.0, 150.0, 300.0)]
-    found = characterize(held, beside=["force"])
-    assert found.loop_width == pytest.approx(clean.loop_width, rel=0.03)
-    (effect,) = found.effects
-    assert (effect.channel, effect.unit) == ("force", "N")
-    assert effect.change == pytest.approx(-0.02 * (effect.high - effect.low), rel=0.02)
-    assert found.output_range[0] < -5.9  # as recorded, at the largest load
 
 
 def isometric(length: float, gain: float, gap: float, seed: int) -> Recording:

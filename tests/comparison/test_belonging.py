@@ -42,33 +42,3 @@ def test_another_muscle_moves_otherwise_under_the_same_load() -> None:
     assert said(run("a"), run("bb", 1.3)) == []
     runs = [run(name, gain) for name, gain in (("a", 1), ("bb", 1.01), ("c", 1.25), ("dd", 1.26))]
     assert said(*runs)  # repeats show that it is no chance
-
-
-def test_other_amplitudes_and_rests_are_no_other_muscle() -> None:
-    """Only what lies where all recordings were is compared."""
-    t = np.arange(0, 60, STEP)
-    up = 2 * np.abs((t / 12 + 0.5) % 1 - 0.5)
-
-    def follows(name: str, pressure: Any) -> Recording:
-        moved = 20 * (1 - np.exp(-pressure))
-        return Recording({"pressure": pressure, "displacement": moved}, STEP, meta={"name": name})
-
-    assert (
-        said(*(follows(name, top * up) for name, top in zip("abcd", (4, 4, 5, 5), strict=True)))
-        == []
-    )
-    rested = np.concatenate([0 * t, 5 * up])
-    assert said(follows("a", rested), follows("bb", 1.5 + 3.5 * up)) == []
-    assert (
-        said(*(follows(name, top * up) for name, top in zip("abc", (0.4, 0.4, 5), strict=True)))
-        == []
-    )
-
-
-def test_noise_is_no_other_muscle() -> None:
-    noise = [np.random.default_rng(seed).standard_normal(PRESSURE.size) for seed in range(4)]
-    runs = [
-        Recording({"pressure": PRESSURE, "displacement": y}, STEP, meta={"name": name})
-        for name, y in zip("abcd", noise, strict=True)
-    ]
-    assert said(*runs) == []

@@ -42,24 +42,9 @@ def test_a_clear_choice_costs_next_to_nothing() -> None:
     assert choice.picked == {"good": 1.0}
 
 
-def test_two_of_a_kind_share_the_resamples() -> None:
-    rng = np.random.default_rng(1)
-    one, other = squares(rng, 1.0), squares(rng, 1.0)
-    choice = choice_of({"a": one, "b": other, "far": squares(rng, 3.0)}, SIZES, 0)
-    assert choice is not None
-    assert set(choice.picked) <= {"a", "b"}
-    assert abs(sum(choice.picked.values()) - 1) < 1e-12
-    assert next(iter(choice.picked.values())) == max(choice.picked.values())
-
-
 def test_the_mean_over_outputs_chooses() -> None:
     pieces = [(1.0, 100.0)] * 32
     choice = choice_of({"a": pieces, "b": [(4.0, 64.0)] * 32}, [1] * 32, 0)
     assert choice is not None
     assert choice.error == (2.0 + 8.0) / 2
     assert choice.picked == {"b": 1.0}
-
-
-def test_one_model_or_few_pieces_are_no_choice() -> None:
-    assert choice_of({"a": [(1.0,)] * 8}, [10] * 8, 0) is None
-    assert choice_of({"a": [(1.0,)] * 3, "b": [(2.0,)] * 3}, [10] * 3, 0) is None

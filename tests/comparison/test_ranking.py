@@ -1,9 +1,6 @@
 from __future__ import annotations
 
 import json
-import sys
-import types
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,16 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import (
-    GPI,
-    DataError,
-    DataWarning,
-    ModelError,
-    PIEstimator,
-    Recording,
-    compare,
-    registry,
-)
+from mckibben import GPI, DataError, ModelError, Recording, compare, registry
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.recommending import USEFUL, recommended
@@ -54,32 +42,31 @@ def without_times(board: Any) -> list[dict[str, Any]]:
     return [{k: v for k, v in row.items() if k not in ("fit_seconds", "step_ns")} for row in rows]
 
 
-def test_models_are_ranked_with_intervals_above_what_is_constant(
+def test_errors_are_those_of_free_runs_within_their_intervals(
     train: Recording, test_set: Recording
 ) -> None:
     board = compare(train, test_set, models=["pi", "gpi"], jobs=1)
-    content = json.loads(json.dumps(board.to_dict(), allow_nan=False))
-    assert (content["input"], content["output"]) == ("pressure", "displacement")
-    assert (content["chosen_by"], content["chosen"]) == ("cross-validation", "gpi")
-    assert content["lowest_on_test"] == "gpi"
-    best, other, constant = content["rows"]
-    for row, model, status, rank in (
-        (best, "gpi", "ok", 1),
-        (other, "pi", "ok", 2),
-        (constant, "constant", "baseline", None),
-    ):
-        assert (row["model"], row["status"], row["test"]["rank"]) == (model, status, rank)
-        low, high = row["test"]["rmse_interval"]
-        assert low <= row["test"]["rmse"] <= high
-        assert {"n_parameters", "fit_seconds", "step_ns"} <= set(row)
-    assert best["test"]["rmse"] < 0.1 < other["test"]["rmse"] < constant["test"]["rmse"]
-    assert best["test"]["difference_to_chosen_interval"] == [0.0, 0.0]
-    assert other["test"]["difference_to_chosen_interval"][0] > 0
+    assert [row.model for row in board.rows] == ["gpi", "pi"]
+    assert json.loads(json.dumps(board.to_dict(), allow_nan=False)) == board.to_dict()
     for row in board.rows:
         assert row.block is not None
         assert row.test is not None
+        assert row.rmse_interval is not None
         error = run_free(row.block, test_set, "displacement") - test_set["displacement"]
         assert row.test.rmse == pytest.approx(np.sqrt(np.mean(error[1:] ** 2)), rel=1e-9)
+        assert row.rmse_interval[0] <= row.test.rmse <= row.rmse_interval[1]
+
+
+def test_a_model_that_fails_is_a_row_with_its_reason(
+    train: Recording, test_set: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise ZeroDivisionError("of all things")
+
+    monkeypatch.setattr(registry.load("estimators", "gpi"), "fit", fail)
+    first, failed = compare(train, test_set, models=["gpi", "pi"], n_folds=0, jobs=1).rows
+    assert (first.model, failed.model) == ("pi", "gpi")
+    assert "of all things" in str(failed.reason)
 
 
 def test_the_choice_is_the_same_whatever_the_test(train: Recording, test_set: Recording) -> None:
@@ -93,56 +80,12 @@ def test_the_choice_is_the_same_whatever_the_test(train: Recording, test_set: Re
     assert len({tuple(row.test_rank for row in board.rows) for board in boards}) > 1
 
 
-@pytest.mark.parametrize(
-    ("n_folds", "chosen_by"), [(4, "cross-validation"), (1, "validation"), (0, "fit")]
-)
-def test_the_choice_has_the_least_error_of_what_it_is_by(
-    train: Recording, test_set: Recording, n_folds: int, chosen_by: str
-) -> None:
-    board = compare(train, test_set, models=["pi", "mpi"], n_folds=n_folds, jobs=1)
-    assert board.chosen_by == chosen_by
-    assert board.best is board.rows[0]
-    for row in board.rows:
-        assert (row.validation_rmse is None) == (chosen_by == "fit")
-    assert board.rows[0].order < board.rows[1].order
-
-
 def test_a_part_that_goes_beyond_the_rest_does_not_decide(train: Recording) -> None:
     parts, _ = validation_folds([train], CHANNELS, 4)
     assert len(parts) == 3
     for part in parts:
         assert train["pressure"][part.test_rows[0]].max() < train["pressure"].max()
     assert len(validation_folds([recorded(triangle(TIME, 4.0, 5.0))], CHANNELS, 4)[0]) == 4
-
-
-def test_rows_are_ordered_by_validation_then_by_trust(
-    train: Recording, test_set: Recording
-) -> None:
-    board = compare(train, test_set, models=["pi", "narx"], n_folds=0, jobs=1)
-    cautions = {row["model"]: row.get("caution") for row in board.to_dict()["rows"]}
-    assert cautions["pi"] is None
-    assert cautions["narx"]
-    row = board.rows[0]
-    careful = replace(row, model="narx", validation_rmse=0.1)
-    plain = replace(row, model="pi", validation_rmse=0.2)
-    failed = replace(row, model="gpi", validation_rmse=None)
-    assert sorted([failed, careful, plain], key=lambda row: row.order) == [plain, careful, failed]
-    idle = replace(plain, skill_least=-0.1)
-    works = replace(careful, skill_least=0.4)
-    assert sorted([idle, failed, works], key=lambda row: row.order) == [works, idle, failed]
-    assert board.constant is not None
-    last = replace(board.constant, validation_rmse=0.21)
-    shown = replace(board, rows=(works, idle), constant=last).ranking
-    assert [one.model for one in shown] == ["narx", "constant", "pi"]
-
-
-@pytest.mark.long
-def test_same_seed_same_table_whatever_the_number_of_processes(
-    train: Recording, test_set: Recording
-) -> None:
-    one = compare(train, test_set, models=["pi", "mpi"], n_folds=2, jobs=1, seed=4)
-    two = compare(train, test_set, models=["pi", "mpi"], n_folds=2, jobs=2, seed=4)
-    assert without_times(one) == without_times(two)
 
 
 def test_test_outputs_are_never_looked_at_while_fitting(
@@ -168,65 +111,6 @@ def test_held_out_tail_is_never_looked_at(train: Recording) -> None:
     assert clean.rows[0].block == other.rows[0].block
     assert clean.n_train == start
     assert clean.n_test == len(train) - start
-
-
-class FailingEstimator(PIEstimator):
-    """An estimator that breaks, for the test below."""
-
-    def fit(self, *args: Any, **settings: Any) -> Any:
-        raise ZeroDivisionError("of all things")
-
-
-class OverflowingEstimator(PIEstimator):
-    """An estimator whose model overflows, for the test below."""
-
-    def fit(self, *args: Any, **settings: Any) -> Any:
-        super().fit(*args, **settings)
-        self.model_ = self.fitted.unpack(np.full(self.fitted.n_parameters, 1e308))
-        return self
-
-
-def test_a_model_that_fails_is_a_row_with_its_reason(
-    train: Recording, test_set: Recording, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    broken = types.ModuleType("broken_models")
-    broken.Failing = FailingEstimator  # type: ignore[attr-defined]
-    broken.Overflowing = OverflowingEstimator  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "broken_models", broken)
-    extra: dict[str, Any] = {
-        "failing": "broken_models:Failing",
-        "overflowing": "broken_models:Overflowing",
-    }
-    monkeypatch.setitem(registry.PLUGINS, "estimators", registry.PLUGINS["estimators"] | extra)
-    registry._locations.cache_clear()
-    try:
-        board = compare(train, test_set, models=["failing", "overflowing", "pi"], n_folds=0, jobs=1)
-    finally:
-        registry._locations.cache_clear()
-    assert [row.model for row in board.rows] == ["pi", "failing", "overflowing"]
-    reasons = {row.model: row.reason for row in board.rows}
-    assert "ZeroDivisionError: of all things" in str(reasons["failing"])
-    assert reasons["overflowing"]
-    assert [row["model"] for row in board.to_dict()["rows"]][1] == "constant"
-    assert board.to_dict()["rows"][2] == {
-        "model": "failing",
-        "status": "failed",
-        "reason": reasons["failing"],
-    }
-
-
-def test_timeless_recordings_fail_only_the_rate_dependent_model(
-    train: Recording, test_set: Recording
-) -> None:
-    board = compare(
-        replace(train, sample_time=None),
-        replace(test_set, sample_time=None),
-        models=["pi", "rdpi"],
-        n_folds=0,
-        jobs=1,
-    )
-    assert board.rows[0].model == "pi"
-    assert board.rows[1].reason
 
 
 def test_what_cannot_be_compared_is_refused_at_once(train: Recording) -> None:
@@ -272,25 +156,6 @@ def test_going_on_recomputes_nothing_that_was_finished(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    "damaged", ["", "null", '{"model": "pi"}', "[" * 100_000, '{"model": "mpi", "block": null}']
-)
-def test_damaged_files_are_computed_again(
-    train: Recording, test_set: Recording, tmp_path: Path, damaged: str
-) -> None:
-    def impatient(board: Leaderboard) -> None:
-        raise KeyboardInterrupt
-
-    how: dict[str, Any] = {"models": "pi,maxwell-slip", "n_folds": 0, "jobs": 1}
-    compare(train, test_set, folder=tmp_path, found=impatient, **how)
-    (kept,) = (tmp_path / "unfinished").iterdir()
-    kept.write_text(damaged)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DataWarning)
-        board = compare(train, test_set, folder=tmp_path, **how)
-    assert without_times(board) == without_times(compare(train, test_set, **how))
-
-
 def test_what_was_kept_of_other_data_or_settings_is_not_used(
     train: Recording, test_set: Recording, tmp_path: Path
 ) -> None:
@@ -304,20 +169,6 @@ def test_what_was_kept_of_other_data_or_settings_is_not_used(
     assert changed.to_dict() != compare(train, test_set, **how).to_dict()
     assert without_times(changed) == without_times(compare(train, test_set, settings=other, **how))
     compare(train, test_set, folder=tmp_path, found=impatient, **how)
-
-
-def test_long_recordings_are_thinned_and_that_is_said(
-    train: Recording, test_set: Recording
-) -> None:
-    board = compare(train, test_set, models=["gpi"], n_folds=0, jobs=1, most_samples=400)
-    assert board.n_train == 400
-    assert "0.06 s" in board.notes[0]
-    whole = compare(train, test_set, models=["gpi"], n_folds=0, jobs=1)
-    assert not whole.notes
-    thinned, all_samples = board.rows[0].test, whole.rows[0].test
-    assert thinned is not None
-    assert all_samples is not None
-    assert thinned.rmse < 1.5 * all_samples.rmse
 
 
 def test_cross_validation_over_recordings_never_mixes_them(

@@ -7,7 +7,7 @@ import pytest
 
 from mckibben import Recording
 from mckibben.comparison.channels import Channels, channels_of, where_held
-from mckibben.comparison.recognising import moved_by, recognised, varies
+from mckibben.comparison.recognising import recognised, varies
 
 T = np.linspace(0.0, 9.0, 50)
 
@@ -74,10 +74,6 @@ def test_at_a_length_held_the_force_is_modelled() -> None:
     assert recognised([*held, run(*names)], names) == (("pressure",), ("displacement",))
 
 
-def test_nothing_is_recognised_of_nothing() -> None:
-    assert recognised([], []) == ((), ())
-
-
 @pytest.mark.parametrize(
     ("inputs", "outputs", "own"),
     [
@@ -91,17 +87,6 @@ def test_nothing_is_recognised_of_nothing() -> None:
 def test_every_output_has_an_input_of_its_own(inputs: str, outputs: str, own: str) -> None:
     pairs = Channels(tuple(inputs.split()), tuple(outputs.split())).pairs()
     assert pairs == tuple(zip(own.split(), outputs.split(), strict=True))
-
-
-def test_a_held_input_is_looked_at_over_what_moves() -> None:
-    names = ["displacement", "pressure"]
-    held = run("pressure", "displacement", "force", held=("displacement",))
-    assert moved_by([held], "displacement", names) == "pressure"
-    assert moved_by([held, run("pressure", "displacement", "force")], "displacement", names) == (
-        "displacement"
-    )
-    still = run("pressure", "displacement", "force", held=("displacement", "pressure"))
-    assert moved_by([still], "displacement", names) == "displacement"
 
 
 def test_a_comparison_of_held_lengths_is_of_force() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mckibben import GPI, DataError, Recording, compare, registry
+from mckibben import GPI, DataError, Recording, compare
 from mckibben.comparison.channels import Channels, channels_of, dead_loads_told
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.splits import ENOUGH, held_out, validation_folds
@@ -89,63 +89,6 @@ def test_only_what_is_held_at_a_level_of_each_recording_is_a_dead_load() -> None
     assert dead_loads_told([varied, hung(20.0)], one) == one
 
 
-QUICKLY = {"balance": {"n_stops": 2, "n_lags": 0, "steps": 2, "elasticity": 3, "contact": False}}
-
-
-@pytest.mark.long
-def test_under_two_dead_loads_a_model_is_ranked_whether_it_is_told_them_or_not() -> None:
-    runs = [hung(10.0), hung(20.0, 1)]  # of which a part left out leaves one load
-    (found,) = compare(runs, models=["balance"], settings=QUICKLY, jobs=1).rows
-    assert found.reason is None
-    assert found.band is None
-    told = compare(
-        runs, inputs=["pressure", "force"], models=["balance"], settings=QUICKLY, jobs=1
-    ).best
-    assert told is not None
-    assert told.model == "balance"
-    assert told.band is not None
-    assert told.block is not None
-    assert [channel.name for channel in told.block.inverse().outputs] == ["pressure"]
-    assert found.validation_rmse is not None
-    assert told.validation_rmse is not None
-    assert told.validation_rmse < 0.5 * found.validation_rmse
-
-
-@pytest.mark.parametrize("name", ["force", "weight"])
-def test_a_model_named_with_a_force_as_input_is_given_it(name: str) -> None:
-    runs = [
-        run.select(["pressure", "displacement"]).with_channels({name: "N"}, **{name: run["force"]})
-        for run in (hung(10.0), hung(20.0, 1))
-    ]
-    estimator = registry.load("estimators", "coupled-memory")(input=("pressure", name))
-    assert estimator.fit(runs).model_.scheduling == (name,)
-
-
-def test_what_is_fitted_to_one_recording_alone_is_not_chosen_among_the_others() -> None:
-    train, names = (
-        [run(peak, seed) for seed, peak in ((1, 5.0), (2, 3.0))],
-        ("pressure", "displacement"),
-    )
-    one = [
-        Recording(
-            dict(zip(names, (r["pressure_1"], r["displacement_1"]), strict=True))
-            | {"force": np.full(TIME.size, pull)},
-            0.05,
-            meta={"name": "x"},
-        )
-        for r, pull in zip(train, (20.0, 22.0), strict=True)
-    ]
-    given = {"mpi": {"n_operators": 2}}
-    plan = plan_of(
-        one, (), load="force", models=["coupled-memory"], settings=given, n_folds=2, seed=0
-    )
-    alone = [item for item in plan.items.values() if item.only is not None]
-    assert [item.only for item in alone] == [0, 1]
-    assert all(item.settings["n_operators"] == 2 for item in alone)
-    board = compare(one, load="force", models=["coupled-memory"], settings=given, n_folds=2, jobs=1)
-    assert [row.validation_rmse is None for row in board.rows] == [False, True, True]
-
-
 def test_given_runs_are_scored_and_nothing_is_fitted_to_them() -> None:
     given = [run(3.0), run(4.0)]
     train = (run(5.0),)
@@ -202,23 +145,6 @@ def test_of_runs_that_each_hold_the_input_the_last_at_each_level_are_held_out() 
     assert [run["length"][0] for run in twice.test] == [100.0, 80.0, 90.0]
     once = held_out([held(length) for length in (100.0, 90.0, 80.0)], channels)
     assert [run["length"][0] for run in once.test] == [90.0]
-
-
-def test_rows_hold_every_output_an_interval_and_a_memory() -> None:
-    board = compare([run(5.0, 1), run(4.0, 2)], run(4.5, 3), models=["coupled-memory"], jobs=1)
-    (row,) = board.rows
-    assert row.test is not None
-    assert tuple(row.outputs) == OUTPUTS == board.outputs
-    mean = np.mean([scores.rmse for scores in row.outputs.values()])
-    assert row.test.rmse == pytest.approx(mean)
-    assert row.rmse_interval is not None
-    assert row.rmse_interval[0] <= row.test.rmse <= row.rmse_interval[1]
-    assert row.memory is not None
-    assert row.memory.gap_ratio == pytest.approx(1.0, abs=0.1)
-    assert row.validation_rmse == pytest.approx(np.mean(list(row.validation_by_output.values())))
-    described = row.to_dict()
-    assert set(described["outputs"]) == set(OUTPUTS)
-    assert described["outputs"]["displacement_1"]["rmse"] == row.outputs["displacement_1"].rmse
 
 
 def test_models_without_a_place_are_left_out_and_said() -> None:

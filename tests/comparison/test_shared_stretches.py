@@ -73,11 +73,6 @@ def test_overlapping_slices_are_found_where_they_overlap(seed: int) -> None:
     assert common(RUN.slice(0, 700), RUN.slice(700, 1200)) == []
 
 
-def test_all_copies_are_found_among_others() -> None:
-    others = [recorded(irregular_triangle(TIME, 12, 5.0, seed=k), k) for k in (4, 5)]
-    assert common(RUN, others[0], RUN, others[1], RUN) == [(0, 2), (0, 4)]
-
-
 @pytest.mark.parametrize("noise", [0.003, 0.02, 0.2])
 @pytest.mark.parametrize("resolution", [0.0, 0.0277], ids=["fine", "ten bits"])
 def test_repeats_of_a_reference_with_sensor_noise_are_different_data(
@@ -87,20 +82,6 @@ def test_repeats_of_a_reference_with_sensor_noise_are_different_data(
     runs = [recorded(reference, seed, noise) for seed in range(4)]
     if resolution:
         runs = [changed(run, lambda x: np.round(x / resolution) * resolution) for run in runs]
-    assert common(*runs) == []
-
-
-def test_holds_and_saturated_stretches_are_nothing_in_common() -> None:
-    still = np.concatenate([np.zeros(500), RUN["pressure"][:600], np.full(500, 5.0)])
-    runs = []
-    for seed in (1, 2):
-        run = recorded(still, seed)
-        y = run["displacement"].copy()
-        y[:500], y[-500:] = y[0].round(), y.max().round()
-        runs.append(run.with_channels(displacement=np.minimum(y, 8.0)))
-    first, second = (run["displacement"] for run in runs)
-    assert (first[1:500] == first[0]).all()
-    assert np.count_nonzero(first == second) > 100 or first[0] != second[0]
     assert common(*runs) == []
 
 

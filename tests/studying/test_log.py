@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import mckibben
-from mckibben import PI, Channel, DataError, ModelError, PerChannel, Recording, example, review
+from mckibben import PI, DataError, ModelError, Recording, review
 from mckibben.blocks.adaptive.adaptive_series import adaptive
 from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.control import track
-from mckibben.files import write
 from mckibben.files.headers import channel_of, parse
 from mckibben.studying.refitting import Refit
 from mckibben.studying.reviewing import Followed
-from mckibben.studying.shifts import dead_time, lagged, shifted
-from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 from tests.studying.plants import Faulty
 
@@ -83,15 +77,6 @@ def test_no_delay_is_certain_where_there_is_none() -> None:
     assert certain <= 1  # in 5 % of the logs
 
 
-def test_a_lag_is_no_dead_time() -> None:
-    wanted = reference(0)["displacement"]
-    late, half, lag = dead_time(wanted, lagged(wanted, 6.0), STEP)
-    assert late - half <= 0.01
-    assert lag == pytest.approx(6.0, abs=0.3)
-    late, half, _ = dead_time(wanted, shifted(wanted, 6.0), STEP)
-    assert abs(late - 6) <= half + 0.05
-
-
 def test_a_refit_is_recommended_where_the_muscle_changed_and_only_there() -> None:
     changed = review(logged(0, gain=0.85, noise=0.05)[0], model=MUSCLE).refit
     assert isinstance(changed, Refit)
@@ -113,31 +98,6 @@ def test_without_commands_pressures_are_compared_with_the_compensators() -> None
     assert found.outputs[0].causes[0].kind == "actuator"
     blind = log.select(["reference_displacement", "command_pressure", "displacement"])
     assert review(blind, model=MUSCLE, refit=False).judged_by == ""
-
-
-def test_several_outputs_are_told_apart() -> None:
-    parts = [
-        replace(
-            MUSCLE,
-            input=Channel(f"pressure_{k}", "bar"),
-            output=Channel(f"displacement_{k}", "mm"),
-        )
-        for k in (1, 2)
-    ]
-    both = PerChannel(tuple(parts))
-    one, _ = logged(0, gain=0.88, noise=0.05)
-    other, _ = logged(1, lag=0.15, noise=0.05)
-    names = ("reference_displacement", "command_pressure", "pressure", "displacement")
-    inputs, outputs = ([c.name for c in side] for side in (both.inputs, both.outputs))
-    own = {"pressure": inputs, "displacement": outputs}
-    channels = {
-        name.replace(key, own[key][place]): log[name]
-        for place, log in enumerate((one, other))
-        for name in names
-        for key in [name.rpartition("_")[2]]
-    }
-    found = review(Recording(channels, STEP, start_time=one.start_time), model=both, refit=False)
-    assert [each.causes[0].kind for each in found.outputs] == ["model", "actuator"]
 
 
 def test_what_is_no_log_is_refused() -> None:
@@ -174,42 +134,6 @@ def test_headers_of_loops_are_known(header: str, channel: str) -> None:
     assert channel_of(parse(header)) == channel
 
 
-def test_study_writes_what_it_finds_of_a_log(cli: Cli, tmp_path: Path) -> None:
-    log, rmse = logged(0, gain=0.85, noise=0.05)
-    table = np.column_stack([log[name] for name in log.channels])[1000::2]
-    heads = {
-        "reference_displacement": "ref_mm",
-        "command_pressure": "setpoint_bar",
-        "pressure": "pressure_bar",
-        "displacement": "displacement_mm",
-    }
-    file = tmp_path / "robot.csv"
-    names = ",".join(heads[name] for name in log.channels)
-    np.savetxt(file, table, delimiter=",", header=names, comments="")
-    inverse = tmp_path / "inverse.json"
-    MUSCLE.inverse().save(inverse)
-    out = tmp_path / "study"
-    given = ["study", file, "--rate", 25, "--compensator", inverse, "--models", "pi", "--jobs", 1]
-    result = cli(*given, "-o", out)
-    assert result.code == 0, result.err
-    told = json.loads((out / "review.json").read_text())
-    (followed,) = told["outputs"]
-    assert followed["achieved"] == pytest.approx(rmse, rel=0.01)
-    assert followed["causes"][0]["cause"] == "model"
-    assert told["refit"]["recommended"]
-    assert isinstance(mckibben.load(out / "refit.json"), PI)
-    assert (out / "report.html").exists()
-
-
-def test_study_refuses_a_log_without_reference(cli: Cli, tmp_path: Path) -> None:
-    inverse = tmp_path / "inverse.json"
-    MUSCLE.inverse().save(inverse)
-    given = ["study", example.TRAIN, "--compensator", inverse, "-o", tmp_path / "study"]
-    result = cli(*given)
-    assert result.code == 2
-    assert "reference_displacement" in result.err
-
-
 def test_what_learns_and_what_plans_is_asked_as_the_loop_asks_it() -> None:
     """It then gives the commands of the log, so that nothing is laid to feedback."""
     stronger = replace(MUSCLE, weights=tuple(1.15 * weight for weight in MUSCLE.weights))
@@ -225,28 +149,3 @@ def test_what_learns_and_what_plans_is_asked_as_the_loop_asks_it() -> None:
     followed = found.outputs[0]
     assert followed.predicted == pytest.approx(followed.achieved, rel=1e-3)
     assert followed.causes[0].kind == "compensator"
-
-
-@pytest.mark.parametrize("plans", [False, True])
-def test_a_loop_without_fault_gets_no_cause_and_no_refit(plans: bool) -> None:
-    inverse = MUSCLE.inverse()
-    ran = Predictive(inverse, 10, 1000.0, (0.0, 8.0)) if plans else inverse
-    log = track(ran, Faulty(MUSCLE), reference(0), pressure_loop=False).recording
-    found = review(log, compensator=ran)
-    assert not found.outputs[0].causes
-    assert found.refit is None
-
-
-def test_commands_stand_for_pressures_that_are_not_measured(cli: Cli, tmp_path: Path) -> None:
-    log, _ = logged(0, gain=0.85, noise=0.05)
-    names = [name for name in log.channels if name != "pressure"]
-    blind, inverse = tmp_path / "blind.csv", tmp_path / "inverse.json"
-    write(log.select(names), blind)
-    MUSCLE.inverse().save(inverse)
-    found = {}
-    for out, more in (("as-it-is", []), ("by-name", ["--input", "command_pressure"])):
-        given = ["study", blind, "--compensator", inverse, "--models", "pi", "--jobs", 1, *more]
-        result = cli(*given, "-o", tmp_path / out)
-        assert result.code == 0, result.err
-        found[out] = json.loads((tmp_path / out / "review.json").read_text())["outputs"]
-    assert found["as-it-is"] == found["by-name"]

@@ -11,16 +11,11 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, PI, DataError, Recording, study
-from mckibben.blocks.compose import Parallel
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.force.feedforward import ForceFeedforward
-from mckibben.blocks.force.tondu_lopez import TonduLopez
-from mckibben.comparison.row import Row
 from mckibben.files import read, write
-from mckibben.registry import load
 from mckibben.rigs import load_rig
-from mckibben.signals import irregular_triangle, triangle
+from mckibben.signals import triangle
 from mckibben.studying.inverting import check_inverse
 from mckibben.studying.loops import closed_loops, named, recorded_rig
 
@@ -35,20 +30,6 @@ def recorded(u: np.ndarray) -> Recording:
 @pytest.fixture(scope="module")
 def train() -> Recording:
     return recorded(triangle(TIME, 4.0, [5.0, 4.2, 3.4, 2.6, 1.8, 1.0]))
-
-
-def test_a_study_holds_everything_the_report_shows(train: Recording) -> None:
-    test = recorded(irregular_triangle(TIME, 12, 5.0, seed=3))
-    found = study(train, test, models=["pi", "gpi"], jobs=1)
-    assert found.leaderboard.best is not None
-    assert found.leaderboard.best.model == "gpi"
-    assert set(found.predictions) == {"pi", "gpi"}
-    for outputs in found.predictions.values():
-        assert [output.shape for output in outputs] == [(len(train), 1), (len(test), 1)]
-    assert found.inverse is not None
-    assert found.inverse.model == "gpi"
-    assert found.inverse.error <= 1e-9
-    assert found.characterization is not None
 
 
 def test_predictions_are_those_that_were_scored(train: Recording) -> None:
@@ -68,16 +49,6 @@ def test_inverse_check_covers_the_reachable_range(block: Block, train: Recording
     low, high = check.reachable
     assert np.ptp(check.reference) > 0.9 * (high - low)
     assert np.all((check.pressure >= 0) & (check.pressure <= 5))
-
-
-def test_what_reaches_anywhere_is_checked_on_what_it_makes_of_the_input(train: Recording) -> None:
-    wide = replace(PI.example(), input_range=None)
-    noisy = train.with_channels(displacement=train["displacement"] - 5.0)  # measured out of reach
-    check = check_inverse("pi", wide, noisy)
-    assert check.reachable is None
-    assert check.own
-    assert np.allclose(check.reference[:, 0], wide.simulate(train["pressure"]))
-    assert check.error < 1e-9
 
 
 @pytest.mark.parametrize(("driven", "closed"), [("voltage", True), ("pressure", False)])
@@ -158,32 +129,3 @@ def test_no_compensation_leaves_the_loop_of_the_model() -> None:
     height = 2 * threshold * weight / (found.reachable[1] - found.reachable[0])
     assert found.error < 1e-9
     assert found.uncompensated_error == pytest.approx(height, rel=0.02)
-
-
-def test_several_muscles_stand_beside_no_compensation_too() -> None:
-    model = load("blocks", "per-channel").example()
-    t = np.arange(400) * 0.05
-    driven = {f"pressure_{k}": 2.5 - 2.4 * np.cos((0.5 + 0.2 * k) * t) for k in (1, 2)}
-    recording = Recording(driven, 0.05)
-    modelled = model.simulate(recording)
-    found = check_inverse("both", model, modelled)
-    assert found.uncompensated is not None
-    assert found.uncompensated.shape == (400, 2)
-    assert found.uncompensated_error is not None
-    assert found.uncompensated_error > 10 * found.error
-
-
-def test_a_force_is_compensated_alike_in_the_leaderboard_and_in_the_check() -> None:
-    ahead = ForceFeedforward.example()
-    model, t = ahead.undone, np.arange(400) * 0.05
-    assert isinstance(model, Parallel)
-    driven = {"length": 2.0 + np.sin(t), "pressure": 2.5 - 2.0 * np.cos(0.3 * t)}
-    found = check_inverse(
-        "force", model, model.simulate(Recording(driven, 0.05)).with_channels(**driven)
-    )
-    row = Row("force", block=model)
-    assert found.inverse == row.inverse == ahead
-    assert (found.given, row.to_dict()["inverse"]) == ("pressure", "exact")
-    assert found.error < 1e-9
-    assert found.uncompensated_error is None
-    assert Row("force", block=TonduLopez.example()).to_dict()["inverse"] == "none"

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from mckibben import PI, Recording
+from mckibben import Recording
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.laws.examples import examples
-from mckibben.errors import DataError
 from mckibben.validation.describing import describe
 
 STEP = 0.05
@@ -77,23 +76,3 @@ def test_criteria_are_those_of_the_residuals_one_step_ahead() -> None:
     assert (found.n_samples, found.n_parameters) == (n, p)
     assert abs((found.bic - found.aic) - p * (np.log(n) - 2)) < 1e-9
     assert abs(found.aic / n - np.log(found.fpe)) < 1e-5
-    # without its noise model residuals are not white
-    bare = describe(TransferFunction(block.numerator, block.denominator, STEP), [recording])
-    assert (bare.criteria.aic, bare.criteria.bic, bare.criteria.fpe) == (None, None, None)
-
-
-def test_of_a_compensator_no_errors_are_given() -> None:
-    block = PI.example().inverse()
-    assert all(one.standard_error is None for one in describe(block, [recorded(block)]).parameters)
-
-
-def test_the_output_named_is_the_only_one_described() -> None:
-    block = EXAMPLES["per-channel"]
-    found = describe(block, [recorded(block)], "displacement_2")
-    assert [one.output.name for one in found.describing_functions] == ["displacement_2"]
-    with pytest.raises(DataError, match="force"):
-        describe(block, [recorded(block)], "force")
-    with pytest.raises(DataError, match="recordings"):
-        describe(block, [])
-    with pytest.raises(DataError, match="displacement"):
-        describe(PI.example(), [Recording({"pressure": np.linspace(0, 5, 50)}, STEP)])

@@ -7,16 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 from scipy.stats import binom
 
-from mckibben import PI, PIEstimator, Recording
+from mckibben import PI, Recording
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.validation.parameters import parameters, residuals, sureness
+from tests.validation.runs import noise
 
 STEP, SAMPLES = 0.05, 3000
 
@@ -35,12 +33,6 @@ def wave() -> Array:
 
 def steps() -> Array:
     return np.repeat(np.random.default_rng(5).uniform(0.2, 4.8, SAMPLES // 10), 10)
-
-
-def noise(seed: int, memory: float, n: int = SAMPLES, deviation: float = 0.1) -> Array:
-    """Return noise that decays by a factor a sample, in its stationary state."""
-    shocks = np.random.default_rng(seed).normal(0, deviation * np.sqrt(1 - memory**2), n + 500)
-    return np.asarray(lfilter([1.0], [1.0, -memory], shocks))[500:]
 
 
 def fitted(block: Block, u: Array, y: Array) -> Block:
@@ -71,7 +63,7 @@ def covered(block: Block, u: Array, memory: float, seeds: int) -> tuple[int, int
     clean = np.asarray(block.simulate(u, sample_time=STEP))
     hits = trials = 0
     for seed in range(seeds):
-        y = clean + noise(1000 + seed, memory)
+        y = clean + 0.1 * noise(SAMPLES, memory, 1000 + seed)
         model = fitted(block, u, y)
         recording = Recording({"pressure": u, "displacement": y}, STEP)
         sure = sureness(model, [recording], residuals(model, [recording]))
@@ -99,22 +91,10 @@ def test_intervals_hold_the_truth_as_often_as_they_say(name: str, memory: float)
     assert low <= hits / trials < 1
 
 
-def test_errors_grow_with_the_memory_of_residuals() -> None:
-    block, u = MODELS["pi"][0], wave()
-    found = []
-    for memory in (0.0, 0.9):
-        y = np.asarray(block.simulate(u)) + noise(1, memory)
-        recording = Recording({"pressure": u, "displacement": y}, STEP)
-        sure = sureness(block, [recording], residuals(block, [recording]))
-        found.append(np.sqrt(np.diag(sure.covariance)))
-        assert abs(sure.n_effective / (SAMPLES * (1 - memory) / (1 + memory)) - 1) < 0.3
-    assert np.all(found[1] > 2 * found[0])
-
-
 def test_what_is_not_determined_is_said_and_has_no_number() -> None:
     u = np.minimum(wave(), 2.0) * 0.1  # too little to move the operator of threshold 1.5
     block = MODELS["pi"][0]
-    y = np.asarray(block.simulate(u, initial="virgin")) + noise(1, 0.0)
+    y = np.asarray(block.simulate(u, initial="virgin")) + 0.1 * noise(SAMPLES, 0.0, 1)
     still = PI(THRESHOLDS, (3.0, 1.5, 0.9, 0.5), 2.0, initial="virgin")
     recording = Recording({"pressure": u, "displacement": y}, STEP)
     sure = sureness(still, [recording], residuals(still, [recording]))
@@ -122,45 +102,3 @@ def test_what_is_not_determined_is_said_and_has_no_number() -> None:
     assert found[0].standard_error is not None
     assert found[3].standard_error is None
     assert found[3].interval is None
-
-
-@pytest.mark.parametrize("memory", [0.0, 0.9])
-def test_fits_and_descriptions_say_the_same(memory: float) -> None:
-    block, u = MODELS["pi"][0], wave()
-    y = np.asarray(block.simulate(u)) + noise(1, memory)
-    recording = Recording({"pressure": u, "displacement": y}, STEP)
-    fit = PIEstimator(thresholds=THRESHOLDS).fit(recording)
-    model = fit.fitted
-    sure = sureness(model, [recording], residuals(model, [recording]))
-    told = np.sqrt(np.diag(sure.covariance))
-    np.testing.assert_allclose(fit.diagnostics_.standard_errors, told, rtol=0.02)
-
-
-def test_a_parameter_at_its_bound_has_no_error() -> None:
-    u = wave()
-    block = PI(THRESHOLDS, (3.0, 0.0, 1e-14, 0.5), 2.0)
-    y = np.asarray(block.simulate(u)) + noise(1, 0.0)
-    recording = Recording({"pressure": u, "displacement": y}, STEP)
-    found = parameters(block, sureness(block, [recording], residuals(block, [recording])))
-    none = [one.standard_error is None for one in found]
-    assert none == [False, True, True, False, False]
-
-
-def test_outputs_each_have_residuals_of_their_own() -> None:
-    u = np.column_stack([wave(), steps()])
-    names = ("pressure_1", "pressure_2"), ("displacement_1", "displacement_2")
-    driven = tuple(Channel(name, "bar") for name in names[0])
-    given = tuple(Channel(name, "mm") for name in names[1])
-    block = Coupling(((2.0, 0.5), (0.3, 1.5)), driven, given)
-    hits = []
-    for seed in range(60):
-        y = block.simulate(u) + np.column_stack([noise(seed, 0.8), 2 * noise(100 + seed, 0.0)])
-        gains = np.linalg.lstsq(u, y, rcond=None)[0]
-        model = block.unpack(gains.ravel())
-        channels = dict(zip((*names[0], *names[1]), np.hstack([u, y]).T, strict=True))
-        units = dict.fromkeys(names[0], "bar") | dict.fromkeys(names[1], "mm")
-        recording = Recording(channels, STEP, units=units)
-        sure = sureness(model, [recording], residuals(model, [recording]))
-        own = np.sqrt(np.diag(sure.covariance))
-        hits.append(np.abs(model.pack() - block.pack()) < sure.half_width * own)
-    assert 0.88 <= np.mean(hits) <= 0.99

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from mckibben import Recording
 from mckibben.arrays import Array
 from mckibben.blocks.dynamic.process_model import ProcessModel
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.play_type.play import Play
 from mckibben.validation.parameters import residuals, sureness
 from mckibben.validation.responses import describing_functions, frequency_responses
@@ -66,36 +64,3 @@ def test_a_process_model_answers_as_its_formula_says() -> None:
     good = (found.coherence > 0.95) & (found.measured_frequency < 1.0)
     assert good.sum() > 5
     np.testing.assert_allclose(found.measured_gain[good], near[good], rtol=0.1)
-
-
-def test_bounds_hold_the_true_response_as_often_as_they_say() -> None:
-    rng = np.random.default_rng(1)
-    u = np.repeat(rng.uniform(0, 5, 150), 10)
-    truth = TransferFunction((0.5, 0.1), (-0.8,), STEP)
-    clean = np.asarray(truth.simulate(u, sample_time=STEP))
-    inside = []
-    for _ in range(60):
-        y = clean + rng.normal(0, 0.3, u.size)
-        model = _least_squares(truth, u, y)
-        recording = Recording({"pressure": u, "displacement": y}, STEP)
-        sure = sureness(model, [recording], residuals(model, [recording]))
-        (found,) = frequency_responses(model, [recording], sure.covariance, sure.half_width)
-        h = truth.linear_system(STEP).response(found.frequency)[:, 0, 0]
-        assert found.gain_interval is not None
-        assert found.angle_interval is not None
-        within = (found.gain_interval[0] <= np.abs(h)) & (np.abs(h) <= found.gain_interval[1])
-        turned = np.degrees(np.unwrap(np.angle(h)))
-        own = (found.angle_interval[0] <= turned) & (turned <= found.angle_interval[1])
-        inside.append([within.mean(), own.mean()])
-    assert np.all(np.abs(np.mean(inside, axis=0) - 0.95) < 0.06)
-
-
-def _least_squares(block: TransferFunction, u: Array, y: Array) -> TransferFunction:
-    def at(x: Array) -> TransferFunction:
-        return block.unpack([*x, 0.0, 0.0])
-
-    def left(x: Array) -> Array:
-        return np.asarray(at(x).simulate(u, sample_time=STEP)) - y
-
-    found = least_squares(left, block.pack()[:3])
-    return at(found.x)

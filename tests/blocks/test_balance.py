@@ -30,6 +30,7 @@ from tests.blocks.balances import (
     run,
 )
 from tests.blocks.strategies import numbers
+from tests.twins import TWINS
 
 Array = NDArray[np.float64]
 
@@ -67,6 +68,13 @@ def test_pressures_that_are_clipped_move_muscles_that_need_them(block: Balance, 
     np.testing.assert_allclose(run(block, beside(reached, inputs)), pressures, atol=1e-9 * high)
 
 
+@given(balances(), SEEDS)
+def test_drawn_balances_agree_with_their_twin(block: Balance, seed: int) -> None:
+    inputs = motion(block, (-5.0, FURTHEST), seed, 3)
+    expected = TWINS["balance"](block, inputs.tolist(), STEP)
+    np.testing.assert_allclose(run(block, inputs), expected, atol=1e-9 * HIGHEST)
+
+
 # -- memory --------------------------------------------------------------------------------------
 
 
@@ -74,19 +82,6 @@ def state_after(block: Block, inputs: Array) -> Array:
     state = block.initial_state(inputs[0])
     block.bind(STEP, state, inputs, np.empty((len(inputs), len(block.outputs))))()
     return state
-
-
-@given(balances(n=1, n_lags=0, n_loads=1), st.lists(numbers(0.05, 0.95), min_size=2, max_size=2))
-def test_a_closed_minor_loop_of_one_muscle_is_wiped_out(block: Balance, inner: list[float]) -> None:
-    """Return-point memory, of pressures under a load held and of displacements."""
-    for each, furthest in ((block.inverse(), HIGHEST), (block, FURTHEST)):
-        low, high = sorted(inner)
-        turns = furthest * np.array([0.0, 1.0, low, high, low])
-        path = np.interp(np.arange(121), np.arange(0, 121, 30), turns)
-        inputs = np.tile([0.0] * (len(each.inputs) - 1) + [10.0], (path.size, 1))
-        inputs[:, 0] = path
-        before, after = state_after(each, inputs[:61]), state_after(each, inputs)
-        np.testing.assert_allclose(after, before, atol=1e-8)
 
 
 # -- energy --------------------------------------------------------------------------------------
@@ -124,24 +119,7 @@ def test_what_asks_a_muscle_to_push_harder_than_it_can_is_told(block: Balance, s
 # -- loads ---------------------------------------------------------------------------------------
 
 
-def test_a_tare_is_where_muscles_rest_under_the_first_load() -> None:
-    block = replace(Balance.example(), tare=True).inverse()
-    inputs = np.array([[0.0, 0.0, 1.0, 25.0], [0.0, 0.0, 1.0, 25.0], [0.0, 0.0, 1.0, 0.0]])
-    moved = run(block, inputs)
-    np.testing.assert_allclose(moved[:2], 0.0, atol=1e-12)
-    assert moved[2, 0] > 0.5
-
-
 # -- time ----------------------------------------------------------------------------------------
-
-
-def test_settled_muscles_are_where_a_long_hold_leaves_them() -> None:
-    moved = motion(ALONE, (0.5, HIGHEST), seed=3)
-    held = np.vstack([np.repeat(moved[:1], 5000, axis=0), moved])
-    settled = run(replace(ALONE, settled=True).inverse(), moved)
-    just_come = run(ALONE.inverse(), moved)
-    np.testing.assert_allclose(settled, run(ALONE.inverse(), held)[5000:], atol=1e-9 * FURTHEST)
-    assert np.abs(just_come - settled).max() > 0.01
 
 
 def ramps(block: Block, highest: float, steps: int) -> Array:

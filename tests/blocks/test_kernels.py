@@ -24,6 +24,7 @@ from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
 from mckibben.blocks.differential.bouc_wen import BoucWen
 from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
+from mckibben.blocks.differential.flow import flow
 from mckibben.blocks.differential.generalized_bouc_wen import GeneralizedBoucWen
 from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
 from mckibben.blocks.dynamic.state_network import StateNetwork
@@ -342,6 +343,15 @@ def test_memberships_are_those_of_each_time_after_the_other() -> None:
 
 
 # -- one muscle --------------------------------------------------------------------------------
+
+
+def test_flow_solves_its_equation_where_it_slows_down_unloading() -> None:
+    """dv/dtau = 1 - psi |v|^2; models that run away so are refused, and never come here."""
+    v, h = -1.1, 1e-6
+    for tau in np.linspace(0.05, 1.2, 24):
+        here, ahead = (plain(flow)(v, step, 0.4, 1.3, 2) for step in (tau, tau + h))
+        psi = 0.4 if here < 0 else 1.3
+        assert (ahead - here) / h == pytest.approx(1 - psi * here**2, abs=1e-5)
 
 
 @pytest.mark.parametrize("v", [0.0, 0.01, 3.0])

@@ -22,14 +22,12 @@ from mckibben import (
 )
 from mckibben.blocks.core.fields import rows, vector
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
 from mckibben.blocks.dynamic.air import LONGEST_DEAD_TIME, Air
 from mckibben.blocks.dynamic.state_network import StateNetwork
 from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.play_type.envelopes.exponential import Exponential
 from mckibben.blocks.play_type.envelopes.tanh import Tanh
-from mckibben.registry import load, names
 
 EXAMPLES = examples()
 
@@ -80,7 +78,6 @@ UNUSUAL: list[Block] = [
     replace(StateNetwork.example(), hold="zero"),
     *(without_lags(n_loads, tare) for n_loads in (0, 1) for tare in (False, True)),
     *(without_lags(n_loads, tare).inverse() for n_loads in (0, 1) for tare in (False, True)),
-    *(LoadEstimate(without_lags(1, tare)) for tare in (False, True)),
 ]
 
 
@@ -92,13 +89,6 @@ def test_obeys_the_contract(title: str) -> None:
 
 @pytest.mark.parametrize("block", UNUSUAL, ids=lambda block: block.title)
 def test_unusual_blocks_obey_it(block: Block) -> None:
-    assert not (isinstance(block, Balance | LoadEstimate) and block.rate_dependent)
+    assert not (isinstance(block, Balance) and block.rate_dependent)
     for seed in range(3):
         check_block(block, seed=seed)
-
-
-@pytest.mark.parametrize("kind", names("blocks"))
-def test_is_registered_under_its_own_kind(kind: str) -> None:
-    block = load("blocks", kind)
-    assert block.kind == kind
-    assert type(block.example()) is block

@@ -11,21 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben import (
-    EUPI,
-    GPI,
-    PI,
-    Affine,
-    ModelError,
-    ModelWarning,
-    Play,
-    RateDependentPI,
-    Series,
-)
+from mckibben import GPI, Affine, ModelError, ModelWarning, Play, Series
 from mckibben.blocks.core.fields import vector
 from mckibben.blocks.core.single_channel import Ranged
 from mckibben.blocks.laws.examples import examples
-from mckibben.blocks.play_type.envelopes.piecewise_linear import PiecewiseLinear
 from mckibben.registry import load
 from tests.blocks.strategies import (
     HIGH,
@@ -217,33 +206,6 @@ def test_minor_loops_close_and_are_congruent(
         shapes.append(outputs - outputs[0])
     if family != "modified":  # whose curve is steeper here than there
         np.testing.assert_allclose(shapes[0], shapes[1], atol=1e-9)
-
-
-@pytest.mark.parametrize("family", [*RISING, "play"])
-@few
-@given(data=st.data(), u=paths())
-def test_outputs_rise_and_fall_with_the_input(family: str, data: st.DataObject, u: Array) -> None:
-    model = data.draw(FORGETFUL["play"] if family == "play" else RISING[family])
-    outputs = simulate(model, u)
-    steps, changes = np.diff(u), np.diff(outputs)
-    assert (changes * np.sign(steps) >= -tolerance(outputs)).all()
-    assert (np.abs(changes[steps == 0]) <= tolerance(outputs)).all()
-
-
-# -- limits in which models become others --------------------------------------------------------
-
-
-@given(pi_models(), paths())
-def test_three_models_contain_that_of_prandtl_and_ishlinskii(model: PI, u: Array) -> None:
-    r, w = model.thresholds, model.weights
-    still, straight = tuple(0.0 for _ in w), PiecewiseLinear((LOW, HIGH), (LOW, HIGH))
-    expected = simulate(model, u)
-    for same, offset in (
-        (RateDependentPI(r, still, w, model.offset), 0.0),
-        (GPI(r, w, straight, straight, (LOW, HIGH)), model.offset),
-        (EUPI(r, w, 1.0, 1.0, (0.0, 0.0, 0.0), model.offset, (LOW, HIGH)), 0.0),
-    ):
-        np.testing.assert_allclose(simulate(same, u) + offset, expected, atol=1e-10)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in EXAMPLES if len(EXAMPLES[kind].inputs) == 1])

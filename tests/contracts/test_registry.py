@@ -50,35 +50,12 @@ def concrete(base: type, folder: str) -> set[Any]:
     }
 
 
-def functions(folder: str, named: str = "") -> set[Any]:
-    """Return the public functions that the modules of a folder define, or those so named."""
-    return {
-        value
-        for module in modules_under(folder)
-        if module.__name__.endswith(named)
-        for name, value in inspect.getmembers(module, inspect.isfunction)
-        if value.__module__ == module.__name__ and not name.startswith("_")
-    }
-
-
-def of_time() -> set[Any]:
-    """Return the functions of signals whose first argument is a time."""
-    return {
-        function
-        for function in functions("signals")
-        if next(iter(inspect.signature(function).parameters), "") == "time"
-    }
-
-
 ON_DISK: dict[str, Callable[[], set[Any]]] = {
     "blocks": lambda: concrete(Block, "blocks"),
     "envelopes": lambda: concrete(Envelope, "blocks/play_type/envelopes"),
     "estimators": lambda: concrete(Estimator, "estimators"),
     "faces": lambda: concrete(Face, "report/notebook"),
-    "protocols": lambda: functions("papers", "protocol"),
-    "published": lambda: functions("papers", "published"),
     "setups": lambda: concrete(Rig, "rigs"),
-    "signals": of_time,
 }
 
 
@@ -86,7 +63,7 @@ ON_DISK: dict[str, Callable[[], set[Any]]] = {
 def test_what_is_on_disk_is_registered_in_order_and_loads(group: str) -> None:
     registered = {inspect.unwrap(load(group, name)) for name in PLUGINS[group]}
     assert all(callable(found) for found in registered)
-    if group not in {"controllers", "papers"}:
+    if group in ON_DISK:
         assert ON_DISK[group]() == registered
     assert list(PLUGINS[group]) == sorted(PLUGINS[group])
     assert list(names(group)) == sorted(names(group))

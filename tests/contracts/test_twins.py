@@ -72,13 +72,3 @@ def test_envelope_agrees_with_its_formula_and_its_own_inverse(kind: str) -> None
         np.testing.assert_allclose(envelope(u), expected, rtol=1e-13, atol=1e-14)
         np.testing.assert_allclose(envelope.solve(envelope(u)), u, rtol=1e-11, atol=1e-11)
         assert np.all(np.diff(envelope(u)) > 0)
-
-
-@pytest.mark.parametrize("kind", names("envelopes"))
-def test_envelope_packs_shifts_and_stays_in_order(kind: str) -> None:
-    rising, falling = load("envelopes", kind).examples()
-    u = np.linspace(0.0, 5.0, 501)
-    assert np.all(falling(u) >= rising(u))
-    for envelope in (rising, falling):
-        assert envelope.unpack(envelope.pack()) == envelope
-        np.testing.assert_allclose(envelope.shifted(0.25)(u), envelope(u) + 0.25, rtol=1e-13)

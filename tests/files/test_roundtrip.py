@@ -89,6 +89,19 @@ def test_csv_is_plain_to_other_programs(recording: Recording, tmp_path: Path) ->
     assert described["units"] == {"pressure": "bar", "displacement_model": "mm"}
 
 
+def test_the_description_of_a_file_that_was_changed_is_ignored(
+    recording: Recording, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.csv"
+    mckibben.write(recording, path)
+    path.write_text(path.read_text().replace("0.1,", "0.10,", 1))
+    with pytest.warns(DataWarning, match=r"a\.csv"):
+        (back,) = mckibben.read(path)
+    assert back.meta["file"] == str(path)
+    assert "rig" not in back.meta
+    assert np.array_equal(back["pressure"], recording["pressure"])
+
+
 @pytest.mark.parametrize(
     "text",
     [

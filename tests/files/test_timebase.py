@@ -81,16 +81,6 @@ GAPPED = (
 )
 
 
-def test_gaps_split(tmp_path: Path) -> None:
-    with pytest.warns(DataWarning, match="1 of 3 "):
-        parts, samples = read(tmp_path, GAPPED, gaps="split")
-    assert [part.name for part in parts] == ["run[1]", "run[2]"]
-    assert [part.start_time for part in parts] == [0.0, 20.0]
-    assert [part.sample_time for part in parts] == [0.1, 0.1]
-    assert np.array_equal(parts[0]["pressure"], samples[:30])
-    assert np.array_equal(parts[1]["pressure"], samples[35:])
-
-
 def test_gaps_interpolate(tmp_path: Path) -> None:
     with pytest.warns(DataWarning, match="2 gap"):
         (recording,), samples = read(tmp_path, GAPPED, gaps="interpolate")

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import DataError, DataWarning, Recording
-from mckibben.files.channels import NAME
+from mckibben import Recording
 
 N = 40
 T = (np.arange(N) / 50).tolist()
@@ -69,15 +68,3 @@ def test_numbers_are_read_to_the_last_bit(tmp_path: Path) -> None:
 def test_dates_are_times(tmp_path: Path, instant: Any) -> None:
     rows = [["time", "p_bar", "Weg_mm"], *([instant(k), P[k], X[k]] for k in range(N))]
     check(one(book(tmp_path / "a.xlsx", Data=rows)))
-
-
-def test_the_first_sheet_with_numbers_or_the_one_named(tmp_path: Path) -> None:
-    other = [SOUND[0], *([t, 2 * p, x] for t, p, x in SOUND[1:])]
-    path = book(tmp_path / "a.xlsx", Notes=[["by", "Jane"]], Run=SOUND, Second=other)
-    with pytest.warns(DataWarning, match="'Run'.*'Notes', 'Second'"):
-        check(one(path))
-    (tmp_path / NAME).write_text('[[files]]\nmatch = "a.xlsx"\nsheet = "Second"\n')
-    assert one(path)["pressure"] == pytest.approx(2 * np.array(P))
-    (tmp_path / NAME).write_text('sheet = "Third"\n')
-    with pytest.raises(DataError, match=r"'Third'.*Notes, Run, Second"):
-        mckibben.read(path)

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import ast
-import io
 import json
 import os
 import random
@@ -22,7 +21,6 @@ import re
 import signal
 import subprocess
 import sys
-import tarfile
 import tempfile
 import time
 from collections.abc import Iterator
@@ -272,11 +270,8 @@ def main() -> None:
     found: dict[str, str] = {}
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder)
-        archive = subprocess.run(
-            ["git", "archive", options.at], cwd=ROOT, capture_output=True, check=True
-        )
-        with tarfile.open(fileobj=io.BytesIO(archive.stdout)) as packed:
-            packed.extractall(tree, filter="data")
+        git("clone", "--quiet", "--shared", str(ROOT), folder)
+        git("-C", folder, "checkout", "--quiet", options.at)
         for change in changes:
             begun = time.perf_counter()
             found[change.name] = caught(change, tree, options)

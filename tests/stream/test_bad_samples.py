@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from mckibben import Block, DataError, ModelWarning
 from mckibben.blocks.core.running import Stream
 from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.laws.trial import input_limits, wander
+from mckibben.registry import load
 
 Array = NDArray[np.float64]
 

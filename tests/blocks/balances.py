@@ -96,14 +96,6 @@ def run(block: Block, inputs: Array, sample_time: float = STEP, **start: Any) ->
         return block.simulate(inputs, sample_time=sample_time, **start)
 
 
-def measured(block: Balance, inputs: Array) -> Array:
-    """Return what is measured of pressures, what schedules and loads: all but the loads."""
-    n, n_loads = len(block.driven), block.n_loads
-    displacements = run(block.inverse(), inputs)
-    known = inputs[:, n : inputs.shape[1] - n_loads]
-    return np.column_stack([displacements, inputs[:, :n], known])
-
-
 ALONE = Balance(
     springs=((0.0, 14.0),),
     elasticity=((6.0, 4.0),),

@@ -12,12 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
-from mckibben import PI, ModelWarning, Series
-from mckibben.blocks.compose import Parallel, PerChannel
-from mckibben.blocks.core.fields import Channel
+from mckibben import ModelWarning, Series
 from mckibben.blocks.dynamic.air import Air
 from mckibben.blocks.memoryless.affine import Affine
-from mckibben.control import dead_time_undone
 from mckibben.export import export_c
 from tests.blocks.strategies import numbers, paths
 
@@ -74,14 +71,3 @@ def test_a_dead_time_between_samples_is_rounded_with_a_warning(tmp_path: Path) -
     with pytest.warns(ModelWarning):
         export_c(between, tmp_path, sample_time=STEP)
     between.inverse().stream(STEP)  # which has no use for it
-
-
-def test_dead_times_add_up_in_series_and_are_shared_side_by_side() -> None:
-    p, q = Channel("pressure", "bar"), Channel("pressure_2", "bar")
-    slow = replace(EXAMPLE, dead_time=0.05, input=p)
-    assert Series((EXAMPLE, slow)).dead_time == pytest.approx(0.07)
-    apart = replace(EXAMPLE, input=Channel("voltage_2", "V"), output=q)
-    assert PerChannel((slow, apart)).dead_time == 0.05
-    assert Parallel((EXAMPLE, RIGHT_AWAY)).dead_time == 0.02
-    assert dead_time_undone(EXAMPLE) == 0.0
-    assert dead_time_undone(PI.example().inverse()) == 0.0

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
@@ -21,11 +20,9 @@ from tests.blocks.balances import (
     ALONE,
     FURTHEST,
     HIGHEST,
-    LOADED,
     SEEDS,
     STEP,
     balances,
-    measured,
     motion,
     run,
 )
@@ -164,17 +161,6 @@ def test_a_hanging_load_swings_as_newton_says() -> None:
 
 
 # -- loads that are estimated ----------------------------------------------------------------------
-
-
-@given(st.integers(1, 3), st.data(), SEEDS)
-def test_the_loads_estimated_are_those_that_were(n: int, data: st.DataObject, seed: int) -> None:
-    block = data.draw(balances(n=n, n_loads=data.draw(st.sampled_from([1, n]))))
-    inputs = motion(block, (0.0, HIGHEST), seed)
-    loads = inputs[:, inputs.shape[1] - block.n_loads :]
-    inputs[0, :n] = 0.0  # from rest; of a tare nothing tells the load there
-    loads[0] *= 0.0 if block.tare else 1.0
-    found = run(LoadEstimate(block), measured(block, inputs))
-    np.testing.assert_allclose(found, loads, atol=1e-9 * LOADED)
 
 
 @given(balances(n=2, n_loads=2), numbers(0.0, HIGHEST), SEEDS)

@@ -19,6 +19,9 @@ from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.negative import Negative
+from mckibben.papers.field_models.published import process_model
+from mckibben.papers.multistate_friction.published import static_force
+from mckibben.registry import load
 
 STEP = 0.01
 INPUT = np.cumsum(np.random.default_rng(0).standard_normal(1500)) * 0.05
@@ -110,3 +113,13 @@ def test_a_continuous_model_comes_as_it_is_written() -> None:
     s = 1j * w
     expected = 2.0 * (0.3 * s + 1) / (0.01 * s**2 + 2 * 0.4 * 0.1 * s + 1)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_printed_numbers() -> None:
+    poles = np.sort(np.roots(process_model().denominator()))
+    np.testing.assert_allclose(poles, [-3.185, -0.00966], rtol=2e-3)
+    assert load("published", "sdchm-coupling")().radius == pytest.approx(0.456, abs=5e-4)
+    per_bar, rest = static_force().terms(np.array([190.0]))
+    assert float(rest[0] + 4.0 * per_bar[0]) == pytest.approx(
+        7596 - 136.6 * 4 - 93.14 * 190 + 1.176 * 190 * 4 + 0.2758 * 190**2
+    )

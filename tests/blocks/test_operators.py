@@ -1,4 +1,4 @@
-"""Play, Prandtl-Ishlinskii and Preisach models, and curves: closed forms and cases by hand.
+"""Play, Prandtl-Ishlinskii and Preisach models, and curves: operators side by side, cases by hand.
 
 The laws that they share are in `tests.contracts.test_memory`.
 """
@@ -13,14 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben import EUPI, GPI, PI, PiecewiseLinear, Play
-from mckibben.blocks.core.fields import vector
+from mckibben import EUPI, GPI, PiecewiseLinear, Play
 from mckibben.blocks.play_type.eupi import eupi_matrix
 from mckibben.blocks.play_type.gpi import gpi_matrix
 from mckibben.blocks.play_type.maxwell_slip import slip_matrix
 from mckibben.blocks.play_type.play import play_matrix
 from mckibben.blocks.preisach_type.preisach import DEPTH, Preisach
-from tests.blocks.strategies import HIGH, LOW, eupi_models, gpi_models, numbers, paths, pi_models
+from tests.blocks.strategies import LOW, eupi_models, gpi_models, numbers, paths
 
 Array = NDArray[np.float64]
 
@@ -84,28 +83,6 @@ def test_springs_side_by_side_are_each_alone() -> None:
 
 
 # -- models ----------------------------------------------------------------------------------------
-
-
-def closed_form(model: PI) -> tuple[PI, tuple[float, ...]]:
-    """Return the textbook inverse, itself a PI model, and the state of its operators after a rise.
-
-    r^_i = sum_{j<=i} w_j (r_i - r_j), w^_0 = 1 / w_0, w^_i = -w_i / (S_i S_{i-1}) with S_i the
-    partial sums; operator i of a model that only rose to y is at y - r^_i.
-    """
-    r, w = np.array(model.thresholds), np.array(model.weights)
-    partial = np.cumsum(w)
-    thresholds = [float(w[: i + 1] @ (r[i] - r[: i + 1])) for i in range(r.size)]
-    weights = [1 / w[0], *(-w[1:] / (partial[1:] * partial[:-1]))]
-    return PI(tuple(thresholds), vector(weights)), tuple(thresholds)
-
-
-@given(pi_models(), paths(0.1, 4.9))
-def test_the_inverse_is_the_textbook_closed_form(model: PI, u: Array) -> None:
-    references = model.simulate(u)
-    inverse, r_hat = closed_form(model)
-    risen = [float(references[0]) - model.offset - r for r in r_hat]
-    expected = inverse.simulate(references - model.offset, initial=risen)
-    np.testing.assert_allclose(model.inverse().simulate(references), expected, atol=1e-9 * HIGH)
 
 
 def test_a_held_reference_holds_the_input() -> None:

@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from mckibben import GPI, PI, DataError, ModelError, load
 from mckibben.blocks.core import saving
@@ -29,13 +27,6 @@ def refused(path: Path, content: bytes | None = None) -> None:
         load(path)
     assert "Remedy:" in str(caught.value)
     assert str(path) in str(caught.value)
-
-
-@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=5))
-def test_every_double_comes_back(weights: list[float]) -> None:
-    model = PI(tuple(float(i) for i in range(len(weights))), tuple(weights))
-    copy = saving.from_dict(json.loads(json.dumps(model.to_dict(), allow_nan=False)))
-    assert copy.pack().tobytes() == model.pack().tobytes()
 
 
 def test_whole_numbers_and_what_a_windows_editor_puts_before_them_are_read(tmp_path: Path) -> None:
@@ -57,8 +48,6 @@ DAMAGES: dict[str, Callable[[dict[str, Any]], object]] = {
     "another format": with_(format="onnx"),
     "no format": without("format"),
     "a later version": with_(version=2),
-    "no version": without("version"),
-    "no kind": without("kind"),
     "an unknown kind": with_(kind="unheard-of"),
     "a kind that is a location": with_(kind="os:system"),
     "a kind that is a path": with_(kind="../gpi"),
@@ -66,14 +55,10 @@ DAMAGES: dict[str, Callable[[dict[str, Any]], object]] = {
     "a method as a field": with_(bind=1.0),
     "an absent field": without("weights"),
     "a number as text": with_(weights=["9.0", 4.0, 2.0, 1.0]),
-    "a number for a list": with_(weights=9.0),
-    "an input range of three": with_(input_range=[0.0, 1.0, 5.0]),
     "an unknown start": with_(initial="fresh"),
     "a start that is not finite": with_(initial=[1e999, 0.0]),
     "a channel without a unit": with_(input={"name": "pressure"}),
-    "a channel with more": with_(input={"name": "p", "unit": "bar", "x": 1}),
     "an unknown envelope": with_(rising={"kind": "erf", "slope": 1.0, "shift": 0.0}),
-    "an envelope that is a block": with_(rising=PI.example().to_dict()),
     "an envelope that falls": with_(rising=GOOD["rising"] | {"slope": -1.0}),
     "a list": lambda d: [d],
 }

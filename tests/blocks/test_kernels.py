@@ -125,9 +125,7 @@ ALONE = replace(
 """A balance of one muscle under a load."""
 
 
-def test_a_force_balance_is_clipped_to_its_pressures_and_stays_where_it_has_no_equilibrium() -> (
-    None
-):
+def test_a_force_balance_is_clipped_and_warns_without_an_equilibrium() -> None:
     block = ForceBalance.example()
     inputs = path([0.0, 0.0, 0.0], [30.0, 30.0, 2.0])
     free = block.simulate(inputs)

@@ -24,7 +24,6 @@ from mckibben.presets import Chosen, preset
 from mckibben.registry import PLUGINS, REPLACED, load, names
 from mckibben.report.notebook.face import Face
 from mckibben.rigs import Rig
-from mckibben.signals.protocol import protocol
 
 SOURCE = Path(mckibben.__file__).parent
 EVERYTHING = [(group, name) for group in PLUGINS for name in PLUGINS[group]]
@@ -67,15 +66,6 @@ def test_what_is_on_disk_is_registered_in_order_and_loads(group: str) -> None:
         assert ON_DISK[group]() == registered
     assert list(PLUGINS[group]) == sorted(PLUGINS[group])
     assert list(names(group)) == sorted(names(group))
-
-
-def test_protocols_setups_and_signals_bear_their_names() -> None:
-    for name in PLUGINS["protocols"]:
-        assert protocol(name).name == name
-    for name in PLUGINS["setups"]:
-        assert load("setups", name).model_fields["setup"].default == name
-    for name in PLUGINS["signals"]:
-        assert load("signals", name).__name__ == name.replace("-", "_")
 
 
 def test_every_public_name_is_there() -> None:

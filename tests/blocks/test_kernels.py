@@ -22,10 +22,8 @@ from mckibben.blocks.coupled.force_balance import ForceBalance
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
-from mckibben.blocks.differential.bouc_wen import BoucWen
 from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
 from mckibben.blocks.differential.flow import flow
-from mckibben.blocks.differential.generalized_bouc_wen import GeneralizedBoucWen
 from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
 from mckibben.blocks.dynamic.state_network import StateNetwork
 from mckibben.blocks.force.multistate_friction import deflected
@@ -302,16 +300,16 @@ VARIANTS: dict[str, tuple[Any, float, list[float]]] = {
         [5.0],
     ),
     **{
-        f"{kind.kind}, exponent {exponent}, loops {k}": (
-            replace(kind.example(), exponent=exponent, **loops),
+        f"{kind} {loops}, exponent {exponent}": (
+            replace(load("blocks", kind).example(), exponent=exponent, **loops),
             0.01,
             [5.0],
         )
-        for kind, shapes in (
-            (BoucWen, ({"sigma": 0.5}, {"sigma": 0.9}, {"sigma": 3.0})),
-            (GeneralizedBoucWen, ({},)),
+        for kind, loops in (
+            ("bouc-wen", {"sigma": 0.5}),
+            ("bouc-wen", {"sigma": 3.0}),
+            ("generalized-bouc-wen", {}),
         )
-        for k, loops in enumerate(shapes)
         for exponent in (1, 2)
     },
     "held force, Bouc-Wen": (replace(BoucWenOscillator.example(), hold="zero"), 0.01, [5.0]),

@@ -55,7 +55,7 @@ def doings(draw: st.DrawFn) -> tuple[str, bytes | int]:
         ahead = draw(st.sampled_from([1] * 8 + [0, 2, 2**31, 2**32 - 1]))
         session = int(kind == 3) + draw(st.sampled_from([0] * 8 + [1, 65536, 2**31]))
         return what, Frame(kind, session, ahead, draw(bodies(kind))).packed()
-    return what, draw(st.binary(max_size=300) if what == "bytes" else st.integers(1, 4))
+    return what, draw(st.binary(max_size=300)) if what == "bytes" else draw(st.integers(1, 4))
 
 
 def sent_by(server: Twin | Compiled, most: int) -> Iterator[int]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -150,21 +148,6 @@ def test_a_folder_that_cannot_be_written_to_is_refused_before_any_work(
     result = cli(*command.split(), *words, f"/proc/mine{Path(out).suffix}")
     assert result.code == 2
     assert "/proc/mine" in result.err
-
-
-@pytest.mark.long
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device is always full here")
-def test_full_standard_output_is_reported() -> None:
-    with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
-            [sys.executable, "-m", "mckibben.cli.main", "info", "--models"],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
 
 
 # Descriptions and folders of results -------------------------------------------------------------------

@@ -6,23 +6,10 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from mckibben import read
-from mckibben.rigs import load_rig, rig_names
+from mckibben.rigs import load_rig
 from tests.cli.conftest import Cli
-
-
-def test_list_names_rigs_protocols_and_signals(cli: Cli) -> None:
-    words = cli("rig", "list")
-    assert words.code == 0
-    for name in (*rig_names(), "mpi-narmax", "decaying-triangle", "pulls"):
-        assert name in words.out
-    found = json.loads(cli("rig", "list", "--json").out)
-    assert set(found["rigs"]) == set(rig_names())
-    assert found["rigs"]["rail"]["inputs"] == ["voltage", "force"]
-    assert found["protocols"]["sdchm"]["rig"] == "soft-arm"
-    assert found["signals"]["triangle"]["period"] == "number"
 
 
 def test_what_show_prints_is_a_rig(cli: Cli, tmp_path: Path) -> None:
@@ -31,38 +18,6 @@ def test_what_show_prints_is_a_rig(cli: Cli, tmp_path: Path) -> None:
     mine.write_text(shown.out.replace("disc_mass = 0.8", "disc_mass = 1.5"), encoding="utf-8")
     assert load_rig(mine) == load_rig("soft-arm").changed({"disc_mass": 1.5})
     assert json.loads(cli("rig", "show", str(mine), "--json").out)["disc_mass"] == 1.5
-
-
-def test_run_writes_a_recording(cli: Cli, tmp_path: Path) -> None:
-    out = tmp_path / "run.csv"
-    drive = "decaying-triangle:period=2,n_cycles=3,low=1"
-    arguments = ["rig", "run", "mas20-hanging", "--signal", drive, "--duration", 6, "--rate", 100]
-    result = cli(*arguments, "-o", out)
-    assert result.code == 0, result.err
-    assert "Written:" in result.out
-    (recording,) = read(out)
-    assert len(recording) == 601
-    assert recording["pressure"].max() == pytest.approx(6.0, abs=0.3)
-    assert recording.meta["rig"] == "mas20-hanging v2 (virtual)"
-    first = out.read_bytes()
-    cli(*arguments, "-o", out)
-    assert out.read_bytes() == first
-    cli(*arguments, "--seed", 1, "-o", out)
-    assert out.read_bytes() != first
-
-
-def test_run_drives_several_inputs_and_changes_parameters(cli: Cli, tmp_path: Path) -> None:
-    out = tmp_path / "run.parquet"
-    result = cli(
-        *("rig", "run", "rail", "--signal", "voltage=constant:value=0.1"),
-        *("--signal", "force=pulls:high=100,n_pulls=1,duration=2", "--set", "payload=2.5"),
-        *("--duration", 4, "--rate", 200, "--ideal", "--json", "-o", out),
-    )
-    assert result.code == 0, result.err
-    told = json.loads(result.out)
-    assert told["ranges"]["force"] == pytest.approx([24.5, 124.5], abs=1)
-    assert "volume" in told["ranges"]
-    assert told["saturated"] == {}
 
 
 def test_run_takes_commands_from_a_recording_and_reports_saturation(

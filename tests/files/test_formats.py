@@ -8,6 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 from scipy.io import loadmat, savemat
 
 import mckibben
@@ -156,6 +157,22 @@ def test_links_of_hdf5_do_not_lead_out_of_a_file_nor_round_in_it(tmp_path: Path)
         file.create_dataset("c", (20,), [("a", "f8"), ("b", "S5000")])
     (recording,) = mckibben.read(tmp_path / "a.h5")
     assert list(recording.channels) == ["again"]
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_a_tdms_file_without_times_begins_at_nothing(tmp_path: Path, timed: bool) -> None:
+    shared = {"wf_increment": 0.02, "wf_start_offset": 1.0} if timed else {}
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment(
+            [
+                ChannelObject("run", "Druck", P, {"unit_string": "kPa", **shared}),
+                ChannelObject("run", "Weg", X, {"unit_string": "cm", **shared}),
+            ]
+        )
+    (recording,) = mckibben.read(tmp_path / "a.tdms", rate=50)
+    check(recording)
+    assert recording.start_time == (1.0 if timed else 0.0)
+    assert mckibben.read(tmp_path / "a.tdms")[0].sample_time == (0.02 if timed else None)
 
 
 @pytest.mark.parametrize("compression", [None, "gzip"])

@@ -94,3 +94,14 @@ def test_a_whole_recording_with_nan_is_refused(kind: str) -> None:
     inputs, _ = poisoned(path_for(block, 7, 20), 8)
     with pytest.raises(DataError):
         block.simulate(inputs, sample_time=SAMPLE_TIME)
+
+
+def test_what_is_no_sample_is_refused_and_changes_nothing() -> None:
+    block = load("blocks", "pi").example()
+    stream, plain = block.stream(), block.stream()
+    wrongs: list[Any] = [[1.0, 2.0], "two", 10**400, [[1.0], [2.0]], {}, []]
+    for value in (1.0, 3.0, 2.0):
+        for wrong in wrongs:
+            with pytest.raises(DataError, match="pressure"):
+                stream.step(wrong)
+        assert stream.step(value)[0] == plain.step(value)[0]

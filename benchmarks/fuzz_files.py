@@ -20,7 +20,8 @@ import fuzzing
 from mckibben import MckibbenError, read
 
 FILES = Path(__file__).parents[1] / "tests/golden/files"
-GROUNDS = sorted(path for path in FILES.rglob("*") if path.is_file() and path.stat().st_size)
+SINGLE = (FILES, FILES / "wrong")
+"""Folders whose files are each a recording; any other folder is read as a whole."""
 
 WORDS: tuple[bytes, ...] = (
     *(b"nan", b"inf", b"-1", b"1e308", b"1e-320", b"null", b"true", b"1.000,5", b"9" * 500),
@@ -57,24 +58,44 @@ def damage(content: bytes, chance: random.Random) -> bytes:
     return bytes(made)
 
 
+def asked_of(path: Path) -> Path:
+    """Return what is read to read a file: itself, what it describes, or its folder."""
+    if path.parent in SINGLE:
+        return path.with_name(path.name.removesuffix("-metadata.json"))
+    return FILES / path.relative_to(FILES).parts[0]
+
+
+def reads(path: Path) -> bool:
+    """Return whether a file is read as it is."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            read(asked_of(path))
+        except MckibbenError:
+            return False
+    return True
+
+
+GROUNDS = [path for path in sorted(FILES.rglob("*")) if path.is_file() and reads(path)]
+
+
 def attempt(number: int) -> None:
     """Damage one file and read it, or the folder that it belongs to."""
     chance = random.Random(f"{SEED[0]} {number}")
     ground = chance.choice(GROUNDS)
+    asked = asked_of(ground)
     with tempfile.TemporaryDirectory() as place, warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if ground.parent == FILES:
-            for companion in FILES.glob(f"{ground.stem}.*"):  # what describes a file lies beside it
+        if asked.is_dir():
+            shutil.copytree(asked, Path(place) / asked.name)
+            path = Path(place) / asked.name / ground.relative_to(asked)
+        else:
+            for companion in asked.parent.glob(f"{asked.name}*"):  # what describes it
                 shutil.copy(companion, place)
             path = Path(place) / ground.name
-            asked = path.with_name(path.name.removesuffix("-metadata.json"))
-        else:
-            asked = Path(place) / ground.relative_to(FILES).parts[0]
-            shutil.copytree(FILES / asked.name, asked)
-            path = Path(place) / ground.relative_to(FILES)
         path.write_bytes(damage(path.read_bytes(), chance))
         with suppress(MckibbenError):
-            read(asked)
+            read(Path(place) / asked.name)
 
 
 if __name__ == "__main__":

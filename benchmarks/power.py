@@ -24,6 +24,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -119,7 +120,7 @@ def reverted(base: str, seed: int, n: int) -> list[Change]:
         if tried.returncode == 0:
             title = git("log", "-1", "--format=%h %s", commit).strip()
             fixes.append(Change(title, files, tests, patch=patch))
-        if len(fixes) == n:
+        if len(fixes) >= n:
             break
     return fixes
 
@@ -198,9 +199,11 @@ def failed(tree: Path, words: list[str]) -> list[str]:
     try:
         printed, _ = run.communicate(timeout=SECONDS)
     except subprocess.TimeoutExpired:
-        os.killpg(run.pid, signal.SIGKILL)
         print(f"{' '.join(words)} did not end", file=sys.stderr)
         return []
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(run.pid, signal.SIGKILL)
     if run.returncode in (0, 5):  # no test at all is 5
         return []
     return re.findall(r"^(?:FAILED|ERROR) ([^\s:]+(?:::.*?)?)(?: - .*)?$", printed, re.M) or [CRASH]

@@ -138,7 +138,7 @@ def field() -> None:
     names = []
     for name in registry.names("estimators"):
         estimator = registry.load("estimators", name)()
-        if estimator.objection([train, test], "pressure", "displacement"):
+        if estimator.objection([train, test], ("pressure",), ("displacement",)):
             continue
         names.append(name)
         started = time.perf_counter()

@@ -2,9 +2,8 @@
 
     python benchmarks/standard_errors.py [SEEDS]
 
-Of a PI model, a linear model and a PI model that creeps, each fitted anew to every seed's noise by a
-search that is none of the package's. Beside the intervals of descriptions stand those as if residuals
-were independent.
+Of models of the tests, each fitted anew to every seed's noise by a search that is none of the package's.
+Beside the intervals of descriptions stand those as if residuals were independent.
 """
 
 from __future__ import annotations
@@ -17,7 +16,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from tests.validation.test_parameters import MODELS, STEP, fitted, noise
+from tests.validation.runs import noise
+from tests.validation.test_parameters import MODELS, STEP, fitted
 
 from mckibben import Recording
 from mckibben.estimators.core import autoregression
@@ -31,7 +31,7 @@ def measure(name: str, memory: float, seeds: int) -> tuple[float, float]:
     clean = np.asarray(block.simulate(u, sample_time=STEP))
     hits: list[list[bool]] = [[], []]
     for seed in range(seeds):
-        y = clean + noise(1000 + seed, memory)
+        y = clean + 0.1 * noise(clean.size, memory, 1000 + seed)
         model = fitted(block, u, y)
         recording = Recording({"pressure": u, "displacement": y}, STEP)
         left = told.residuals(model, [recording])

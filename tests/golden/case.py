@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.recordings import MEASURED
 from tests.tools import where
 
 Leaf = None | bool | int | float | str | np.ndarray
@@ -18,9 +19,6 @@ EXACT = 0.0
 """Equal to the bit, on a machine of the kind on which the case was stored."""
 
 DATA = Path(__file__).parent / "data"
-
-SHARED = Path(__file__).parents[3] / "shared" / "data"
-"""Recordings that are not part of the repository; cases on them are skipped where they are not."""
 
 
 @dataclass(frozen=True)
@@ -34,16 +32,15 @@ class Case:
     call : str
         The call or the command, for a reader of the stored data.
     run : callable
-        Takes an empty folder to work in, returns the tree of values. Must be a module's function
-        (or a `functools.partial` of one), since cases run in other processes.
+        Takes an empty folder to work in, returns the tree of values.
     tolerances : dict
-        Pattern of leaves' paths (as of `fnmatch`) -> relative tolerance; the first that matches
-        counts, ``{"*": EXACT}`` where none is named. It is relative to the stored value, in an array
-        to its largest magnitude. `None` as tolerance leaves a leaf uncompared but for its kind.
+        Pattern of leaves' paths (as of `fnmatch`, whose ``*`` crosses ``/``) -> relative tolerance; the
+        first that matches counts, ``{"*": EXACT}`` where none is named. It is relative to the stored
+        value, in an array to its largest magnitude. `None` as tolerance leaves a leaf uncompared but for its kind.
     needs, tools : sequence of str
         Folders of shared recordings, and programs of `tests.tools`, without which the case is skipped.
     slow : bool
-        Left out where not asked for by ``--slow``.
+        Left out where neither its name nor ``--slow`` asks for it.
     """
 
     name: str
@@ -57,7 +54,7 @@ class Case:
     @property
     def possible(self) -> bool:
         """Whether all that it needs is here."""
-        there = all((SHARED / folder).is_dir() for folder in self.needs)
+        there = all((MEASURED / folder).is_dir() for folder in self.needs)
         return there and all(where(tool) for tool in self.tools)
 
     def tolerance(self, leaf: str) -> float | None:
@@ -83,5 +80,8 @@ def flat(tree: Tree, path: str = "") -> dict[str, Leaf]:
         return {path: empty}
     leaves: dict[str, Leaf] = {}
     for key, value in parts:
-        leaves |= flat(value, f"{path}/{key}" if path else key)
+        own = flat(value, f"{path}/{key}" if path else key)
+        if twice := leaves.keys() & own.keys():
+            raise ValueError(f"two values are called {', '.join(twice)}")
+        leaves |= own
     return leaves

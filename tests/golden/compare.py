@@ -56,6 +56,19 @@ def distance(expected: Any, found: Leaf, tolerance: float | None) -> float | Non
         if math.isnan(value):
             return None
         return 0.0 if value <= bound else (value - bound) / (abs(bound) or 1.0)
+    if tolerance == EXACT and not _alike(expected, found):
+        return _far(expected, found, tolerance) or None
+    return _far(expected, found, tolerance)
+
+
+def _alike(expected: Any, found: Any) -> bool:
+    """Return whether two values are of one type and equal to the bit."""
+    if isinstance(expected, np.ndarray) and isinstance(found, np.ndarray):
+        return expected.dtype == found.dtype and expected.tobytes() == found.tobytes()
+    return type(expected) is type(found) and repr(expected) == repr(found)
+
+
+def _far(expected: Any, found: Leaf, tolerance: float | None) -> float | None:
     if isinstance(expected, np.ndarray) or isinstance(found, np.ndarray):
         return _arrays(expected, found, tolerance)
     if _number(expected) and _number(found):
@@ -76,7 +89,7 @@ def _arrays(expected: Any, found: Any, tolerance: float | None) -> float | None:
     a, b = np.asarray(expected), np.asarray(found)
     if a.dtype.kind != b.dtype.kind or (tolerance is not None and a.shape != b.shape):
         return None
-    if tolerance is None or (a.dtype == b.dtype and a.tobytes() == b.tobytes()):
+    if tolerance is None:
         return 0.0
     if a.dtype.kind not in "fiu" or a.size == 0:
         return 0.0 if np.array_equal(a, b) and a.dtype == b.dtype else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,14 @@ NUMBERS = np.array([1.0, -2.0, np.nan])
 
 def found(folder: Path) -> Any:
     assert folder.is_dir()
-    return {"rmse": 0.5, "best": "gpi", "pressure": NUMBERS, "rows": [{"n": 3}], "notes": []}
+    return {
+        "rmse": 0.5,
+        "best": "gpi",
+        "pressure": NUMBERS,
+        "zero": 0.0,
+        "rows": [{"n": 3}],
+        "notes": [],
+    }
 
 
 def raising(folder: Path) -> Any:
@@ -36,7 +44,7 @@ def rows(**changed: Any) -> list[str]:
 
 
 def test_leaves_have_paths() -> None:
-    assert set(LEAVES) == {"rmse", "best", "pressure", "rows/0/n", "notes"}
+    assert set(LEAVES) == {"rmse", "best", "pressure", "zero", "rows/0/n", "notes"}
 
 
 def test_what_is_as_stored_is_not_reported() -> None:
@@ -54,6 +62,9 @@ def test_what_is_as_stored_is_not_reported() -> None:
         {"pressure": NUMBERS * (1 + 1e-15)},
         {"pressure": NUMBERS[:2]},
         {"pressure": np.array([1.0, np.nan, -2.0])},
+        {"pressure": NUMBERS.astype(np.float32)},
+        {"zero": -0.0},
+        {"rows_0_n": 3.0},
         {"rows_0_n": 4},
         {"rows_1_n": 3},
         {"notes_0": "one more"},
@@ -88,13 +99,28 @@ def test_cases_are_stored_compared_and_accepted(
     broken = Case(CASE.name, "", raising)
     assert verdict(broken, answer(broken), held.machine)[0] == "raised"
 
-    right = Stored({**held.leaves, "rmse": 0.1}, "known", held.machine, "issue 41")
+    right = Stored({**held.leaves, "rmse": 0.1}, "known", held.machine, "issue 41", ["rmse"])
     save(CASE.name, CASE.call, right)
     assert verdict(CASE, answer(CASE), held.machine)[0] == "expected"
-    assert verdict(broken, answer(broken), held.machine)[0] == "expected"
+    assert verdict(broken, answer(broken), held.machine)[0] == "raised"
     assert update([CASE], "today's wrong value") == 1
-    assert (load(CASE.name) or right).leaves["rmse"] == 0.1
-    save(CASE.name, CASE.call, Stored(held.leaves, "known", held.machine, "issue 41"))
+    assert (load(CASE.name) or held).leaves["rmse"] == 0.1
+    save(CASE.name, CASE.call, replace(right, leaves={**right.leaves, "best": "pi"}))
+    word, rows, _ = verdict(CASE, answer(CASE), held.machine)
+    assert (word, [row.leaf for row in rows]) == ("moved", ["best"])  # which is not what is wrong
+    save(CASE.name, CASE.call, replace(right, leaves={**held.leaves, "rmse": {"at most": 1.0}}))
     assert verdict(CASE, answer(CASE), held.machine)[0] == "mended"
     assert update([CASE], "mended") == 0
     assert verdict(CASE, answer(CASE), held.machine)[0] == "same"
+    assert (load(CASE.name) or held).leaves["rmse"] == {"at most": 1.0}
+
+
+def test_what_is_stored_twice_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(storage, "DATA", tmp_path)
+    save(CASE.name, CASE.call, Stored(LEAVES, "", ""))
+    place = tmp_path / "room/case.json"
+    place.write_text(place.read_text().replace('"expected": {', '"expected": {"pressure": [1.0],'))
+    with pytest.raises(ValueError, match="pressure"):
+        load(CASE.name)
+    with pytest.raises(ValueError, match="a/b"):
+        flat({"a/b": 1, "a": {"b": 2}})

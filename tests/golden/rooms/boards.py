@@ -9,7 +9,8 @@ from typing import Any
 
 import mckibben
 from mckibben import example
-from tests.golden.case import SHARED, Case, Tree
+from tests import recordings
+from tests.golden.case import Case, Tree
 from tests.golden.commands import answered
 from tests.golden.plants import runs
 
@@ -123,7 +124,7 @@ def own(plant: str, options: Mapping[str, Any], folder: Path) -> Tree:
 
 def measured(name: str, models: str, folder: Path) -> Tree:
     """Compare models on a set of measured recordings, by its fixed splits."""
-    words = ("measured", SHARED, "--only", name, "--models", models, "--jobs", 1)
+    words = ("measured", recordings.MEASURED, "--only", name, "--models", models, "--jobs", 1)
     boards = answered(*words, "-o", folder / "out")
     return [shown(board) | {"range": board["range"]} for board in boards.values()]
 

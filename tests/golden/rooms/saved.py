@@ -87,6 +87,9 @@ def cases() -> Iterator[Case]:
 
 def write(name: str) -> None:
     """Write a file of the models that no other holds as they are written today."""
+    path = FOLDER / f"{name}.json"
+    if path.exists():
+        sys.exit(f"{path.name} is there, and is never written again: give another name")
     known = [saved["model"] for path in FOLDER.glob("*.json") for saved in contents(path).values()]
     lines = []
     for title, model in all_models().items():
@@ -99,8 +102,10 @@ def write(name: str) -> None:
         saved = {"model": model.to_dict(), "inputs": inputs.tolist(), "outputs": outputs.tolist()}
         lines.append(f"{json.dumps(title)}: {json.dumps(saved, allow_nan=False)}")
     text = "{\n" + ",\n".join(lines) + "\n}\n"
-    (FOLDER / f"{name}.json").write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("python -m tests.golden.rooms.saved VERSION")
     write(sys.argv[1])

@@ -19,7 +19,8 @@ import mckibben
 from mckibben import MckibbenError, Recording, registry
 from mckibben.control import track
 from mckibben.link import Device, Port, State
-from tests.golden.case import SHARED, Case, Tree
+from tests import recordings
+from tests.golden.case import Case, Tree
 from tests.golden.commands import answered, call
 from tests.golden.plants import STEP, Array, cycles, noise, play, runs
 from tests.golden.rooms.commands import MODEL
@@ -85,7 +86,7 @@ def black_box(folder: Path) -> Tree:
     for u, y in (("uest", "yest"), ("uval", "yval")):
         found = []
         for name in (u, y):
-            content = loadmat(SHARED / "bouc_wen_benchmark" / f"{name}_multisine.mat")
+            content = loadmat(recordings.MEASURED / "bouc_wen_benchmark" / f"{name}_multisine.mat")
             (key,) = (key for key in content if not key.startswith("_"))
             found.append(content[key][0, :4096].astype(float))
         channels = {"force": found[0], "displacement": 1000.0 * found[1]}
@@ -131,7 +132,7 @@ def damper(folder: Path) -> Tree:
 def seal(folder: Path) -> Tree:
     """Friction of a seal has two levels by direction, and no inverse by displacement."""
     (folder / "seal.csv").write_bytes(
-        (SHARED / "foreign_friction" / "seal_circle_2bar.csv").read_bytes()
+        (recordings.MEASURED / "foreign_friction" / "seal_circle_2bar.csv").read_bytes()
     )
     columns = {"time": (1, "ms"), "pressure": (6, "bar"), "displacement": (5, "mm")}
     words = ["study", "seal.csv", "--input", "displacement", "--output", "force"]

@@ -36,7 +36,7 @@ class Case:
     tolerances : dict
         Pattern of leaves' paths (as of `fnmatch`, whose ``*`` crosses ``/``) -> relative tolerance; the
         first that matches counts, ``{"*": EXACT}`` where none is named. It is relative to the stored
-        value, in an array to its largest magnitude. `None` as tolerance leaves a leaf uncompared but for its kind.
+        value, in an array to its largest magnitude. `None` compares the kind of a leaf alone.
     needs, tools : sequence of str
         Folders of shared recordings, and programs of `tests.tools`, without which the case is skipped.
     slow : bool

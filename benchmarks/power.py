@@ -62,7 +62,7 @@ FAULTS = [
     (f"{FILES}/units.py", '"cm": "cm"', '"dm": "cm"'),
     (f"{FILES}/units.py", '"ms": "ms ', '"centisecond": "ms '),
     (SPLITS, "HELD_OUT = 0.25", "HELD_OUT = 0.35"),
-    (SPLITS, "% n\n        ", "% (n + 1)\n        "),
+    (SPLITS, "astype(int) % n", "astype(int) % (n + 1)"),
     (SPLITS, "place % EVERY == EVERY - 1", "place % EVERY == 0"),
 ]
 COMPILED = ("kernel", "summing_kernel", "inlined", "deferred")

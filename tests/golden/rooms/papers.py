@@ -9,6 +9,7 @@ from typing import Any
 
 from tests.golden.case import Case, Tree
 from tests.golden.commands import answered
+from tests.golden.rounding import rounded
 
 PAPERS: Mapping[str, bool] = {
     "activation-pressure": False,
@@ -53,9 +54,7 @@ def _cell(cell: Any) -> Tree:
     """Return a number, or a name; of several words only that they are some."""
     if isinstance(cell, str):
         return "words" if len(cell.split()) > 1 else cell
-    if isinstance(cell, float) and abs(cell) < 1e-9:
-        return 0.0
-    return cell
+    return rounded(cell)
 
 
 def cases() -> Iterator[Case]:

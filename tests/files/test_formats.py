@@ -57,6 +57,8 @@ def test_columns_of_a_matrix_are_named_by_number(
     (recording,) = mckibben.read(tmp_path / name, channels=["pressure", "displacement"], **MATRIX)
     check(recording)
     assert list(recording.channels) == ["pressure", "displacement"]
+    with pytest.raises(DataError, match=r"data\[1\]"):  # the columns that can be named
+        mckibben.read(tmp_path / name, columns={"pressure": "data"})
 
 
 def test_a_matrix_goes_with_vectors_of_its_length(tmp_path: Path) -> None:

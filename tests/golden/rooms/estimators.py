@@ -1,4 +1,4 @@
-"""Every estimator on two data sets: errors, response, parameters that the data determine, within 0.5 %."""
+"""Every estimator on two data sets: errors, response, parameters that data determine, within 0.5 %."""
 
 from __future__ import annotations
 

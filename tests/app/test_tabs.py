@@ -270,8 +270,12 @@ def test_motions_begin_at_rest_and_take_as_long_as_the_training_recordings(
         await on_compensate(user)
         assert field(user, "Time between steps [s]").value == 0.1
         assert field(user, "Duration [s]").value == 80.0
-        first, other = (float(field(user, label).value) for label in ("From [mm]", "To [mm]"))
-        assert (other - first) * gain > 0
+
+        def ends() -> tuple[float, ...]:
+            return tuple(float(field(user, label).value) for label in ("From [mm]", "To [mm]"))
+
+        await later(lambda: (ends()[1] - ends()[0]) * gain > 0)  # what can be reached is looked for
+        first = ends()[0]
         field(user, "Duration [s]").set_value(120.0)
         user.find(marker="wave").click()
         points = only(user, "points").value

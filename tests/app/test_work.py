@@ -261,6 +261,7 @@ def test_a_loop_is_stored_beside_no_compensation(workspace: Workspace, plant: st
     ):
         off = (stored[channel] - stored["reference_displacement"])[scored]
         assert float(np.sqrt(np.mean(off**2))) == pytest.approx(noted, rel=1e-6, abs=1e-9)
+    assert run.offset["displacement"] == pytest.approx(off.mean(), rel=1e-6, abs=1e-9)
 
 
 def test_a_log_is_split_into_what_its_error_comes_from(workspace: Workspace) -> None:

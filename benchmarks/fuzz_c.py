@@ -130,7 +130,13 @@ def fuzzed(folder: Path, seconds: int, seed: int) -> int:
     clang, compiler = shutil.which("clang"), own_compiler()
     if clang and built(folder, clang, WATCHED, "-fsanitize=fuzzer"):
         (folder / "corpus").mkdir()
-        options = ["corpus", "-max_len=2048", "-timeout=10", f"-max_total_time={seconds}"]
+        options = [
+            "corpus",
+            "-verbosity=0",
+            "-max_len=2048",
+            "-timeout=10",
+            f"-max_total_time={seconds}",
+        ]
         command = [*options, "-print_final_stats=1", f"-seed={seed}"]
     elif compiler is None:
         print("there is no C compiler on this machine: install gcc or clang", file=sys.stderr)

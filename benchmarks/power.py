@@ -34,6 +34,8 @@ MOST_LINES = 60
 """Changed lines of source in a commit that still counts as one fix."""
 
 CRASH = "no test by name"
+"""What failed where a run named nothing: it broke down under the change."""
+
 SECONDS = 900
 """Longest run of tests for one change; what does not end by then has caught nothing."""
 
@@ -80,9 +82,9 @@ class Change:
     tests: tuple[str, ...]
     """Tests that came with it."""
     patch: str = ""
-    """To be applied in reverse; or"""
+    """To be applied in reverse, where there is one."""
     replaced: tuple[str, str] = ("", "")
-    """what stands in the one file, and what is to stand there."""
+    """Without a patch: what stands in the one file, and what is to stand there."""
 
 
 def git(*words: str, text: str = "") -> str:

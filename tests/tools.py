@@ -38,21 +38,18 @@ def needs(tool: str) -> pytest.MarkDecorator:
     return pytest.mark.tool(name=tool)
 
 
-def where(tool: str) -> str | None:
-    """Return where a program is, None where it is not."""
-    return shutil.which(tool)
-
-
 def skip_without_tools(item: pytest.Item) -> None:
     """Skip a test whose tools are not here, and say which."""
     wanted = [mark.kwargs["name"] for mark in item.iter_markers("tool")]
-    if lacking := sorted(tool for tool in wanted if where(tool) is None):
+    if lacking := sorted(tool for tool in wanted if shutil.which(tool) is None):
         pytest.skip(f"there is no {', '.join(lacking)}")
 
 
 def install(tools: Sequence[str]) -> None:
     """Install tools of `PACKAGES`, with what they depend on; where that fails, tests are skipped."""
-    packages = sorted({*" ".join(PACKAGES[tool] for tool in tools if not where(tool)).split()})
+    packages = sorted(
+        {*" ".join(PACKAGES[tool] for tool in tools if not shutil.which(tool)).split()}
+    )
     if not packages or shutil.which("apt-get") is None:
         return
     asked = ["apt-get", "install", "-y", "-qq", "--no-install-recommends", *packages]

@@ -10,11 +10,10 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from shutil import which
 from typing import Any
 
-from tests.tools import where
-
-BROWSER = where("chromium")
+BROWSER = which("chromium")
 
 SLOW = 300_000
 """Milliseconds to wait for fits on a busy machine."""

@@ -7,12 +7,12 @@ import os
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+from shutil import which
 from typing import Any
 
 import pytest
 
 from tests.app.browsing import SLOW, downloaded, seen, visited, workbench
-from tests.tools import where
 
 pytest.importorskip("playwright.sync_api")
 
@@ -69,7 +69,7 @@ def test_from_the_example_to_a_c_folder(page: Any, tmp_path: Path) -> None:
         names = archive.namelist()
         archive.extractall(tmp_path)
     assert any(name.endswith("CMakeLists.txt") for name in names)
-    if where("cc"):
+    if which("cc"):
         from mckibben.export.c.building import self_test
 
         folder = tmp_path / names[0].split("/")[0]

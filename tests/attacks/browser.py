@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from shutil import which
 from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-
-from tests.tools import where
 
 OPTIONS = [
     "--no-sandbox",
@@ -103,7 +102,7 @@ def watched(own: str) -> Iterator[Watched]:
     """Open a page of this machine, a file or of a server here, where nothing else is reached."""
     play_with = pytest.importorskip("playwright.sync_api").sync_playwright
     with play_with() as play:
-        browser = play.chromium.launch(executable_path=where("chromium"), args=OPTIONS)
+        browser = play.chromium.launch(executable_path=which("chromium"), args=OPTIONS)
         parts = urlsplit(own)
         ours = own if parts.scheme == "file" else f"{parts.scheme}://{parts.netloc}/"
         here = ours.replace("http", "ws", 1)

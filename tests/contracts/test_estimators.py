@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -18,20 +17,12 @@ from mckibben import DataError, ModelError, Recording, registry
 from mckibben import load as load_model
 from mckibben.estimators.optimisers.tracker import whole_searches
 from tests.estimators.examples import CASES, KINDS, quick, recorded
+from tests.estimators.examples import few_steps as few_steps  # a fixture
 
 pytestmark = [
     pytest.mark.parametrize(("name", "kind"), CASES),
     pytest.mark.filterwarnings("ignore::mckibben.errors.ModelWarning"),
 ]
-
-
-@pytest.fixture(autouse=True, scope="module")
-def few_steps() -> Iterator[None]:
-    """Let linear models take few steps: what is asked here does not depend on how far they go."""
-    with pytest.MonkeyPatch.context() as patch:
-        for steps in ("FIRST_STEPS", "STEPS"):
-            patch.setattr(f"mckibben.estimators.linear.prediction_error.{steps}", 2)
-        yield
 
 
 @cache

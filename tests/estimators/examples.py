@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
+
+import pytest
 
 from mckibben import Recording
 from mckibben.registry import load, names
@@ -113,3 +116,12 @@ def quick(name: str, kind: str | None = None, **settings: Any) -> Any:
 
 CASES = tuple((name, kind) for name in names("estimators") for kind in kinds_for(name))
 """Every estimator on every kind of recording that it learns from."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few_steps() -> Iterator[None]:
+    """Let linear models take few steps: what is asked here does not depend on how far they go."""
+    with pytest.MonkeyPatch.context() as patch:
+        for steps in ("FIRST_STEPS", "STEPS"):
+            patch.setattr(f"mckibben.estimators.linear.prediction_error.{steps}", 2)
+        yield

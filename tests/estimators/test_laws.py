@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +18,7 @@ from mckibben.estimators.core.searching import SearchingEstimator
 from mckibben.estimators.core.settings import Setting, settings_with_defaults
 from mckibben.registry import load, names
 from tests.estimators.examples import KINDS, example_for, kinds_for, quick
+from tests.estimators.examples import few_steps as few_steps  # a fixture
 
 ALL = names("estimators")
 INVERTIBLE = (
@@ -35,15 +35,6 @@ FREE_OF_UNITS = (
 )
 UNIT_DEPENDENT = ("gpi", "mms", "mpi", "rdpi")
 """These, and others, have tolerances, bounds or starts in units of their own yet."""
-
-
-@pytest.fixture(autouse=True, scope="module")
-def few_steps() -> Iterator[None]:
-    """Let linear models take few steps: what is asked here does not depend on how far they go."""
-    with pytest.MonkeyPatch.context() as patch:
-        for steps in ("FIRST_STEPS", "STEPS"):
-            patch.setattr(f"mckibben.estimators.linear.prediction_error.{steps}", 2)
-        yield
 
 
 # -- settings --------------------------------------------------------------------------------------

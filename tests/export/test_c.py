@@ -19,7 +19,7 @@ from tests.export.building import FLAGS, SAMPLE_TIME, Compiled, build
 from tests.export.models import MODELS, difference, nearby, path_for, simulated
 from tests.tools import needs
 
-pytestmark = [pytest.mark.c, pytest.mark.long, needs("cc")]
+pytestmark = [pytest.mark.long, needs("cc")]
 
 DOUBLE, SINGLE, GROWN = 1e-12, 1e-4, 1e-8
 """Largest difference allowed, relative to the range; `GROWN` of what learns, over a long run."""

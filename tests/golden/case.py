@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
+from shutil import which
 
 import numpy as np
 
 from tests.recordings import MEASURED
-from tests.tools import where
 
 Leaf = None | bool | int | float | str | np.ndarray
 Tree = Leaf | Mapping[str, "Tree"] | Sequence["Tree"]
@@ -55,7 +55,7 @@ class Case:
     def possible(self) -> bool:
         """Whether all that it needs is here."""
         there = all((MEASURED / folder).is_dir() for folder in self.needs)
-        return there and all(where(tool) for tool in self.tools)
+        return there and all(which(tool) for tool in self.tools)
 
     def tolerance(self, leaf: str) -> float | None:
         """Return how far a leaf may move, relative to its stored value."""

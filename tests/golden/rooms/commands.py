@@ -16,6 +16,7 @@ import mckibben
 from mckibben import example
 from tests.golden.case import Case, Tree
 from tests.golden.commands import answered, call
+from tests.golden.models import example as block_example
 from tests.golden.plants import runs
 from tests.golden.rounding import rounded
 from tests.golden.written import written
@@ -50,6 +51,10 @@ COMMANDS: Mapping[str, Sequence[str]] = {
     "compare-example": (
         "compare decaying-triangle.csv --test irregular-triangle.csv --models pi,mpi --jobs 1",
     ),
+    "compare-load": (
+        "compare lifted-1.csv lifted-2.csv lifted-3.csv --test lifted-4.csv --load force "
+        "--models coupled-memory,mpi --jobs 1",
+    ),
     "plan": ("plan train.csv --minutes 1 -o next.csv",),
     "simulate": ("simulate model.json test.csv -o out.csv",),
     "simulate-inverse": (INVERT, "simulate inverse.json test.csv -o out.csv"),
@@ -60,12 +65,14 @@ COMMANDS: Mapping[str, Sequence[str]] = {
         "simulate banded.json test.csv --interval 0.75 -o out.csv",
     ),
     "invert": (INVERT,),
+    "invert-force": ("invert balance.json --for force -o estimate.json",),
     "invert-adaptive": ("invert model.json --adaptive -o adaptive.json",),
     "invert-predictive": ("invert model.json --predictive --rate-limit 5 -o predictive.json",),
     "track-twin": (INVERT, LOOP),
     "track-log": (INVERT, f"{LOOP} --noise 0.05 -o log.csv"),
     "track-rig": (INVERT, "track inverse.json --rig mas20-hanging --reference test.csv"),
     "study": ("study train.csv --test test.csv --models pi,mpi --jobs 1 -o study",),
+    "study-quick": ("study train.csv --test test.csv --quick --jobs 1 -o study",),
     "review": (
         INVERT,
         f"{LOOP} --noise 0.05 -o log.csv",
@@ -151,12 +158,15 @@ def prepared(folder: Path) -> None:
     """Write what commands are called on."""
     for name, recording in zip(("train", "test"), runs("muscle"), strict=True):
         mckibben.write(recording, folder / f"{name}.csv")
+    for number, recording in enumerate(runs("lifted"), start=1):
+        mckibben.write(recording, folder / f"lifted-{number}.csv")
     for path in (example.TRAIN, example.TEST):
         (folder / path.name).write_bytes(path.read_bytes())
     (folder / "model.json").write_text(json.dumps(MODEL))
     other = MODEL | {"weights": [9.0, 6.0, 1.5, 2.0, 3.0]}
     (folder / "other.json").write_text(json.dumps(other))
     mckibben.Polynomial((1.0, 0.0, 2.0)).save(folder / "network.json")
+    block_example("balance").save(folder / "balance.json")
 
 
 def commanded(commands: Sequence[str], folder: Path) -> Tree:

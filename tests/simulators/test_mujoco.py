@@ -202,3 +202,10 @@ def test_what_cannot_be_a_muscle_is_refused() -> None:
     mujoco.set_mjcb_act_bias(lambda m, d, k: 0.0)
     with pytest.raises(ModelError):  # as there is another callback
         lift()
+
+
+def test_muscles_that_are_alike_share_a_number() -> None:
+    zeros = (0.0, 0.1, 0.0, 0.1)
+    numbers = [float(lift(QUICK, zero=zero).actuator_biasprm[0, 0]) for zero in zeros]
+    assert numbers[:2] == numbers[2:]
+    assert numbers[0] != numbers[1]

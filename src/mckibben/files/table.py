@@ -97,6 +97,9 @@ class Table:
         What else the file holds.
     rates : mapping of str to float
         Scalars named as rates or sample times are, by their places; they are not looked at yet.
+    unread : mapping of str to str
+        What else holds data and became no column (a struct array, a sheet, a data set of three axes),
+        by its place, and the reason in a few words.
     name : str, optional
         The name of this recording among several in the file.
     own : bool
@@ -109,6 +112,7 @@ class Table:
     start_time: float = 0.0
     meta: Mapping[str, Any] = field(default_factory=dict)
     rates: Mapping[str, float] = field(default_factory=dict)
+    unread: Mapping[str, str] = field(default_factory=dict)
     name: str | None = None
     own: bool = False
 

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from mckibben.app.kept import Reading
 from mckibben.errors import DataError, TooLargeError
 from mckibben.files import formats, read
-from mckibben.files.assigning import assign
+from mckibben.files.choosing import assign
 from mckibben.files.headers import channel_of, parse
 from mckibben.files.own import description
 from mckibben.files.request import Request

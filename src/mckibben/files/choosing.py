@@ -1,7 +1,9 @@
-"""The channels of a table in the units of the package."""
+"""Which column of a table is which channel, and its samples in the package's units."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,21 +12,21 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import clocks, glitches, instants, plausible, timebase
-from mckibben.files.assigning import assign
-from mckibben.files.calibration import calibrated
-from mckibben.files.channels import Described
-from mckibben.files.headers import LONGEST, parse, unit_of
+from mckibben.files import clocks, instants, quality, timebase
+from mckibben.files.channels import NAME, Channel
+from mckibben.files.headers import LONGEST, by_units, channel_of, parse, snake_case, unit_of
 from mckibben.files.notices import listed, warn
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
-from mckibben.files.units import Unit, convert, find
+from mckibben.files.units import Unit, convert, find, weight
 
-IMPLAUSIBLE_BAR = 50.0
-"""No muscle sees this pressure; larger numbers without a unit are kPa, psi or the like."""
+ROLES = ("reference_", "command_")
+"""Beginnings of the names of a loop's channels."""
 
 ASSUMED = "no unit is given, so these are assumed: "
-"""What a note on assumed units begins with."""
+"""Beginning of a note on assumed units."""
+
+EXAMPLES = {"bar": "kPa", "N": "kN", "s": "ms", "rad": "deg", "mm": "um"}
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,13 @@ class Choice:
     channels, units : dict
         Samples and unit of every channel.
     recorded : dict
-        The channels as they are without gain and offset, by which the same rows are known again.
+        The channels without gain and offset, by which rows that two recordings share are found.
     time : numpy.ndarray or None
         In the unit ``time_unit``, so that the digits recorded can still be seen.
+    stated : bool
+        Whether the unit of the times is certain: stated, or they are dates.
     meta : dict
-        What else to tell about the columns.
+        What else is recorded about the columns.
     """
 
     channels: dict[str, Array]
@@ -48,17 +52,58 @@ class Choice:
     recorded: dict[str, Array]
     time: Array | None
     time_unit: str
+    stated: bool
     meta: dict[str, Any]
 
 
-@dataclass
-class _Findings:
-    """What comes up while columns are looked at."""
+@dataclass(frozen=True)
+class Seen:
+    """A column of a file, as an import shows it.
 
-    ignored: list[str]
+    Parameters
+    ----------
+    header, unit : str
+        As in the file; the unit is empty where the file states none.
+    first : tuple of str
+        Its first cells.
+    channel : str
+        The channel that it is read as; empty where it is left out.
+    unasked : str
+        The channel that it is read as without options.
+    """
+
+    header: str
+    unit: str
+    first: tuple[str, ...]
+    channel: str
+    unasked: str
+
+
+@dataclass
+class _Notes:
+    """What is recorded while columns are converted."""
+
+    left_out: dict[str, str]
     converted: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
     references: dict[str, str] = field(default_factory=dict)
+    calibration: dict[str, Any] = field(default_factory=dict)
+
+
+def seen(table: Table, request: Request, path: Path) -> list[Seen]:
+    """Return the columns of a table and what each is read as; of a refusal, what headers name."""
+    nothing = replace(request, columns={}, units={}, channels=None, rate=None)
+    asked, unasked = (_by_place(table, one, path) for one in (request, nothing))
+    return [
+        Seen(
+            column.header,
+            column.unit or parse(column.label).unit or "",
+            tuple(_cell(column, k) for k in range(min(4, column.size))),
+            asked.get(id(column), ""),
+            unasked.get(id(column), ""),
+        )
+        for column in table.columns
+    ]
 
 
 def choose(table: Table, request: Request, path: Path) -> Choice:
@@ -67,65 +112,311 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
     Raises
     ------
     DataError
-        If a channel asked for is missing, two columns are one channel, a cell is no number, or a
-        unit is unknown or of the wrong dimension.
+        If a channel asked for is missing, two columns are one channel, a cell is no number, a unit is
+        unknown, contradicted or of the wrong dimension, or a value is impossible.
     """
-    described = Described() if table.own else request.described
-    request = replace(request, described=request.describing(described))
+    request = request.describing(table)
     named, left_out = assign(table, request, path)
     named, dropped = clocks.on_one(named, request, path)
-    left_out += dropped
-    before = named
-    named, calibration = calibrated(named, request.described, request.calibration)
-    found = _Findings(ignored=[*table.meta.get("ignored_columns", ()), *left_out])
-    time, time_unit = None, "s"
+    left_out |= dict.fromkeys(dropped, "no samples at the others' times")
+    notes = _Notes(left_out)
+    time, time_unit, stated = None, "s", True
     if "time" in named:
-        time, time_unit = _time(named.pop("time"), table, request, path, found)
+        time, time_unit, stated = _time(named.pop("time"), table, request, path, notes)
     channels: dict[str, Array] = {}
     units: dict[str, str] = {}
     recorded: dict[str, Array] = {}
     for channel, column in named.items():
-        values = _numbers(channel, column, table, request, path, found)
-        if values is not None:
-            unit = _unit(channel, column, values, table.own, request, path, found)
-            target = unit_of(channel)
-            target = unit.target if target is None else target
-            keeps = target is None or (table.own and unit_of(channel) is None)
-            units[channel] = unit.name if keeps or target is None else target
-            channels[channel] = recorded[channel] = convert(values, unit.name, units[channel])
-            if channel in calibration and (raw := before[channel].values) is not None:
-                recorded[channel] = convert(raw, unit.name, units[channel])
-            if units[channel] != unit.name:
-                found.converted.append(f"{channel} from {unit.name} to {units[channel]}")
-            if not table.own or channel in request.units:
-                plausible.check(
-                    channel, channels[channel], unit_of(channel), unit.name, table, path
-                )
-                if unit_of(channel) is not None:
-                    glitches.check(channel, channels[channel], units[channel], values, table, path)
+        try:
+            found = _converted(channel, column, table, request, path, notes)
+        except DataError as error:
+            if request.needs(channel) and (
+                unit_of(channel) is not None or request.asks_for(channel)
+            ):
+                raise
+            left_out[column.header] = error.problem
+            continue
+        channels[channel], recorded[channel], units[channel] = found
     if not channels:
         raise DataError(
             "there is no column of numbers", file=path, remedy="give a file with samples in columns"
         )
-    if found.assumed:
+    if notes.assumed:
         warn(
             path,
-            f"{ASSUMED}{listed(found.assumed)}; say --unit CHANNEL=UNIT where that is wrong",
+            f"{ASSUMED}{listed(notes.assumed)}; use --unit CHANNEL=UNIT where that is wrong",
         )
-    notes = {
-        "ignored_columns": found.ignored,
-        "converted_units": found.converted,
-        "pressure_reference": found.references,
-        "calibration": calibration,
+    absolute = [name for name, kind in notes.references.items() if kind == "absolute"]
+    if absolute:
+        warn(path, f"absolute pressure, not gauge: {listed(absolute)}; no offset was removed")
+    if left_out and not table.own:
+        reasons = [f"{header} ({why})" for header, why in left_out.items()]
+        warn(path, f"not read: {listed(reasons)}")
+    found_meta = {
+        "ignored_columns": list(left_out),
+        "converted_units": notes.converted,
+        "pressure_reference": notes.references,
+        "calibration": notes.calibration,
     }
-    meta = {name: note for name, note in notes.items() if note}
-    return Choice(channels, units, recorded, time, time_unit, meta)
+    meta = {name: note for name, note in found_meta.items() if note}
+    return Choice(channels, units, recorded, time, time_unit, stated, meta)
 
 
-def _numbers(
-    channel: str, column: Column, table: Table, request: Request, path: Path, found: _Findings
-) -> Array | None:
-    """Return the samples of a column, or None where it is to be left out."""
+def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column], dict[str, str]]:
+    """Return the column of every channel, in the order of the file, and why others are left out.
+
+    Columns that the request names go before those that the folder describes, and these before those
+    whose headers name the channel; numbers go before text. Unless columns have clocks of their own,
+    all are of one length: that of the columns asked for, or else the longest that several have.
+
+    Raises
+    ------
+    DataError
+        If a channel asked for is missing, or two columns are one channel.
+    """
+    long = next((c for c in table.columns if len(c.header) > LONGEST and not table.own), None)
+    if long is not None:
+        raise DataError(
+            f"the header {long.header[:40]!r}... has {len(long.header)} characters",
+            file=path,
+            remedy=f"shorten it to {LONGEST} at most",
+        )
+    mapped = {
+        channel: find_column(wanted, channel, table, path)
+        for channel, wanted in request.columns.items()
+        if not (channel == "time" and table.has_clocks)
+    }
+    table, left_out = _of_one_length(table, mapped, path)
+    mapped = _described(table, request, path) | mapped
+    named: dict[str, Column] = dict(mapped)
+    for column in sorted(table.columns, key=lambda column: column.values is None):
+        if any(column is taken for taken in mapped.values()):
+            continue
+        header = parse(column.label)
+        whole = snake_case(column.header)
+        channel = column.header if table.own else channel_of(header)
+        if (channel in mapped and not table.own) or (
+            channel in named and channel.startswith(ROLES)
+        ):
+            channel = snake_case(header.name)  # the first of several references is the loop's
+        if channel in named and channel not in mapped and not request.needs(channel):
+            channel = whole
+        text = column.values is None
+        wanted = channel not in named and (channel == "time" or request.asks_for(channel))
+        if text and not wanted:
+            left_out[column.header] = "text"
+        elif channel in mapped:
+            left_out[column.header] = f"{channel} is read from another column"
+        elif channel in named:
+            raise DataError(
+                f"columns {named[channel].header!r} and {column.header!r} both hold it",
+                file=path,
+                channel=channel,
+                remedy=f"name one, with --column {channel}={named[channel].header!r}; "
+                "the columns of a file need different headers",
+            )
+        else:
+            named[channel] = column
+    order = {id(column): place for place, column in enumerate(table.columns)}
+    named = dict(sorted(named.items(), key=lambda item: order.get(id(item[1]), len(order))))
+    renamed = {} if table.own else _by_units(named, request)
+    said = [f"{named[name].header!r} as {channel}" for name, channel in renamed.items()]
+    named = {renamed.get(channel, channel): column for channel, column in named.items()}
+    _require(named, table, request, path)
+    if said:
+        warn(
+            path,
+            f"no name identifies these columns, so they are read by their units: {listed(said)}; "
+            "use --column CHANNEL=COLUMN where that is wrong",
+        )
+    return named, left_out | dict(table.unread)
+
+
+def find_column(wanted: str, channel: str, table: Table, path: Path) -> Column:
+    """Return the column of a name: as written, without its unit, or in another case."""
+    readings = (
+        lambda column: column.header == wanted,
+        lambda column: parse(column.header).name == wanted.strip(),
+        lambda column: column.header.casefold().strip() == wanted.casefold().strip(),
+        lambda column: snake_case(parse(column.header).name) == snake_case(wanted),
+        lambda column: column.label == wanted,
+    )
+    for reading in readings:
+        matches = [column for column in table.columns if reading(column)]
+        if len(matches) > 1:
+            headers = listed([column.header for column in matches])
+            numbered = len({column.header for column in matches}) == len(matches)
+            raise DataError(
+                f"{len(matches)} columns are named {wanted!r}",
+                file=path,
+                channel=channel,
+                remedy=f"name one of {headers}" if numbered else "give them different headers",
+            )
+        if matches:
+            return matches[0]
+    unread = {
+        place: why
+        for place, why in table.unread.items()
+        if wanted in (place, place.rpartition(".")[2])
+    }
+    if unread:
+        ((place, why), *_) = unread.items()
+        raise DataError(
+            f"{place!r} cannot be read: {why}",
+            file=path,
+            channel=channel,
+            remedy="save it as one vector of numbers",
+        )
+    raise DataError(
+        f"there is no column {wanted!r}; there are {_headers(table)}",
+        file=path,
+        channel=channel,
+        remedy=f"name one of them with --column {channel}=COLUMN",
+    )
+
+
+def matrix_hint(table: Table, *, time: bool) -> str:
+    """Return what to add to a remedy where columns are those of a matrix, whose names mean nothing."""
+    columns = [column for column in table.columns if column.matrix is not None]
+    if not columns:
+        return ""
+    said = f", one of {listed([column.header for column in columns])}"
+    first = columns[0]
+    if time and first.values is not None and timebase.rises_evenly(first.values):
+        said += f"; {first.header} rises evenly, as time does: --column time={first.header}"
+    return said
+
+
+def _of_one_length(
+    table: Table, mapped: Mapping[str, Column], path: Path
+) -> tuple[Table, dict[str, str]]:
+    """Return the columns of the recording's length, and the others with the reason."""
+    if table.has_clocks:
+        return table, {}
+    asked = {channel: column.size for channel, column in mapped.items()}
+    if len(set(asked.values())) > 1:
+        said = ", ".join(f"{channel} {size}" for channel, size in asked.items())
+        raise DataError(
+            f"the columns asked for have unlike numbers of samples: {said}",
+            file=path,
+            channel=next(iter(asked)),
+            remedy="name columns of one length with --column CHANNEL=COLUMN",
+        )
+    sizes = Counter(column.size for column in table.columns if column.size > 1)
+    if not sizes:
+        raise DataError(
+            "there are no vectors of numbers in it",
+            file=path,
+            remedy="save each channel as one vector, all of one length, or as a column of one matrix",
+        )
+    shared = [size for size, several in sizes.items() if several > 1]
+    size = next(iter(asked.values()), max(shared or sizes))
+    kept = tuple(column for column in table.columns if column.size == size)
+    others = {c.header: f"{c.size} of {size} samples" for c in table.columns if c.size != size}
+    return replace(table, columns=kept), others
+
+
+def _described(table: Table, request: Request, path: Path) -> dict[str, Column]:
+    """Return the columns and constants that the folder names; what is not needed may be missing.
+
+    Of a force, a mass is the weight that hangs there: nobody measured it.
+    """
+    found: dict[str, Column] = {}
+    time = request.described.time
+    for name, given in request.described.channels.items():
+        if given.value is not None:
+            unit = weight(given.unit) if given.unit and unit_of(name) == "N" else given.unit
+            found[name] = Column(name, np.full(table.n_samples, given.value), unit)
+    said = {name: given.column for name, given in request.described.channels.items()}
+    for channel, wanted in {"time": time.column, **said}.items():
+        if wanted is None or channel in request.columns or (channel == "time" and table.has_clocks):
+            continue
+        try:
+            found[channel] = find_column(wanted, channel, table, path)
+        except DataError as error:
+            optional = (
+                time.sample_time is not None if channel == "time" else not request.asks_for(channel)
+            )
+            if not optional and not table.own:
+                raise DataError(
+                    error.problem,
+                    file=path,
+                    channel=channel,
+                    remedy=f"correct its column in {NAME}, or use --column {channel}=COLUMN",
+                ) from None
+            if not table.own:
+                warn(path, f"channel {channel!r} is left out: {error.problem}")
+    return found
+
+
+def _by_units(named: Mapping[str, Column], request: Request) -> dict[str, str]:
+    """Return the channels of columns without a known name, such as u1, by their units.
+
+    A name that the caller or the folder uses stays.
+    """
+    used = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
+    used |= request.described.channels.keys()
+    units = {}
+    for channel, column in named.items():
+        unit = find(column.unit or parse(column.label).unit or "")
+        units[channel] = (unit.target or "") if unit and channel not in used else ""
+    return by_units(units)
+
+
+def _require(named: Mapping[str, Column], table: Table, request: Request, path: Path) -> None:
+    for channel in request.channels or ():
+        if channel not in named:
+            raise DataError(
+                f"there is no such channel; the columns are {_headers(table)}",
+                file=path,
+                channel=channel,
+                remedy=f"name its column with --column {channel}=COLUMN"
+                f"{matrix_hint(table, time='time' not in named)}",
+            )
+    for word, option, asked in (
+        ("unit", "--unit", request.units),
+        ("calibration", "--calibrate", request.calibration),
+    ):
+        for channel in asked:
+            if channel not in named:
+                raise DataError(
+                    f"a {word} is given for it and it is not there; there are {', '.join(named)}",
+                    file=path,
+                    channel=channel,
+                    remedy=f"give {option} for one of them",
+                )
+
+
+def _headers(table: Table) -> str:
+    return listed([*(column.header for column in table.columns), *table.unread])
+
+
+def _converted(
+    channel: str, column: Column, table: Table, request: Request, path: Path, notes: _Notes
+) -> tuple[Array, Array, str]:
+    """Return the samples of a channel, the same without calibration, and their unit."""
+    raw = _numbers(channel, column, table, path)
+    gain, offset, calibrated = _calibration(channel, column, table, request, notes)
+    with np.errstate(over="ignore"):
+        values = gain * raw + offset if calibrated else raw
+    unit = _unit(channel, column, values, table, request, path, notes)
+    target = unit_of(channel)
+    target = unit.target if target is None else target
+    keeps = target is None or (table.own and unit_of(channel) is None)
+    final = unit.name if keeps or target is None else target
+    samples = convert(values, unit.name, final)
+    recorded = convert(raw, unit.name, final) if calibrated else samples
+    if final != unit.name:
+        notes.converted.append(f"{channel} from {unit.name} to {final}")
+    if not table.own or channel in request.units or calibrated:
+        if not table.own and unit_of(channel) is not None:
+            samples = quality.without_codes(channel, samples, raw, table, path)
+        quality.refuse_impossible(channel, samples, unit_of(channel), unit.name, table, path)
+    return samples, recorded, final
+
+
+def _numbers(channel: str, column: Column, table: Table, path: Path) -> Array:
+    """Return the samples of a column; `DataError` if it is text or has a flaw."""
     if column.values is None:
         raise DataError(
             f"column {column.header!r} holds text",
@@ -134,119 +425,169 @@ def _numbers(
             row=table.row(0),
             remedy=f"name a column of numbers with --column {channel}=COLUMN",
         )
-    if column.flaw is None:
-        return column.values
-    flaw = column.flaw
-    if request.asks_for(channel) or unit_of(channel) is not None:
-        raise DataError(
-            flaw.problem,
-            file=path,
-            channel=channel,
-            row=table.row(flaw.sample),
-            remedy=flaw.remedy,
-        )
-    warn(path, f"column {column.header!r} is left out: {flaw.problem}")
-    found.ignored.append(column.header)
-    return None
+    if column.flaw is not None:
+        flaw = column.flaw
+        row = table.row(flaw.sample)
+        raise DataError(flaw.problem, file=path, channel=channel, row=row, remedy=flaw.remedy)
+    return column.values
+
+
+def _calibration(
+    channel: str, column: Column, table: Table, request: Request, notes: _Notes
+) -> tuple[float, float, bool]:
+    """Return gain and offset of a channel, as asked for or else described, and whether there are any.
+
+    A file of this package that was calibrated when it was first read is not calibrated again.
+    """
+    given = request.described.channels.get(channel)
+    if given is not None and given.value is not None and column.header == channel:
+        notes.calibration[channel] = {"value": given.value, "unit": given.unit}
+        return 1.0, 0.0, False
+    if channel in request.calibration:
+        gain, offset = request.calibration[channel]
+    elif isinstance(given, Channel) and given.is_calibrated:
+        gain, offset = 1.0 if given.gain is None else given.gain, given.offset or 0.0
+    else:
+        return 1.0, 0.0, False
+    notes.calibration[channel] = {"column": column.header, "gain": gain, "offset": offset}
+    return gain, offset, True
 
 
 def _unit(
     channel: str,
     column: Column,
     values: Array,
-    own: bool,
+    table: Table,
     request: Request,
     path: Path,
-    found: _Findings,
+    notes: _Notes,
 ) -> Unit:
-    """Return the unit of a column: as given, as the file states it, or as assumed."""
-    given = request.units.get(channel)
-    text = column.unit if given is None else given
-    if text is None and not own:
-        text = parse(column.label).unit
+    """Return the unit of a column: as asked for, as the file or the folder states it, or assumed.
+
+    Raises
+    ------
+    DataError
+        If the file and the folder state different ones, and none is asked for; or if it is unknown or
+        of another dimension.
+    """
     expected = unit_of(channel)
+    text = request.units.get(channel)
     if text is None:
-        return _assumed(channel, expected, values, path, found)
-    if own and given is None and text == (text if expected is None else expected):
+        text = _stated(channel, column, table, request, path)
+    if text is None:
+        return _assumed(channel, values, notes)
+    if (
+        table.own
+        and channel not in request.units
+        and text == (text if expected is None else expected)
+    ):
         return Unit(text, expected)
     unit = find(text)
-    example = {"bar": "kPa", "N": "kN", "s": "ms"}.get(expected or "", "UNIT")
-    if unit is None and expected is None and given is None and len(text) <= LONGEST:
+    if unit is None and expected is None and channel not in request.units and len(text) <= LONGEST:
         return Unit(text, None)
     if unit is None:
         raise DataError(
             f"the unit {text[:40]!r} is unknown",
             file=path,
             channel=channel,
-            remedy=f"say which it is, as in --unit {channel}={example}",
+            remedy=f"name it, as in --unit {channel}={EXAMPLES.get(expected or '', 'UNIT')}",
         )
     if expected is not None and unit.target != expected:
+        raw = unit.target == "V" or text.casefold() in ("count", "counts", "lsb", "adc")
+        calibrate = (
+            f"calibrate it, as in --calibrate {channel}={column.header}:GAIN:OFFSET:{expected}, "
+        )
         said = f"in {text!r}, which does not convert to" if text else "without a unit: it is in"
         raise DataError(
             f"it cannot be {said} {expected or 'a pure number'}",
             file=path,
             channel=channel,
-            remedy=f"correct the unit with --unit {channel}={expected or '%'}, "
-            f"or name another column with --column {channel}=COLUMN",
+            remedy=f"{calibrate if raw else ''}correct the unit with --unit "
+            f"{channel}={expected or '%'}, or name another column with --column {channel}=COLUMN",
         )
     if unit.reference is not None:
-        found.references[channel] = unit.reference
-    if unit.name == "mm" and given is None:
-        plausible.doubt(channel, values, path)
+        notes.references[channel] = unit.reference
     return unit
 
 
-def _assumed(
-    channel: str, expected: str | None, values: Array, path: Path, found: _Findings
-) -> Unit:
-    if expected is None:
-        return Unit("", "")
-    finite = np.abs(values[np.isfinite(values)])
-    largest = float(finite.max()) if finite.size else 0.0
-    if expected == "bar" and largest > IMPLAUSIBLE_BAR:
-        fitting = plausible.meant(largest, expected, expected)
+def _stated(channel: str, column: Column, table: Table, request: Request, path: Path) -> str | None:
+    """Return the unit that the file and the folder state; `DataError` if they state different ones."""
+    described = (
+        request.described.time if channel == "time" else request.described.channels.get(channel)
+    )
+    in_header = None if table.own else parse(column.label).unit
+    stated = {"its header": in_header, "the file": column.unit}
+    if described is not None and described.unit is not None:
+        if isinstance(described, Channel) and described.value is not None:
+            stated = {NAME: column.unit}
+        else:
+            # what is calibrated has the unit that the calibration gives
+            calibrated = isinstance(described, Channel) and described.is_calibrated
+            stated = ({} if calibrated else stated) | {NAME: described.unit}
+    texts = {place: text for place, text in stated.items() if text is not None}
+    units = {place: find(text) for place, text in texts.items()}
+    kinds = {(unit.name, unit.reference) if unit else texts[place] for place, unit in units.items()}
+    if len(kinds) > 1:
+        said = ", ".join(f"{text!r} in {place}" for place, text in texts.items())
         raise DataError(
-            f"it has no unit and reaches {largest:g}, which cannot be bar",
+            f"its unit is contradicted: {said}",
             file=path,
             channel=channel,
-            remedy=f"say its unit, as in --unit {channel}={f' or --unit {channel}='.join(fitting[:2])}",
+            remedy=f"name the right one, as in --unit {channel}={list(texts.values())[-1]}",
         )
-    hint = ""
-    if expected == "mm" and 0 < largest < 0.5:
-        hint = f" (at most {largest:.3g}: is it in m?)"
-    if expected == "" and largest > 1.5:
-        hint = f" (up to {largest:.3g}: is it in %?)"
-    if expected or hint:
-        found.assumed.append(f"{channel} in {expected or 'parts of one'}{hint}")
+    return list(texts.values())[-1] if texts else None
+
+
+def _assumed(channel: str, values: Array, notes: _Notes) -> Unit:
+    expected = unit_of(channel)
+    if expected is None:
+        return Unit("", "")
+    if expected:
+        notes.assumed.append(f"{channel} in {expected}")
+    elif np.any(np.abs(values) > 1.5):
+        notes.assumed.append(
+            f"{channel} in parts of one (up to {np.nanmax(np.abs(values)):.3g}: is it in %?)"
+        )
     return Unit(expected, expected)
 
 
 def _time(
-    column: Column, table: Table, request: Request, path: Path, found: _Findings
-) -> tuple[Array | None, str]:
+    column: Column, table: Table, request: Request, path: Path, notes: _Notes
+) -> tuple[Array | None, str, bool]:
+    """Return times, their unit, and whether the unit is certain."""
     if column.values is None:
-        return _instants(column, table, request, path, found), "s"
-    values = _numbers("time", column, table, request, path, found)
-    assert values is not None  # time is a channel that _numbers never leaves out
-    stated = request.units.get("time") or column.unit or parse(column.label).unit
+        if request.rate is not None:
+            notes.left_out[column.header] = "the rate is given"
+            return None, "s", True
+        return instants.seconds(column.texts, table, path), "s", True
+    values = _numbers("time", column, table, path)
+    stated = request.units.get("time") or _stated("time", column, table, request, path)
     unit = None if stated else timebase.unit_by_size(values, table, path)
     if unit is None:
-        unit = _unit("time", column, values, table.own, request, path, found).name
+        unit = _unit("time", column, values, table, request, path, notes).name
     else:
+        stated = unit
         warn(
             path,
             f"the times have no unit; by their size they are counted in {unit} since 1970; "
-            "say --unit time=UNIT where that is wrong",
+            "use --unit time=UNIT where that is wrong",
         )
-    plausible.check("time", convert(values, unit, "s"), "s", unit, table, path)
-    return values, unit
+    quality.refuse_impossible("time", convert(values, unit, "s"), "s", unit, table, path)
+    return values, unit, "time" in request.units or (bool(stated) and unit != "s")
 
 
-def _instants(
-    column: Column, table: Table, request: Request, path: Path, found: _Findings
-) -> Array | None:
-    """Return instants as seconds since the first; None where the rate is given instead."""
-    if request.rate is not None:
-        found.ignored.append(column.header)
-        return None
-    return instants.seconds(column.texts, table, path)
+def _by_place(table: Table, request: Request, path: Path) -> dict[int, str]:
+    """Return the channel of every column, by its identity."""
+    try:
+        named, _ = assign(table, request, path)
+    except DataError:  # two columns are one channel, for example: each is then named by its header
+        named = {}
+        for column in table.columns:
+            if column.values is not None:
+                named.setdefault(channel_of(parse(column.label)), column)
+    kept: Sequence[str] | None = request.channels
+    return {id(c): name for name, c in named.items() if kept is None or name in (*kept, "time")}
+
+
+def _cell(column: Column, k: int) -> str:
+    return str(column.texts[k])[:40] if column.values is None else f"{column.values[k]:.6g}"

@@ -1,4 +1,4 @@
-"""Reading recordings: the columns of a file, on one time grid, without holes."""
+"""From a file to recordings: a table, its channels and units, its time grid."""
 
 from __future__ import annotations
 
@@ -6,20 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import rates, sources, timebase
-from mckibben.files.assigning import of_matrix
+from mckibben.files import quality, sources, timebase
 from mckibben.files.channels import about
-from mckibben.files.choosing import ASSUMED, Choice, choose
+from mckibben.files.choosing import ASSUMED, Choice, Seen, choose, matrix_hint, seen
 from mckibben.files.fingerprint import fingerprint
-from mckibben.files.holes import Channels, treat
 from mckibben.files.notices import listed, noted, warn
-from mckibben.files.request import FEWEST, Request
+from mckibben.files.quality import Channels, Mask
+from mckibben.files.request import FEWEST, Gaps, Request
 from mckibben.files.table import Table
 from mckibben.files.timebase import Span
 from mckibben.files.units import convert
@@ -28,19 +27,23 @@ from mckibben.recording import AT, ROWS, Recording
 MAY_BE_HELD = frozenset(
     {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
 )
-"""Channels that an experiment can hold: a recording of one length, or under one load, tells all else."""
+"""Channels that an experiment can hold constant."""
 
 LONGEST_BRIDGE = 100
-"""Times the samples there are: interpolating gaps to more than that is refused."""
+"""Most samples to which gaps are interpolated, over those there are."""
+
+LONGEST_STEP = 5.0
+"""Longest sample time [s] that is believed of times without a certain unit."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Samples on a uniform grid: the step [s], None where there is no time, and the start [s]."""
+    """Samples on a uniform grid: the step [s], None without time, and the start [s]."""
 
     samples: Channels
     step: float | None
     start: float
+    bridged: Mask
 
 
 def read(
@@ -49,63 +52,67 @@ def read(
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     rate: float | None = None,
-    gaps: Literal["error", "split", "interpolate"] = "error",
+    gaps: Gaps = "error",
     channels: Sequence[str] | None = None,
     informative: bool = True,
     calibration: Mapping[str, tuple[float, float]] | None = None,
     constants: Mapping[str, tuple[float, str]] | None = None,
+    most: float = 2.0**31,
 ) -> list[Recording]:
     """Read the recordings in a file, by its ending, or in a folder.
 
-    What ``channels.toml`` in the same folder says of the file (columns, units, calibrations, constants,
-    files with one signal each; see `mckibben.files.channels`) goes behind what is said here.
+    What ``channels.toml`` in the same folder states of the file (columns, units, calibrations,
+    constants, files with one signal each; see `mckibben.files.channels`) is used where no option is given.
 
     Parameters
     ----------
     path : path
-        Ends in ``.csv .tsv .txt .dat .parquet .mat .h5 .hdf5 .tdms .xlsx .bag .mcap .db3``; or a
-        folder of such files: a bag of ROS 2, files with one signal each, or several recordings.
+        Ends in one of `mckibben.files.formats.READERS`; or a folder: a bag of ROS 2, files with one
+        signal each, or several recordings.
     columns : mapping of str to str, optional
         Channel -> column, by its header with or without the unit; ``data[1]`` is the first column of a
-        matrix ``data``. Standard channels are found by
-        common names (``p``, ``Druck``, ``position``, ...) without it. ``time`` is a channel here.
+        matrix ``data``. Standard channels are found by common names (``p``, ``Druck``, ...)
+        without it. ``time`` is a channel here. Other columns with flaws are then left out, with a note.
     units : mapping of str to str, optional
-        Channel -> unit, such as ``{"pressure": "kPa"}``; goes before what the header says.
+        Channel -> unit, such as ``{"pressure": "kPa"}``; overrides what the file states.
     rate : float, optional
         Samples per second, positive, where there is no column of times. Without either, a scalar
-        beside the samples may tell it, such as ``fs``, or the recording has no time. Channels with
+        beside the samples may state it, such as ``fs``, or the recording has no time. Channels with
         times of their own are put on a clock of this rate.
     gaps : {"error", "split", "interpolate"}
         What to do where time is missing (a step of more than three median steps) or a sample is
-        (blank, NaN or infinite): refuse, cut into several recordings, or bridge linearly.
+        (blank, NaN, infinite, or a code such as -9999): refuse, cut into several recordings, or bridge
+        linearly; ``meta["bridged"]`` lists the bridged samples.
     channels : sequence of str, optional
-        Channels that must be there and whole. Others are then left out, with a `DataWarning`, if
-        samples of theirs are missing. By default all must be whole.
+        Channels that must be there and whole. Others are left out, with a `DataWarning`, if samples of
+        theirs are missing. By default all must be whole.
     informative : bool
         Whether there must be something to learn from: at least 10 samples, and no constant pressure
         or other channel asked for that an experiment does not hold, as it does a length or a force.
-        Without, two samples will do, as for simulating a model.
+        Without, two samples are enough, as for simulating a model.
     calibration : mapping of str to (float, float), optional
         Channel -> gain and offset: the channel is gain times the column, plus offset, in the unit that
         ``units`` or else the header gives. ``{"displacement": (-1, 0)}`` turns a sign.
     constants : mapping of str to (float, str), optional
-        Channel -> value and unit of what was held and stands in no column, such as the force
-        ``{"force": (200, "g")}``: a mass is the weight that it hangs with. Go before columns.
+        Channel -> value and unit of what was held and is in no column, such as the force
+        ``{"force": (200, "g")}``: a mass is the weight that it hangs with. Override columns.
+    most : float
+        Largest file that is read [bytes].
 
     Returns
     -------
     list of Recording
         One; or one for each stretch with ``gaps="split"``, each group of a TDMS file, and each file of
-        a folder.
-        In the package's units: bar, mm, N, s, rad, V, mm/s, degC. A file that `write` made gives
-        a recording equal to the one written. What was assumed or mended on the way is in
-        ``meta["notes"]``, a list of sentences, if there was anything.
+        a folder. In the package's units: bar, mm, N, s, rad, V, mm/s, degC. A file that `write` made
+        gives a recording equal to the one written. What was assumed, mended or left out is in
+        ``meta["notes"]``, a list of sentences, if anything was.
 
     Raises
     ------
     DataError
         Naming file, channel, row and remedy: file missing, damaged or of an unknown kind; column
-        or unit unknown; time repeated, going back or with gaps; samples missing or fewer than 10.
+        or unit unknown or contradicted; impossible values; time repeated, going back or with gaps;
+        samples missing or fewer than 10.
 
     Warns
     -----
@@ -123,9 +130,35 @@ def read(
         informative,
         dict(calibration or {}),
         dict(constants or {}),
+        most,
     )
     request.check(path)
     return [each for one in sources.inside(path) for each in _read(one, request)]
+
+
+def columns_of(path: str | Path, **options: Any) -> list[Seen]:
+    """Return the columns of a file or a folder's recording, and the channel that each is read as.
+
+    Parameters
+    ----------
+    path : path
+    **options
+        Those of `read`.
+
+    Returns
+    -------
+    list of Seen
+        In the order of the file; of the first recording, where there are several.
+
+    Raises
+    ------
+    DataError
+        If the file is missing or damaged.
+    """
+    path = Path(path)
+    request = replace(Request(**options), described=about(path))
+    (table, *_), _ = sources.tables(path, request)
+    return seen(table, request.describing(table), path)
 
 
 def _read(path: Path, request: Request) -> list[Recording]:
@@ -138,9 +171,9 @@ def _read(path: Path, request: Request) -> list[Recording]:
 
 
 def _with_notes(recording: Recording, notes: list[str], said: bool) -> Recording:
-    """Return a recording that tells what was assumed or mended when it was read, now or before.
+    """Return a recording with the notes of this reading after earlier ones.
 
-    Units that were assumed before are not, where it is said now what the columns are.
+    Units that were assumed before are not, where it is stated now what the columns are.
     """
     known = [note for note in recording.notes if not (said and note.startswith(ASSUMED))]
     told = known + [note for note in notes if note not in known]
@@ -157,27 +190,27 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
             remedy="give a longer recording",
         )
     step = _stated_step(choice, table, request, path)
-    measured = choice.time if step is None else None
-    if step is None and measured is None and (columns := of_matrix(table, time=True)):
-        warn(path, f"no column of times is named; say --column time=COLUMN{columns}")
-    if measured is not None:
-        timebase.check(measured, table, path)
-    order = np.arange(n, dtype=float) if measured is None else measured
+    time = choice.time if step is None else None
+    if step is None and time is None and (columns := matrix_hint(table, time=True)):
+        warn(path, f"no column of times is named; use --column time=COLUMN{columns}")
+    if time is not None:
+        time = timebase.checked(time, table, path)
+    order = np.arange(n, dtype=float) if time is None else time
     begin = table.start_time if choice.time is None else _seconds(choice.time[0], choice)
-    channels, spans = treat(choice.channels, order, table, request, path)
+    channels, spans, bridged = quality.fill(choice.channels, order, table, request, path)
     if request.informative:
         _refuse_constant(channels, spans, request, path)
-    if measured is None:
+    if time is None:
         pieces = [
-            Piece(_cut(channels, span), step, begin + (step or 1.0) * span[0])
+            Piece(
+                _cut(channels, span), step, begin + (step or 1.0) * span[0], bridged[slice(*span)]
+            )
             for span in _long_enough(spans, table, request, path)
         ]
     else:
-        pieces = _on_grid(channels, measured, spans, choice, table, request, path)
+        pieces = _on_grid(channels, time, spans, bridged, choice, table, request, path)
     units = {name: choice.units[name] for name in channels}
-    when = (
-        begin + (step or 1.0) * order if measured is None else convert(order, choice.time_unit, "s")
-    )
+    when = begin + (step or 1.0) * order if time is None else convert(order, choice.time_unit, "s")
     rows = fingerprint({name: choice.recorded[name] for name in channels}, when)
     meta = _meta(choice, table, path, digest)
     found = [
@@ -186,7 +219,7 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
             piece.step,
             units,
             piece.start,
-            ({ROWS: rows | {AT: piece.start}} if rows else {}) | meta,
+            ({ROWS: rows | {AT: piece.start}} if rows else {}) | meta | _bridged(piece.bridged),
         )
         for piece in pieces
     ]
@@ -196,11 +229,11 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
 
 
 def _stated_step(choice: Choice, table: Table, request: Request, path: Path) -> float | None:
-    """Return the sample time that the caller or the file states, which the times must not deny."""
+    """Return the sample time that the caller or the file states, which the times must not contradict."""
     step = table.sample_time if request.rate is None else 1.0 / request.rate
     if step is None and choice.time is None and not table.own:
         said = request.described.time.sample_time
-        return rates.sample_time(table.rates, path) if said is None else said
+        return timebase.stated_step(table.rates, path) if said is None else said
     if step is None:
         return None
     if table.sample_time is not None and abs(step - table.sample_time) > 1e-3 * step:
@@ -223,6 +256,7 @@ def _on_grid(
     channels: Channels,
     time: Array,
     spans: list[Span],
+    bridged: Mask,
     choice: Choice,
     table: Table,
     request: Request,
@@ -230,21 +264,32 @@ def _on_grid(
 ) -> list[Piece]:
     """Return the spans on one grid: as they are where times are uniform, else resampled."""
     cuts = [at for at in timebase.gaps(time) for start, stop in spans if start < at < stop]
+    lengths = [_seconds(float(time[at] - time[at - 1]), choice) for at in cuts]
     if cuts and request.gaps == "error":
-        lengths = [_seconds(float(time[at] - time[at - 1]), choice) for at in cuts]
+        among = (
+            f" ({len(cuts)} gaps in all, together {sum(lengths):.3g} s)" if len(cuts) > 1 else ""
+        )
         raise DataError(
-            f"there is a gap of {lengths[0]:.6g} s before this row{_among(lengths)}",
+            f"there is a gap of {lengths[0]:.6g} s before this row{among}",
             file=path,
             channel="time",
             row=table.row(int(cuts[0])),
-            remedy="say --gaps split to cut there or --gaps interpolate to bridge them",
+            remedy="use --gaps split to cut there or --gaps interpolate to bridge them",
         )
-    bridged = bool(cuts) and request.gaps == "interpolate"
+    over = bool(cuts) and request.gaps == "interpolate"
     stretches = _split(spans, cuts)
     if request.gaps == "split":
         spans = stretches = _long_enough(stretches, table, request, path)
     step = timebase.common_step(time, stretches)
     seconds = _seconds(step.size, choice)
+    if seconds > LONGEST_STEP and not choice.stated:
+        raise DataError(
+            f"its steps are {seconds:.6g} s: is time in ms?",
+            file=path,
+            channel="time",
+            row=table.row(0),
+            remedy="name its unit, as in --unit time=ms, or --unit time=s where that is right",
+        )
     if step.jitter is not None:
         rms, worst = (_seconds(deviation, choice) for deviation in step.jitter)
         warn(
@@ -253,41 +298,30 @@ def _on_grid(
             f"({100 * rms / seconds:.3g} %) and {worst:.3g} s at worst "
             f"({100 * worst / seconds:.3g} %); the samples were interpolated onto a uniform grid",
         )
-    if bridged:
-        _announce_bridges(time, cuts, step.size, choice, path)
+    if over:
+        if (time[-1] - time[0]) / step.size > LONGEST_BRIDGE * time.size:
+            raise DataError(
+                f"{len(cuts)} gap(s) of {sum(lengths):.6g} s in all are too long to interpolate over",
+                file=path,
+                channel="time",
+                remedy="use --gaps split",
+            )
+        warn(
+            path, f"{len(cuts)} gap(s) in time, {sum(lengths):.6g} s in all, were interpolated over"
+        )
     pieces = []
     for start, stop in _long_enough(spans, table, request, path):
-        samples, t = _cut(channels, (start, stop)), time[start:stop]
-        if bridged or step.jitter is not None:
-            samples = {
-                name: timebase.resample(t, values, step.size) for name, values in samples.items()
-            }
-        pieces.append(Piece(samples, seconds, _seconds(float(t[0]), choice)))
+        samples, t, mended = _cut(channels, (start, stop)), time[start:stop], bridged[start:stop]
+        if over or step.jitter is not None:
+            grid = timebase.grid(t, step.size)
+            samples = {name: np.interp(grid, t, values) for name, values in samples.items()}
+            # a sample of the grid is bridged where either neighbour is, or both enclose a gap
+            after = np.clip(np.searchsorted(t, grid - 1e-9 * step.size), 1, t.size - 1)
+            gap = np.isin(after + start, cuts) & (grid < t[after] - 1e-6 * step.size)
+            gap &= grid > t[after - 1] + 1e-6 * step.size
+            mended = (mended[after] & mended[after - 1]) | gap
+        pieces.append(Piece(samples, seconds, _seconds(float(t[0]), choice), mended))
     return pieces
-
-
-def _among(lengths: Sequence[float]) -> str:
-    """Return how long several gaps are, of which the first is told [s]."""
-    if len(lengths) < 2:
-        return ""
-    return (
-        f" ({len(lengths)} gaps in all: the longest {max(lengths):.3g} s, the median "
-        f"{np.median(lengths):.3g} s, together {sum(lengths):.3g} s)"
-    )
-
-
-def _announce_bridges(
-    time: Array, cuts: Sequence[int], step: float, choice: Choice, path: Path
-) -> None:
-    missing = _seconds(float(sum(time[at] - time[at - 1] for at in cuts)), choice)
-    if (time[-1] - time[0]) / step > LONGEST_BRIDGE * time.size:
-        raise DataError(
-            f"{len(cuts)} gap(s) of {missing:.6g} s in all are too long to interpolate over",
-            file=path,
-            channel="time",
-            remedy="say --gaps split",
-        )
-    warn(path, f"{len(cuts)} gap(s) in time, {missing:.6g} s in all, were interpolated over")
 
 
 def _refuse_constant(channels: Channels, spans: list[Span], request: Request, path: Path) -> None:
@@ -311,14 +345,14 @@ def _long_enough(spans: list[Span], table: Table, request: Request, path: Path) 
         raise DataError(
             f"no stretch without gaps has {fewest} samples",
             file=path,
-            remedy="say --gaps interpolate, or give a recording with fewer gaps",
+            remedy="use --gaps interpolate, or give a recording with fewer gaps",
         )
     if len(kept) < len(spans):
         rows = [f"{table.row(start)}" for start, stop in spans if stop - start < fewest]
         warn(
             path,
-            f"{len(rows)} of {len(spans)} stretches between gaps have fewer than {fewest} samples, "
-            f"which no later step can use, and were left out: they begin in row {listed(rows)}",
+            f"{len(rows)} of {len(spans)} stretches between gaps have fewer than {fewest} samples and "
+            f"were left out: they begin in row {listed(rows)}",
         )
     return kept
 
@@ -334,6 +368,14 @@ def _cut(channels: Channels, span: Span) -> Channels:
 
 def _seconds(value: float, choice: Choice) -> float:
     return float(convert(np.array([value]), choice.time_unit, "s")[0])
+
+
+def _bridged(mended: Mask) -> dict[str, Any]:
+    """Return the spans of interpolated samples as ``meta`` lists them, nothing without any."""
+    if not mended.any():
+        return {}
+    edges = np.flatnonzero(np.diff(mended.astype(np.int8), prepend=0, append=0))
+    return {"bridged": edges.reshape(-1, 2).tolist()}
 
 
 def _meta(choice: Choice, table: Table, path: Path, digest: str) -> dict[str, object]:

@@ -163,5 +163,4 @@ def _seconds(clock: Column, table: Table, request: Request, path: Path) -> Array
     rest = Column("signal", np.zeros(table.n_samples), "1")
     choice = choose(replace(table, columns=(time, rest)), alone, path)
     assert choice.time is not None
-    timebase.check(choice.time, table, path)
-    return convert(choice.time, choice.time_unit, "s")
+    return convert(timebase.checked(choice.time, table, path), choice.time_unit, "s")

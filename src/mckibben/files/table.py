@@ -1,30 +1,27 @@
-"""A table: the columns of a file as they stand in it, before anything is read into them."""
+"""A table: the columns of one recording as they are in the file, before they are interpreted."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
 from mckibben.files.headers import parse
 
 WIDEST = 64
-"""Columns of a matrix that are channels, as of arrays in messages; what has more is no recording."""
+"""Most columns of a matrix that are read as channels."""
 
 SLENDER = 10
-"""Rows for each column that such a matrix has at least."""
+"""Fewest rows of such a matrix for each of its columns."""
 
 
 @dataclass(frozen=True)
 class Flaw:
-    """What keeps a column of numbers from being used.
+    """Why a column of numbers cannot be used.
 
     Parameters
     ----------
@@ -52,15 +49,15 @@ class Column:
     unit : str, optional
         The unit where the file states it apart from the header.
     texts : sequence of str, length n
-        The cells of a column of text; of a text file the first ones only, if they are no times.
+        The cells of a column of text; of a text file the first ones only, unless they are times.
     flaw : Flaw, optional
         Why the samples cannot be used, if they cannot.
     says : str, optional
-        What tells the channel and the unit in place of the header, as the name of a file does.
+        What names the channel and the unit in place of the header, as the name of a file does.
     times : numpy.ndarray, shape (n,), optional
         Times of the samples [s], where not all columns were sampled together.
     held : bool
-        Whether the last sample holds until the next, as counts and switches do.
+        Whether the last sample holds until the next, as with counts and switches.
     matrix : str, optional
         The place of the matrix that it is a column of.
     """
@@ -77,33 +74,38 @@ class Column:
 
     @property
     def label(self) -> str:
-        """What tells the channel and the unit."""
+        """What names the channel and the unit."""
         return self.says or self.header
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        return len(self.texts) if self.values is None else self.values.size
 
 
 @dataclass(frozen=True)
 class Table:
-    """The columns of one recording in a file, all of one length.
+    """The columns of one recording in a file.
 
     Parameters
     ----------
     columns : tuple of Column
-        At least one.
+        In the order of the file; of unlike lengths where the file holds vectors of unlike lengths.
     lines : numpy.ndarray of int, shape (n,), optional
-        The line of a text file that each sample stands in; samples count from 1 without.
+        The line of a text file that each sample is in; without it, samples count from 1.
     sample_time, start_time : float
         The time grid [s] where the file states it; ``sample_time`` is None otherwise.
     meta : mapping
         What else the file holds.
     rates : mapping of str to float
-        Scalars named as rates or sample times are, by their places; they are not looked at yet.
+        Scalars named as rates or sample times are, by their places.
     unread : mapping of str to str
         What else holds data and became no column (a struct array, a sheet, a data set of three axes),
         by its place, and the reason in a few words.
     name : str, optional
         The name of this recording among several in the file.
     own : bool
-        Whether this package wrote it: names, units and meta then stand as they are.
+        Whether this package wrote it: names, units and meta then need no interpretation.
     """
 
     columns: tuple[Column, ...]
@@ -118,13 +120,14 @@ class Table:
 
     @property
     def n_samples(self) -> int:
-        """Samples of each column."""
-        known = [column.values.size for column in self.columns if column.values is not None]
-        return known[0] if known else _length(self.columns[0])
+        """Samples of the first column of numbers, or of the first column."""
+        return next(
+            (c.values.size for c in self.columns if c.values is not None), self.columns[0].size
+        )
 
     @property
     def has_clocks(self) -> bool:
-        """Whether its columns have times of their own, so that none is of times."""
+        """Whether columns have times of their own, so that none of them is the time."""
         return any(column.times is not None for column in self.columns)
 
     def row(self, sample: int) -> int:
@@ -134,11 +137,9 @@ class Table:
 
 def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column:
     """Return the column of an array of any type; instants become seconds since the first."""
-    if np.issubdtype(values.dtype, np.datetime64):
-        since = (values - values[:1]).astype("timedelta64[ns]").astype(np.float64) * 1e-9
-        return Column(header, np.where(np.isnat(values), np.nan, since), "s")
-    if np.issubdtype(values.dtype, np.timedelta64):
-        seconds = values.astype("timedelta64[ns]").astype(np.float64) * 1e-9
+    if values.dtype.kind in "mM":
+        since = values - values[:1] if values.dtype.kind == "M" else values
+        seconds = since.astype("timedelta64[ns]").astype(np.float64) * 1e-9
         return Column(header, np.where(np.isnat(values), np.nan, seconds), "s")
     if values.dtype.kind in "biuf":
         return Column(header, np.asarray(values, dtype=np.float64), unit)
@@ -167,10 +168,9 @@ def columns_of(
 
 
 def printable(table: Table) -> Table:
-    r"""Return a foreign table whose words hold nothing that steers a terminal or turns text round.
+    r"""Return a table of another program without control characters in its words.
 
-    Blanks of any kind become plain ones, other signs that cannot be printed are written as
-    ``\x1b``. What this package wrote stands as it is: its names were looked at before.
+    Blanks of any kind become plain ones; other signs that cannot be printed are written as ``\x1b``.
     """
     if table.own:
         return table
@@ -178,16 +178,20 @@ def printable(table: Table) -> Table:
         replace(
             column,
             header=plain(column.header),
-            unit=None if column.unit is None else plain(column.unit),
-            says=None if column.says is None else plain(column.says),
-            matrix=None if column.matrix is None else plain(column.matrix),
+            unit=column.unit and plain(column.unit),
+            says=column.says and plain(column.says),
+            matrix=column.matrix and plain(column.matrix),
         )
         for column in table.columns
     )
-    name = None if table.name is None else plain(table.name)
-    meta = {plain(key): _plain_value(value) for key, value in table.meta.items()}
-    rates = {plain(place): value for place, value in table.rates.items()}
-    return replace(table, columns=columns, name=name, meta=meta, rates=rates)
+    return replace(
+        table,
+        columns=columns,
+        name=table.name and plain(table.name),
+        meta={plain(key): _plain_value(value) for key, value in table.meta.items()},
+        rates={plain(place): value for place, value in table.rates.items()},
+        unread={plain(place): plain(why) for place, why in table.unread.items()},
+    )
 
 
 def plain(text: str) -> str:
@@ -211,31 +215,8 @@ def _plain_value(value: Any) -> Any:
 
 
 def of_equal_length(
-    columns: Mapping[str, Column], path: Path, *, meta: Mapping[str, Any], name: str | None = None
+    columns: Mapping[str, Column], path: Any, *, meta: Mapping[str, Any], name: str | None = None
 ) -> Table:
-    """Return the table of the columns that have the commonest length, the longest of several.
-
-    A matrix counts as one.
-
-    Parameters
-    ----------
-    columns : mapping of str to Column
-        By their place in the file; those that are left out are listed in the table's ``meta``.
-    """
-    parts = {column.matrix or place: _length(column) for place, column in columns.items()}
-    lengths = Counter(length for length in parts.values() if length > 1)
-    if not lengths:
-        raise DataError(
-            "there are no vectors of numbers in it",
-            file=path,
-            remedy="save each channel as one vector, all of one length, or as a column of one matrix",
-        )
-    common = max(lengths, key=lambda length: (lengths[length], length))
-    left_out = [place for place, column in columns.items() if _length(column) != common]
-    kept = tuple(column for column in columns.values() if _length(column) == common)
-    listed = {"ignored_columns": left_out} if left_out else {}
-    return Table(kept, meta={**meta, **listed}, name=name)
-
-
-def _length(column: Column) -> int:
-    return len(column.texts) if column.values is None else column.values.size
+    """Return the table of columns by their places."""
+    del path
+    return Table(tuple(columns.values()), meta=meta, name=name)

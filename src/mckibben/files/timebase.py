@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.files.headers import snake_case
+from mckibben.files.notices import listed, warn
 from mckibben.files.table import Table
 
 Span = tuple[int, int]
@@ -18,6 +20,15 @@ Span = tuple[int, int]
 
 GAP = 3.0
 """Steps longer than this many median steps are gaps; shorter ones are jitter."""
+
+WRAPS = (2.0**8, 2.0**16, 2.0**32)
+"""Counts after which integer counters begin anew."""
+
+RATES = ("fs", "Fs", "sample_rate", "sampling_frequency")
+"""Names of samples per second [Hz]."""
+
+STEPS = ("Ts", "dt", "sample_time")
+"""Names of seconds per sample."""
 
 _SINCE_1970 = {"ms": (1e12, 4.2e12), "us": (1e15, 4.2e15), "ns": (1e18, 4.2e18)}
 """Unit -> counts of it since 1970 in the years 2001 to 2103."""
@@ -46,8 +57,14 @@ class Step:
     jitter: tuple[float, float] | None
 
 
-def check(time: Array, table: Table, path: Path) -> None:
-    """Refuse times that are missing, repeated or going back, naming the row."""
+def checked(time: Array, table: Table, path: Path) -> Array:
+    """Return times that rise: counters that wrap go on, and other times that do not rise are refused.
+
+    Raises
+    ------
+    DataError
+        If a time is missing, repeated or goes back, with the row.
+    """
     missing = np.flatnonzero(~np.isfinite(time))
     if missing.size:
         raise DataError(
@@ -57,10 +74,11 @@ def check(time: Array, table: Table, path: Path) -> None:
             row=table.row(int(missing[0])),
             remedy="fill it in or delete the row; or delete the column and give --rate",
         )
+    time = _unwrapped(time, table, path)
     steps = np.diff(time)
     wrong = np.flatnonzero(steps <= 0)
     if not wrong.size:
-        return
+        return time
     at = int(wrong[0])
     if steps[at] == 0:
         problem = (
@@ -71,6 +89,73 @@ def check(time: Array, table: Table, path: Path) -> None:
         problem = f"the time goes back from {time[at]:.10g} to {time[at + 1]:.10g}"
         remedy = "split the file there, or sort its rows by time"
     raise DataError(problem, file=path, channel="time", row=table.row(at + 1), remedy=remedy)
+
+
+def _unwrapped(time: Array, table: Table, path: Path) -> Array:
+    """Return times of an integer counter that goes on where it wrapped, with a note."""
+    steps = np.diff(time)
+    back = steps < 0
+    if not back.any() or not np.array_equal(time, np.rint(time)):
+        return time
+    usual = float(np.median(steps[~back])) if not back.all() else 0.0
+    for size in WRAPS:
+        on = steps[back] + size
+        if time.min() >= 0 and time.max() < size and np.all((on > 0) & (on <= GAP * usual)):
+            first = int(np.argmax(back)) + 1
+            warn(
+                path,
+                f"the time wraps at {size:.0f}, first in row {table.row(first)}, and was unwrapped",
+            )
+            found: Array = time + size * np.concatenate([[0], np.cumsum(back)])
+            return found
+    return time
+
+
+def stated_step(rates: Mapping[str, float], path: Path) -> float | None:
+    """Return the sample time [s] by scalars such as ``fs = 50``, by their places, with a note.
+
+    Raises
+    ------
+    DataError
+        If one is no positive finite number, or two contradict each other.
+    """
+    if not rates:
+        return None
+    said = listed([f"{place} = {value:g}" for place, value in rates.items()])
+    with np.errstate(all="ignore"):
+        steps = [
+            float(value if _last(place) in STEPS else np.float64(1.0) / value)
+            for place, value in rates.items()
+        ]
+    possible = all(1e-12 <= step < 1e11 for step in steps)
+    if not possible or max(steps) - min(steps) > 1e-3 * min(steps):
+        problem = "contradict each other" if possible else "cannot be a rate or a sample time"
+        raise DataError(
+            f"{said}: {problem}",
+            file=path,
+            channel="time",
+            remedy="give the samples per second with --rate, or correct them in the file",
+        )
+    warn(
+        path,
+        f"there are no times, so {said} is read as {steps[0]:g} s between samples; "
+        "use --rate where that is wrong",
+    )
+    return steps[0]
+
+
+def is_rate(name: str) -> bool:
+    """Tell whether a scalar of this name is a rate or a sample time.
+
+    >>> is_rate("Fs"), is_rate("SampleTime"), is_rate("FS")
+    (True, True, False)
+    """
+    return _last(name) in RATES + STEPS
+
+
+def _last(place: str) -> str:
+    name = place.replace("/", ".").rpartition(".")[2]
+    return name if len(name) == 2 else snake_case(name)
 
 
 def unit_by_size(time: Array, table: Table, path: Path) -> str | None:
@@ -169,11 +254,11 @@ def rises_evenly(values: Array) -> bool:
     )
 
 
-def resample(time: Array, samples: Array, step: float) -> Array:
-    """Return samples on the grid of this step that starts at the first time, linear between."""
+def grid(time: Array, step: float) -> Array:
+    """Return the grid of this step from the first time to the last."""
     n = int((time[-1] - time[0]) / step + 1e-6) + 1
-    grid: Array = time[0] + step * np.arange(n)
-    return np.interp(grid, time, samples)
+    found: Array = time[0] + step * np.arange(n)
+    return found
 
 
 def _shortest_first(step: float) -> Iterator[float]:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from mckibben.app.kept import Reading
 from mckibben.errors import DataError, TooLargeError
-from mckibben.files import formats, read
-from mckibben.files.choosing import assign
-from mckibben.files.headers import channel_of, parse
+from mckibben.files import columns_of, read
+from mckibben.files.choosing import Seen
 from mckibben.files.own import description
-from mckibben.files.request import Request
-from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
 from mckibben.system.workers import Tell, Workers
 
@@ -32,38 +28,10 @@ MOST_CELLS = 40_000_000
 START = 2**18
 """Bytes of a long text that tell its columns."""
 
-FIRST = 4
-"""Cells of a column that are shown."""
-
 Result = TypeVar("Result")
 
 AS_FOUND = Reading()
 """Everything by its header."""
-
-
-@dataclass(frozen=True)
-class Seen:
-    """A column of a file.
-
-    Parameters
-    ----------
-    header : str
-        As it stands in the file.
-    unit : str
-        As the file says it; empty where it does not.
-    first : tuple of str
-        Its first cells.
-    channel : str
-        What it is taken for; empty where it is left out.
-    unasked : str
-        What it is taken for by its header alone.
-    """
-
-    header: str
-    unit: str
-    first: tuple[str, ...]
-    channel: str
-    unasked: str
 
 
 def options(reading: Reading) -> dict[str, Any]:
@@ -141,34 +109,4 @@ def _read(path: Path, reading: Reading) -> list[Recording]:
 
 
 def _columns(path: Path, reading: Reading) -> list[Seen]:
-    (table, *_) = formats.tables(path)
-    found, unasked = _channels(table, reading, path), _channels(table, AS_FOUND, path)
-    return [
-        Seen(
-            column.header,
-            column.unit or parse(column.label).unit or "",
-            _first(column),
-            found.get(id(column), ""),
-            unasked.get(id(column), ""),
-        )
-        for column in table.columns
-    ]
-
-
-def _channels(table: Table, reading: Reading, path: Path) -> dict[int, str]:
-    request = Request(reading.columns, {}, reading.rate, reading.gaps, None)
-    try:
-        named, _ = assign(table, request, path)
-    except DataError:  # two columns are one channel, say: each is then named by its header alone
-        named = {}
-        for column in table.columns:
-            if column.values is not None:
-                named.setdefault(channel_of(parse(column.label)), column)
-    kept = reading.channels
-    return {id(c): name for name, c in named.items() if kept is None or name in (*kept, "time")}
-
-
-def _first(column: Column) -> tuple[str, ...]:
-    if column.values is None:
-        return tuple(f"{text}"[:40] for text in column.texts[:FIRST])
-    return tuple(f"{value:.6g}" for value in column.values[:FIRST])
+    return columns_of(path, **options(reading))

@@ -35,6 +35,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         settings={model: given.get("settings", {})},
         seed=int(given.get("seed", 0)),
         allow_shared=bool(given.get("allow_shared", False)),
+        allow_early=True,  # with a note
     )
     plan = replace(plan, items={model: plan.items[model]})  # without those of each load alone
     (ranking,) = ranked(
@@ -89,6 +90,7 @@ def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         seed=int(given.get("seed", 0)),
         jobs=1,
         allow_shared=bool(given.get("allow_shared", False)),
+        allow_early=True,  # with a note
         progress=lambda standing: tell(standing.done / standing.total, float("nan")),
     )
     path = workspace.path("takeaway", "report.html")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mckibben.cli.options import (
+    AllowEarly,
     AllowShared,
     Dask,
     Force,
@@ -49,6 +50,7 @@ class Asked:
     dask: Dask = None
     samples: Samples = None
     allow_shared: AllowShared = False
+    allow_early: AllowEarly = False
     force: Force = False
     as_json: Json = False
 
@@ -90,6 +92,7 @@ class Asked:
             "jobs": self.jobs,
             "most_samples": self.samples,
             "allow_shared": self.allow_shared,
+            "allow_early": self.allow_early,
             "folder": folder,
             "clear": False,
         }

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -79,6 +79,17 @@ Constants = Annotated[
         help="What was held and is in no column, as 'force=200 g'.",
     ),
 ]
+Calibrations = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--calibrate",
+        metavar="CHANNEL=COLUMN:GAIN:OFFSET:UNIT",
+        help="Channel from raw volts or counts, as pressure=A0:2.5:-0.5:bar.",
+    ),
+]
+Most = Annotated[
+    str, typer.Option("--most", metavar="SIZE", help="Largest file that is read, as 2GB.")
+]
 Rate = Annotated[
     float | None,
     typer.Option("--rate", metavar="HZ", help="Samples per second, without a time column."),
@@ -123,6 +134,9 @@ AllowShared = Annotated[
     bool,
     typer.Option("--allow-shared", help="Test on data fitted to, and say so in every result."),
 ]
+AllowEarly = Annotated[
+    bool, typer.Option("--allow-early", help="Compare although the output moves before its input.")
+]
 Force = Annotated[
     bool,
     typer.Option(
@@ -162,10 +176,30 @@ class Reading:
     column: Columns = None
     unit: Units = None
     constant: Constants = None
+    calibrate: Calibrations = None
+    most: Most = "2GB"
     rate: Rate = None
     gaps: GapPolicy = Gaps.ERROR
     resample: Resample = None
     zero: Zero = None
+
+    def options(self) -> dict[str, Any]:
+        """Return the options as `mckibben.read` takes them."""
+        columns = _pairs("--column", self.column)
+        units = _pairs("--unit", self.unit)
+        calibration = {}
+        for channel, (column, gain, offset, unit) in _calibrations(self.calibrate).items():
+            columns[channel], calibration[channel] = column, (gain, offset)
+            units.setdefault(channel, unit)
+        return {
+            "columns": columns,
+            "units": units,
+            "calibration": calibration,
+            "constants": _constants(self.constant),
+            "rate": self.rate,
+            "gaps": _POLICIES[self.gaps],
+            "most": _bytes(self.most),
+        }
 
     def read(
         self, files: Sequence[Path], channels: Sequence[str] | None, *, informative: bool = True
@@ -175,16 +209,7 @@ class Reading:
 
         recordings: list[Recording] = []
         for file in files:
-            recordings += read(
-                file,
-                columns=_pairs("--column", self.column),
-                units=_pairs("--unit", self.unit),
-                constants=_constants(self.constant),
-                rate=self.rate,
-                gaps=_POLICIES[self.gaps],
-                channels=channels,
-                informative=informative,
-            )
+            recordings += read(file, channels=channels, informative=informative, **self.options())
         if self.resample is not None:
             from mckibben.signals import resample
 
@@ -312,6 +337,35 @@ def _constants(given: list[str] | None) -> dict[str, tuple[float, str]]:
             )
         found[said[1].strip()] = float(said[2]), said[3] or ""
     return found
+
+
+def _calibrations(given: list[str] | None) -> dict[str, tuple[str, float, float, str]]:
+    """Return column, gain, offset and unit of channels: ``pressure=A0:2.5:-0.5:bar``."""
+    found = {}
+    for channel, said in _pairs("--calibrate", given).items():
+        column, gain, offset, unit = (["", "", ""] + said.rsplit(":", 3))[-4:]
+        try:
+            found[channel] = column, float(gain), float(offset), unit
+        except ValueError:
+            column = ""
+        if not column or not unit:
+            raise DataError(
+                f"--calibrate {channel}={said} is not of the form CHANNEL=COLUMN:GAIN:OFFSET:UNIT",
+                remedy="write for instance --calibrate pressure=A0:2.5:-0.5:bar",
+            )
+    return found
+
+
+def _bytes(size: str) -> float:
+    """Return a size such as ``2GB``, ``500 MB`` or ``1e9`` in bytes."""
+    said = re.fullmatch(r"\s*([\d.]+(?:[eE]\d+)?)\s*([kMGT]?)i?B?\s*", size, re.IGNORECASE)
+    try:
+        number = float(said[1]) if said else 0.0
+    except ValueError:
+        number = 0.0
+    if said is None or number <= 0:
+        raise DataError(f"--most {size!r} is no size", remedy="write for instance --most 2GB")
+    return number * 1024.0 ** " KMGT".index(said[2].upper() or " ")
 
 
 def chosen_models(given: str, quick: bool = False) -> str | list[str]:

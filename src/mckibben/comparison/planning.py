@@ -156,6 +156,7 @@ def plan_of(
     seed: int,
     most_samples: int | None = None,
     allow_shared: bool = False,
+    allow_early: bool = False,
 ) -> Plan:
     """Return what a comparison is to do; see `compare`."""
     recordings, tests, checks = listed(train), listed(test), listed(validation)
@@ -180,6 +181,7 @@ def plan_of(
     if outputs is None and lacks_displacement(every) and channels.outputs == (FORCE,):
         held = ("there is no displacement, and so force is modelled; or name another output",)
     unit = _checked(recordings, [*tests, *checks], channels)
+    early = _early(every, channels, allow_early)
     roles = {"fit": recordings, "validate": checks, "test": tests}
     shared = told(
         {role: runs for role, runs in roles.items() if runs or role != "validate"},
@@ -235,6 +237,7 @@ def plan_of(
         left_out=left_out,
         notes=(
             *notes,
+            *early,
             *held,
             *different,
             *_about_load(every, channels, load, chosen),
@@ -245,6 +248,25 @@ def plan_of(
         shared=shared,
         apart=". ".join(f"{one[0].upper()}{one[1:]}" for one in different),
     )
+
+
+def _early(every: Sequence[Recording], channels: Channels, allow: bool) -> tuple[str, ...]:
+    """Refuse an output that moves before its one input, or note it where that is allowed."""
+    from mckibben.files.condition import early
+
+    found = early(every, channels.inputs[0], channels.outputs[0]) if channels.single else None
+    if found is None:
+        return ()
+    said = f"{channels.outputs[0]} moves {-found} samples before {channels.inputs[0]}"
+    if not allow:
+        raise DataError(
+            f"it moves {-found} samples before {channels.inputs[0]}",
+            file=every[0].source,
+            channel=channels.outputs[0],
+            remedy="check that columns are not swapped and clocks agree; or compare all the same with "
+            "--allow-early (allow_early=True)",
+        )
+    return (said,)
 
 
 def _checked(

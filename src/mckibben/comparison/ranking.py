@@ -60,6 +60,7 @@ def compare(
     jobs: int | None = None,
     most_samples: int | None = None,
     allow_shared: bool = False,
+    allow_early: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
@@ -112,6 +113,8 @@ def compare(
     allow_shared : bool
         Whether to go on where recordings to test on are those fitted to, or training has some twice; the
         leaderboard then says so.
+    allow_early : bool
+        Whether to go on where the output moves before its input.
     folder : path, optional
         Where finished models are kept until all are, so that a comparison that was stopped and is
         called again goes on from there.
@@ -150,6 +153,7 @@ def compare(
         seed=seed,
         most_samples=most_samples,
         allow_shared=allow_shared,
+        allow_early=allow_early,
     )
     kept, board = plan.kept(folder), plan.board()
     try:

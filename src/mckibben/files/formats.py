@@ -55,10 +55,10 @@ def tables(path: Path) -> list[Table]:
 
 
 @contextmanager
-def opening(path: Path) -> Iterator[BufferedReader]:
+def opening(path: Path, most: float = MOST_BYTES) -> Iterator[BufferedReader]:
     """Open a recording's file; `DataError` if its ending is unknown, or there is none to be read."""
     _reader(path)
-    with opened(path, most=MOST_BYTES) as file:
+    with opened(path, most=int(most)) as file:
         yield file
 
 

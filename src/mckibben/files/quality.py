@@ -239,7 +239,9 @@ def _codes(known: Array) -> Iterator[float]:
         if not at.any() or others.size < FEWEST:
             continue
         low, high = float(others.min()), float(others.max())
-        if (code and max(code - high, low - code) > high - low) or (not code and _excluded(at, known)):
+        if (code and max(code - high, low - code) > high - low) or (
+            not code and _excluded(at, known)
+        ):
             yield code
 
 

@@ -71,7 +71,7 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
     found: dict[Path, list[Table]] = {}
     digests: list[str] = []
     for each in parts.values():
-        with formats.opening(each) as file:
+        with formats.opening(each, request.most) as file:
             before = os.fstat(file.fileno())
             found[each] = formats.read(file, each)
             file.seek(0)

@@ -130,6 +130,7 @@ def study(
     jobs: int | None = None,
     most_samples: int | None = None,
     allow_shared: bool = False,
+    allow_early: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
@@ -151,7 +152,7 @@ def study(
     ----------
     train, test, inputs, outputs, load, validation, models, settings, seed, jobs
         As for `compare`.
-    most_samples, allow_shared, folder, clear, progress
+    most_samples, allow_shared, allow_early, folder, clear, progress
         As for `compare`.
     rig : str, optional
         Virtual rig to close loops on; default the one that recordings of several muscles say they come
@@ -191,6 +192,7 @@ def study(
         seed=seed,
         most_samples=most_samples,
         allow_shared=allow_shared,
+        allow_early=allow_early,
     )
     kept, channels = plan.kept(folder), plan.data.channels
     if rig is not None and channels.single:

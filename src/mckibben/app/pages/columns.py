@@ -10,7 +10,7 @@ from nicegui import ui
 
 from mckibben.app.desk import labelled, named
 from mckibben.app.kept import Reading
-from mckibben.app.reading import Seen
+from mckibben.files.choosing import Seen
 from mckibben.errors import DataError
 from mckibben.recording import STANDARD_UNITS
 

@@ -224,6 +224,15 @@ class Recording(DrawsItself):
         several = given if isinstance(given, list | tuple) else () if given is None else (given,)
         return tuple(map(str, several))
 
+    @property
+    def bridged(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """Which samples were interpolated over a gap when it was read, shape (n,)."""
+        found = np.zeros(self.n_samples, dtype=np.bool_)
+        within = 1e-6 * (self.sample_time or 1.0)
+        for start, stop in self.meta.get("bridged", ()):
+            found |= (self.time >= start - within) & (self.time <= stop + within)
+        return found
+
     def matrix(self, channels: Iterable[str]) -> Array:
         """Return several channels side by side, shape (n, number of channels)."""
         return np.column_stack([self[name] for name in channels])

@@ -83,6 +83,7 @@ def test_what_the_caller_says_goes_before(folder: Folder) -> None:
     assert measured["force"] == pytest.approx(1000 * LASER)
 
 
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 def test_a_constant_goes_before_a_column_of_that_name(folder: Folder) -> None:
     path = folder("[channels.force]\nvalue = 5\nunit='N'\n", "time_ms,p_bar,force_N")
     recording = one(path / "run_load200g.csv")

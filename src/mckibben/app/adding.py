@@ -33,11 +33,6 @@ class Problem:
         return text if self.shown in text else f"{self.shown}: {text}"
 
 
-def about_gaps(error: MckibbenError | None) -> bool:
-    """Tell whether a file was not read because of gaps."""
-    return isinstance(error, DataError) and "--gaps" in error.remedy
-
-
 def add(
     desk: Desk, held: str, shown: str, reading: Reading, *, many: bool = True
 ) -> list[Recording]:

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from mckibben.app.kept import Reading
-from mckibben.errors import DataError, TooLargeError
+from mckibben.errors import TooLargeError
 from mckibben.files import columns_of, read
 from mckibben.files.choosing import Seen
 from mckibben.files.own import description

@@ -343,7 +343,7 @@ def _calibrations(given: list[str] | None) -> dict[str, tuple[str, float, float,
     """Return column, gain, offset and unit of channels: ``pressure=A0:2.5:-0.5:bar``."""
     found = {}
     for channel, said in _pairs("--calibrate", given).items():
-        column, gain, offset, unit = (["", "", ""] + said.rsplit(":", 3))[-4:]
+        column, gain, offset, unit = ["", "", "", *said.rsplit(":", 3)][-4:]
         try:
             found[channel] = column, float(gain), float(offset), unit
         except ValueError:

@@ -149,7 +149,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
     absolute = [name for name, kind in notes.references.items() if kind == "absolute"]
     if absolute:
         warn(path, f"absolute pressure, not gauge: {listed(absolute)}; no offset was removed")
-    if left_out and not table.own:
+    if left_out and not (table.own or request.names_channels):
         reasons = [f"{header} ({why})" for header, why in left_out.items()]
         warn(path, f"not read: {listed(reasons)}")
     found_meta = {
@@ -291,7 +291,7 @@ def _of_one_length(
     table: Table, mapped: Mapping[str, Column], path: Path
 ) -> tuple[Table, dict[str, str]]:
     """Return the columns of the recording's length, and the others with the reason."""
-    if table.has_clocks:
+    if table.has_clocks or table.lines is not None:
         return table, {}
     asked = {channel: column.size for channel, column in mapped.items()}
     if len(set(asked.values())) > 1:
@@ -412,6 +412,8 @@ def _converted(
         if not table.own and unit_of(channel) is not None:
             samples = quality.without_codes(channel, samples, raw, table, path)
         quality.refuse_impossible(channel, samples, unit_of(channel), unit.name, table, path)
+        if not table.own and unit_of(channel) is not None:
+            quality.note_outliers(channel, samples, table, path)
     return samples, recorded, final
 
 

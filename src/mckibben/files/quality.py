@@ -31,7 +31,7 @@ POSSIBLE: dict[str, tuple[float, float]] = {
     "degC": (-100.0, 1e3),
     "": (-1e4, 1e4),
 }
-"""Package unit -> lowest and highest value of a standard channel; what lies outside is in another unit."""
+"""Package unit -> lowest and highest value of a standard channel; others are in another unit."""
 
 SMALLEST_BAR, ZERO_BAR = 1e-7, 1e-12
 """A pressure whose largest value lies between these [bar] is in another unit, not the rounding of 0."""
@@ -78,7 +78,7 @@ def without_codes(channel: str, values: Array, recorded: Array, table: Table, pa
     Warns
     -----
     DataWarning
-        Of codes, and of outliers: samples far from all others, which may be measured.
+        Of codes.
     """
     finite = np.isfinite(recorded)
     wrap = _wrap(recorded[finite])
@@ -103,6 +103,11 @@ def without_codes(channel: str, values: Array, recorded: Array, table: Table, pa
             f"(first in row {table.row(int(np.argmax(coded)))})",
         )
         return np.where(coded, np.nan, values)
+    return values
+
+
+def note_outliers(channel: str, values: Array, table: Table, path: Path) -> None:
+    """Note samples in short runs far from all others, which may be measured."""
     outliers = _outliers(values)
     if outliers.size:
         first = int(outliers[0])
@@ -111,7 +116,6 @@ def without_codes(channel: str, values: Array, recorded: Array, table: Table, pa
             f"channel {channel!r}: {outliers.size} outlier(s), the first of {values[first]:.6g} in row "
             f"{table.row(first)}; correct or blank cells that were not measured",
         )
-    return values
 
 
 def refuse_impossible(

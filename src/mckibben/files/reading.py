@@ -62,7 +62,7 @@ def read(
     """Read the recordings in a file, by its ending, or in a folder.
 
     What ``channels.toml`` in the same folder states of the file (columns, units, calibrations,
-    constants, files with one signal each; see `mckibben.files.channels`) is used where no option is given.
+    constants, files with one signal each; see `mckibben.files.channels`) is used where no option is.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def read(
     gaps : {"error", "split", "interpolate"}
         What to do where time is missing (a step of more than three median steps) or a sample is
         (blank, NaN, infinite, or a code such as -9999): refuse, cut into several recordings, or bridge
-        linearly; ``meta["bridged"]`` lists the bridged samples.
+        linearly. Bridged samples are not fitted: ``meta["bridged"]`` has their first and last times.
     channels : sequence of str, optional
         Channels that must be there and whole. Others are left out, with a `DataWarning`, if samples of
         theirs are missing. By default all must be whole.
@@ -219,7 +219,7 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
             piece.step,
             units,
             piece.start,
-            ({ROWS: rows | {AT: piece.start}} if rows else {}) | meta | _bridged(piece.bridged),
+            ({ROWS: rows | {AT: piece.start}} if rows else {}) | meta | _bridged(piece),
         )
         for piece in pieces
     ]
@@ -370,12 +370,11 @@ def _seconds(value: float, choice: Choice) -> float:
     return float(convert(np.array([value]), choice.time_unit, "s")[0])
 
 
-def _bridged(mended: Mask) -> dict[str, Any]:
-    """Return the spans of interpolated samples as ``meta`` lists them, nothing without any."""
-    if not mended.any():
-        return {}
-    edges = np.flatnonzero(np.diff(mended.astype(np.int8), prepend=0, append=0))
-    return {"bridged": edges.reshape(-1, 2).tolist()}
+def _bridged(piece: Piece) -> dict[str, Any]:
+    """Return the first and last times of interpolated samples as ``meta`` lists them."""
+    edges = np.flatnonzero(np.diff(piece.bridged.astype(np.int8), prepend=0, append=0))
+    times = piece.start + (piece.step or 1.0) * (edges.reshape(-1, 2) - [0, 1])
+    return {"bridged": times.tolist()} if edges.size else {}
 
 
 def _meta(choice: Choice, table: Table, path: Path, digest: str) -> dict[str, object]:

@@ -49,13 +49,17 @@ class Request:
         """Tell whether the caller named a channel."""
         return channel in (self.channels or ()) or channel in self.columns
 
+    @property
+    def names_channels(self) -> bool:
+        """Whether the caller named the channels to read."""
+        return bool(self.columns.keys() - {"time"}) or self.channels is not None
+
     def needs(self, channel: str) -> bool:
         """Tell whether a channel with flaws is an error rather than left out.
 
         Those that the caller named are needed, or all where none is named.
         """
-        named = bool(self.columns.keys() - {"time"}) or self.channels is not None
-        return not named or self.asks_for(channel)
+        return not self.names_channels or channel == "time" or self.asks_for(channel)
 
     def describing(self, table: Table) -> Request:
         """Return the request for a table: constants among what is described, calibrations once.

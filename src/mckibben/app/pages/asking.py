@@ -9,7 +9,7 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app.adding import Problem, about_gaps, add, alike, replaced, source, understood
+from mckibben.app.adding import Problem, add, alike, replaced, source, understood
 from mckibben.app.desk import LONGEST, Desk, guarded, named, tell
 from mckibben.app.fields import GAPS, said
 from mckibben.app.kept import Reading
@@ -89,7 +89,7 @@ async def ask(
             gaps = named(
                 ui.select(
                     GAPS,
-                    value="interpolate" if about_gaps(error) else reading.gaps,
+                    value=reading.gaps,
                     label="Gaps and blank cells",
                 ).classes("w-56"),
                 "gaps",

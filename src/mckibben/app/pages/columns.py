@@ -10,8 +10,8 @@ from nicegui import ui
 
 from mckibben.app.desk import labelled, named
 from mckibben.app.kept import Reading
-from mckibben.files.choosing import Seen
 from mckibben.errors import DataError
+from mckibben.files.choosing import Seen
 from mckibben.recording import STANDARD_UNITS
 
 LEFT_OUT = "(left out)"

@@ -1,4 +1,4 @@
-"""Bags of ROS 1 and ROS 2, written by the library of another program."""
+"""Bags of ROS 1 and ROS 2, written by RosBags."""
 
 from __future__ import annotations
 
@@ -7,34 +7,38 @@ import sqlite3
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
 
 import mckibben
-from mckibben import DataError, Recording
+from mckibben import DataError
+from mckibben.files import formats
 from mckibben.files.folders import roles
+from mckibben.files.table import Table
 
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 
 KINDS = ("bag", "mcap", "db3")
-N, FAST, SLOW, LATE = 100, 10_000_000, 25_000_000, 3_000_000
-"""Messages of the pressure; time between them and between others, and how late all are recorded [ns]."""
-
-Kind = Literal["bag", "mcap", "db3"]
-Messages = Mapping[str, Sequence[tuple[int, Mapping[str, Any]]]]
+BEGAN, STEP, LATE = 1_700_000_000_123_456_789, 10_000_001, 3_000_000
+"""First message, time between two, and how long after its stamp one is recorded [ns]."""
 
 TYPES = {
     "/rig/pressure_bar": "std_msgs/msg/Float64",
     "/force_N": "std_msgs/msg/Float64",
+    "/count": "std_msgs/msg/UInt8",
     "/air": "sensor_msgs/msg/FluidPressure",
     "/arm": "sensor_msgs/msg/JointState",
     "/words": "std_msgs/msg/String",
+    "/picture": "std_msgs/msg/Float64MultiArray",
+    "/near": "diagnostic_msgs/msg/DiagnosticStatus",
+    "/clock": "rosgraph_msgs/msg/Clock",
 }
+Messages = Mapping[str, Sequence[tuple[int, Mapping[str, Any]]]]
 
 
-def bag(path: Path, kind: Kind, messages: Messages, packed: bool = False) -> Path:
+def bag(path: Path, kind: str, messages: Messages, packed: str = "") -> Path:
     """Write messages, each at a time [ns], and return the file, or the folder of ROS 2."""
     from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore
@@ -50,131 +54,219 @@ def bag(path: Path, kind: Kind, messages: Messages, packed: bool = False) -> Pat
         plugin = rosbag2.StoragePlugin.MCAP if kind == "mcap" else rosbag2.StoragePlugin.SQLITE3
         writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
         if packed:
-            modes = rosbag2.CompressionMode, rosbag2.CompressionFormat
-            writer.set_compression(modes[0].STORAGE, modes[1].ZSTD)
+            mode = rosbag2.CompressionMode[packed]
+            writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
 
-    def header(stamp: int) -> Any:
-        extra = {"seq": 0} if kind == "bag" else {}
-        time = store.types["builtin_interfaces/msg/Time"](*divmod(stamp, 10**9))
-        return store.types["std_msgs/msg/Header"](stamp=time, frame_id="", **extra)
+    def message(name: str, fields: Mapping[str, Any]) -> Any:
+        made = dict(fields)
+        for place in made.keys() & {"stamp", "clock"}:
+            time = store.types["builtin_interfaces/msg/Time"](*divmod(made[place], 10**9))
+            made[place] = time
+        if "stamp" in made:
+            time = made.pop("stamp")
+            extra = {"seq": 0} if kind == "bag" else {}
+            made["header"] = store.types["std_msgs/msg/Header"](stamp=time, frame_id="", **extra)
+        if "layout" in made:
+            made["layout"] = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+        return store.types[name](**made)
 
     serialize = store.serialize_ros1 if kind == "bag" else store.serialize_cdr
     with writer:
         for topic, sent in messages.items():
-            name = TYPES[topic]
-            connection = writer.add_connection(topic, name, typestore=store)
+            connection = writer.add_connection(topic, TYPES[topic], typestore=store)
             for when, fields in sent:
-                stamped = {"header": header(fields["header"])} if "header" in fields else {}
-                message = store.types[name](**{**fields, **stamped})
-                writer.write(connection, when, serialize(message, name))
+                raw = serialize(message(TYPES[topic], fields), TYPES[topic])
+                writer.write(connection, when, raw)
     return path
 
 
-def numbers(times: Sequence[int], values: Sequence[float]) -> list[tuple[int, dict[str, Any]]]:
-    return [(when, {"data": value}) for when, value in zip(times, values, strict=True)]
+def numbers(values: Sequence[float], began: int = BEGAN, step: int = STEP) -> list[Any]:
+    return [(began + k * step, {"data": value}) for k, value in enumerate(values)]
 
 
-def pressure(t: Any) -> Any:
-    return 2 + np.sin(9 * t)
+def joints(n: int) -> list[Any]:
+    """Return stamped joints whose order changes."""
+    found = []
+    for k in range(n):
+        names = ["a", "b"][:: -1 if k % 2 else 1]
+        position = np.array([{"a": 0.1, "b": 0.2}[name] * k for name in names])
+        fields = {"name": names, "position": position, "velocity": position[:0], "effort": position}
+        found.append((BEGAN + 2 * k * STEP + LATE, {"stamp": BEGAN + 2 * k * STEP, **fields}))
+    return found
 
 
-def angle(t: Any) -> Any:
-    return 0.5 * np.cos(9 * t)
-
-
-def of_a_robot(began: int = 1_700_000_000 * 10**9) -> dict[str, Any]:
-    """Return messages of a pressure without stamps, and of slower stamped joints in changing order."""
-    fast, slow = np.arange(N) * FAST, np.arange(0, N * FAST, SLOW)
-    joints = []
-    for k, when in enumerate(slow.tolist()):
-        position = {"a": angle(when * 1e-9), "b": 2 * angle(when * 1e-9)}
-        names = sorted(position, reverse=bool(k % 2))
-        fields = {
-            "header": began + when,
-            "name": names,
-            "position": np.array([position[name] for name in names]),
-            "velocity": np.zeros(0),
-            "effort": np.zeros(0),
-        }
-        joints.append((began + when + LATE, fields))
-    air = [
-        (began + LATE + when, {"header": began + when, "fluid_pressure": 6e5, "variance": 0.0})
-        for when in slow.tolist()
-    ]
-    sent = numbers((began + LATE + fast).tolist(), pressure(fast * 1e-9).tolist())
-    return {
-        "/rig/pressure_bar": sent,
-        "/arm": joints,
-        "/air": air,
-        "/words": [(began, {"data": ""})],
-    }
-
-
-ASKED: dict[str, Any] = {
-    "columns": {"pressure": "/rig/pressure_bar/data", "angle": "/arm/position/a"},
-    "units": {"angle": "rad"},
-    "channels": ["pressure", "angle"],
+PRESSURE = (2 + np.sin(np.arange(40) / 3)).tolist()
+AIR = {"fluid_pressure": 6e5, "variance": 0.0}
+STAMPED: Messages = {
+    "/arm": joints(20),
+    "/air": [(BEGAN + k * STEP, {"stamp": BEGAN + k * STEP - LATE, **AIR}) for k in range(12)],
+}
+MIXED: Messages = {
+    **STAMPED,
+    "/rig/pressure_bar": numbers(PRESSURE),
+    "/count": numbers([k % 256 for k in range(30)]),
+    "/words": numbers(["up"]),  # type: ignore[list-item]
+    "/picture": [(BEGAN, {"layout": None, "data": np.ones(65)})],
+    "/near": [(BEGAN, {"level": 2, "name": "", "message": "", "hardware_id": "", "values": []})],
+    "/clock": [(BEGAN, {"clock": BEGAN})],
 }
 
 
-def one(path: Path, **options: Any) -> Recording:
-    (recording,) = mckibben.read(path, **options)
-    return recording
+def table(path: Path) -> Table:
+    (found,) = formats.bag(path) if path.is_dir() else formats.tables(path)
+    return found
 
 
-@pytest.mark.parametrize("packed", [False, True])
-@pytest.mark.parametrize("kind", KINDS)
-def test_topics_are_put_on_the_slowest_clock_by_their_stamps(
-    tmp_path: Path, kind: Kind, packed: bool
+def columns(path: Path) -> dict[str, tuple[list[float], list[float]]]:
+    """Return times and samples by header."""
+    found = {}
+    for column in table(path).columns:
+        assert column.times is not None
+        assert column.values is not None
+        found[column.header] = column.times.tolist(), column.values.tolist()
+    return found
+
+
+def seconds(n: int, step: int = STEP, start: int = 0) -> list[float]:
+    return [(start + k * step) / 10**9 for k in range(n)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "packed"),
+    [*((kind, "") for kind in KINDS), ("bag", "BZ2"), ("mcap", "STORAGE"), ("db3", "MESSAGE")],
+)
+def test_columns_are_what_was_written_each_at_its_times(
+    tmp_path: Path, kind: str, packed: str
 ) -> None:
-    if packed and kind == "db3":
-        pytest.skip("is packed as a whole file, which is no database then")
-    path = bag(tmp_path / "run", kind, of_a_robot(), packed)
-    recording = one(path, **ASKED)
-    assert recording.sample_time == pytest.approx(SLOW * 1e-9)
-    t = recording.time  # since the first message, which is one of words
-    assert recording["angle"] == pytest.approx(angle(t), abs=1e-9)
-    assert recording["arm_position_b"] == pytest.approx(2 * angle(t), abs=1e-9)
-    # the pressure has no stamps: it seems as late as it was recorded
-    assert recording["pressure"] == pytest.approx(pressure(t - LATE * 1e-9), abs=2e-3)
-    air = one(path, columns={"pressure": "/air/fluid_pressure"})
-    assert air["pressure"] == pytest.approx(6.0)  # in Pa, as the type of its messages says
+    path = bag(tmp_path / "run", kind, MIXED, packed)
+    path = path.rename(path.with_stem("50% #1?"))  # which are signs in addresses
+    found = columns(path)
+    assert found["/rig/pressure_bar/data"] == (seconds(40), PRESSURE)
+    assert found["/count/data"] == (seconds(30), list(range(30)))
+    for joint, scale in (("a", 0.1), ("b", 0.2)):
+        expected = seconds(20, 2 * STEP, LATE), [scale * k for k in range(20)]
+        assert found[f"/arm/position/{joint}"] == found[f"/arm/effort/{joint}"] == expected
+    assert [each for each in found if "/near" in each] == ["/near/level"]  # constants are no fields
+    one = table(path)
+    assert one.meta == {"time_source": "recording times"}  # as the pressure has no stamps
+    reasons = {"/words": "no numbers", "/picture/data": "array of 65", "/clock/clock": "a time"}
+    assert all(reason in one.unread[place] for place, reason in reasons.items())
+    assert {column.header: column.held for column in one.columns}["/count/data"]
+    if kind != "bag" and not packed:
+        (alone,) = (each for each in path.iterdir() if each.suffix == f".{kind}")
+        assert columns(alone) == found
+    (recording,) = mckibben.read(path, columns={"pressure": "/air/fluid_pressure"})
+    assert recording["pressure"] == pytest.approx(6.0)  # in Pa, as the type of its messages has it
     assert roles(tmp_path) == {"train": [path]}
 
 
-def test_a_bag_in_several_files(tmp_path: Path) -> None:
-    began = 1_700_000_000 * 10**9
-    whole, cut = (bag(tmp_path / name, "db3", of_a_robot(began)) for name in ("whole", "cut"))
-    (first,) = cut.glob("*.db3")
-    second = first.with_name("cut_1.db3")
+@pytest.mark.parametrize("kind", KINDS)
+def test_stamps_are_the_times_where_all_topics_have_them(tmp_path: Path, kind: str) -> None:
+    path = bag(tmp_path / "run", kind, {**STAMPED, "/words": MIXED["/words"]})
+    found = columns(path)
+    assert table(path).meta == {"time_source": "header stamps"}
+    assert found["/air/fluid_pressure"][0] == seconds(12)
+    assert found["/arm/position/a"][0] == seconds(20, 2 * STEP, LATE)  # the air's came first
+
+
+def test_a_bag_cut_into_files_is_the_whole_one(tmp_path: Path) -> None:
+    whole, cut = (bag(tmp_path / name, "db3", MIXED) for name in ("whole", "cut"))
+    first = cut / "cut.db3"
+    second = cut / "cut_1.db3"
     shutil.copy(first, second)
+    about = (cut / "metadata.yaml").read_text()
+    (cut / "metadata.yaml").write_text(about.replace("- cut.db3", "- cut.db3\n  - cut_1.db3"))
     for path, sign in ((first, ">="), (second, "<")):
-        with closing(sqlite3.connect(path)) as base:
-            base.execute(f"DELETE FROM messages WHERE timestamp {sign} ?", [began + N * FAST // 2])
-            base.commit()
-    found, expected = one(cut, **ASKED), one(whole, **ASKED)
-    assert found["angle"] == pytest.approx(expected["angle"], abs=1e-5)
-    assert found.time == pytest.approx(expected.time, abs=1e-6)
+        change(path, f"DELETE FROM messages WHERE timestamp {sign} {BEGAN + 11 * STEP}")
+    assert columns(cut) == columns(whole)
+    packed = bag(tmp_path / "packed", "db3", MIXED, "FILE")
+    asked = {"angle": "/arm/position/a"}
+    (one,), (other,) = (mckibben.read(path, columns=asked) for path in (whole, packed))
+    assert np.array_equal(one["angle"], other["angle"])
 
 
-TIMES = [k * FAST for k in range(50)]
-VALUES = [1.0 + k for k in range(50)]
+def change(path: Path, *statements: str) -> None:
+    with closing(sqlite3.connect(path)) as base:
+        for statement in statements:
+            base.execute(statement)
+        base.commit()
+
+
+def database(folder: Path, *statements: str) -> Path:
+    """Return the database of a bag with a pressure and a force, changed."""
+    messages = {"/rig/pressure_bar": numbers(PRESSURE), "/count": numbers(list(range(40)))}
+    path = bag(folder / "run", "db3", messages) / "run.db3"
+    change(path, *statements)
+    return path
+
+
+IDL = "module std_msgs { module msg { struct Float64 { double data; }; }; };"
+DEFINED = (
+    "UPDATE message_definitions SET encoding = '{}', encoded_message_definition = '{}' "
+    "WHERE topic_type = 'std_msgs/msg/{}'"
+)
+OF_COUNT = "WHERE name = '/count'"
+
+
+@pytest.mark.parametrize(
+    ("statements", "reason"),
+    [
+        (["UPDATE schema SET schema_version = 3", "DROP TABLE message_definitions"], ""),
+        ([DEFINED.format("ros2idl", IDL, "Float64")], ""),
+        (["UPDATE messages SET data = x'00010000' WHERE id = 77"], "message 37"),
+        ([f"UPDATE topics SET serialization_format = 'json' {OF_COUNT}"], "json"),
+        ([DEFINED.format("ros2msg", "Other data", "UInt8")], "Other"),
+        ([f"UPDATE topics SET type = 'rig/msg/Unknown' {OF_COUNT}"], "Unknown"),
+    ],
+    ids=["no definitions", "IDL", "a message cut off", "JSON", "no such part", "no such type"],
+)
+def test_a_topic_is_read_or_listed_with_the_reason(
+    tmp_path: Path, statements: list[str], reason: str
+) -> None:
+    path = database(tmp_path, *statements)
+    found = columns(path)
+    assert found.pop("/rig/pressure_bar/data") == (seconds(40), PRESSURE)
+    assert bool(found) is not bool(reason)
+    assert reason in table(path).unread.get("/count", "")
+
+
+ATTACKS = [
+    ("rig/msg/A\"\"\"\n    {code}\n    \"\"\"", "float64 data"),
+    ("rig/msg/A", "float64 data\nstring X='\"\"\"); {code} #'"),
+    ("rig/msg/A", "float64 data = {code}"),
+    ("rig/msg/A", "float64[{code}] data"),
+    ("rig/msg/A", "float64 data\nfloat64 x: {code}"),
+    ("rig/msg/A\nfloat64 data\n{line}\nMSG: rig/msg/B(object):\n  {code}\nclass C", "float64 data"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "text"), ATTACKS)
+def test_code_in_definitions_is_never_run(tmp_path: Path, kind: str, text: str) -> None:
+    ran = tmp_path / "ran"
+    code = f"__import__('pathlib').Path('{ran}').touch()"
+    kind, text = (each.format(code=code, line="=" * 80).replace("'", "''") for each in (kind, text))
+    path = database(
+        tmp_path,
+        f"UPDATE topics SET type = '{kind}'",
+        f"UPDATE message_definitions SET topic_type = '{kind}', encoded_message_definition = '{text}'",
+    )
+    try:
+        assert mckibben.read(path)
+    except DataError as error:
+        assert error.file == path  # noqa: PT017
+    assert not ran.exists()
+
+
+P = "/rig/pressure_bar"
 
 
 @pytest.mark.parametrize(
     ("messages", "channel", "row"),
     [
-        ({"/rig/pressure_bar": numbers(TIMES, [*VALUES[:7], np.nan, *VALUES[8:]])}, "pressure", 8),
-        ({"/rig/pressure_bar": numbers([*TIMES[:7], *TIMES[6:-1]], VALUES)}, "pressure", 8),
-        (
-            {
-                "/rig/pressure_bar": numbers(TIMES, VALUES),
-                "/force_N": numbers([10**10 + when for when in TIMES], VALUES),
-            },
-            "pressure",
-            None,
-        ),
-        ({"/words": [(1, {"data": "up"})]}, None, None),
+        ({P: numbers([*PRESSURE[:7], np.nan, *PRESSURE[8:]])}, "pressure", 8),
+        ({P: numbers(PRESSURE[:7]) + numbers(PRESSURE, BEGAN + 6 * STEP)}, "pressure", 8),
+        ({P: numbers(PRESSURE), "/force_N": numbers(PRESSURE, BEGAN + 10**10)}, "pressure", None),
+        ({"/words": MIXED["/words"]}, None, None),
     ],
     ids=["a sample that is missing", "a time that is repeated", "no common time", "no numbers"],
 )
@@ -184,4 +276,4 @@ def test_what_cannot_be_read(
     path = bag(tmp_path / "run", "mcap", messages)
     with pytest.raises(DataError) as caught:
         mckibben.read(path)
-    assert (caught.value.channel, caught.value.row) == (channel, row)
+    assert (caught.value.file, caught.value.channel, caught.value.row) == (path, channel, row)

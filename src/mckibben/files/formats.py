@@ -72,9 +72,22 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         more than is read.
     """
     module = _reader(path)
-    try:
+    with _refusing(path):
         _refuse_impostor(file, path)
-        found: list[Table] = [printable(table) for table in module.read(file, path)]
+        return [printable(table) for table in module.read(file, path)]
+
+
+def bag(folder: Path) -> list[Table]:
+    """Return what is in the folder of a bag of ROS 2; errors are those of `read`."""
+    with _refusing(folder):
+        return [printable(table) for table in import_module("mckibben.files.bags").folder(folder)]
+
+
+@contextmanager
+def _refusing(path: Path) -> Iterator[None]:
+    """Turn whatever a library raises into errors that name the file."""
+    try:
+        yield
     except MckibbenError:
         raise
     except OSError as error:
@@ -93,7 +106,6 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         ) from None
     except Exception as error:  # damaged files make the libraries raise anything at all
         raise _damaged(path, error) from None
-    return found
 
 
 def writer(path: Path) -> ModuleType:
@@ -133,7 +145,7 @@ def _refuse_impostor(file: BufferedReader, path: Path) -> None:
 def _damaged(path: Path, error: Exception) -> DataError:
     reason = " ".join(str(error).split())[:200] or type(error).__name__
     return DataError(
-        f"it is damaged, or not {path.suffix[1:]} ({reason})",
+        f"it is damaged, or not {path.suffix[1:] or 'a bag'} ({reason})",
         file=path,
         remedy="export it again from its source",
     )

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from io import BufferedReader
 from pathlib import Path
 
 from mckibben.errors import DataError
@@ -12,9 +15,13 @@ from mckibben.files.channels import NAME, described
 from mckibben.files.own import description
 from mckibben.files.request import Request
 from mckibben.files.table import Table
+from mckibben.system.ordinary import opened
 
 BAG = "metadata.yaml"
 """In the folder of a bag of ROS 2."""
+
+PACKED = ".zstd"
+"""Ending of the files of a bag that were packed as a whole."""
 
 PROTOCOL = "protocol.json"
 """Tells in a folder what each recording in it is for."""
@@ -58,38 +65,19 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
     Errors are those of `mckibben.files.formats.read` and `mckibben.files.signals.joined`.
     """
     if is_bag(path):
-        parts = {each.name: each for each in _files(path)}
-        if not parts:
-            raise DataError(
-                "there is no .db3 or .mcap file in it", file=path, remedy="copy all of it"
-            )
-    elif path.is_dir():
+        return _bag(path, request.most)
+    if path.is_dir():
         parts = {each.stem: each for each in _files(path)}
     else:
         together = described(path.parent).joined(path.name)
         parts = {name: path.with_name(file) for name, file in together.items()} or {"": path}
     found: dict[Path, list[Table]] = {}
-    digests: list[str] = []
+    digests: dict[Path, str] = {}
     for each in parts.values():
-        with formats.opening(each, request.most) as file:
-            before = os.fstat(file.fileno())
+        with _unchanged(each, digests, request.most) as file:
             found[each] = formats.read(file, each)
-            file.seek(0)
-            digests.append(hashlib.file_digest(file, "sha256").hexdigest())
-            after = os.fstat(file.fileno())
-        if (before.st_mtime_ns, before.st_size) != (after.st_mtime_ns, after.st_size):
-            raise DataError(
-                "it changed while it was read",
-                file=each,
-                remedy="wait until whatever writes it is done, then read it again",
-            )
     if len(found) == 1:
-        return next(iter(found.values())), digests[0]
-    digest = hashlib.sha256("".join(digests).encode()).hexdigest()
-    if is_bag(path):
-        from mckibben.files.topics import one_bag
-
-        return [one_bag(found)], digest
+        return next(iter(found.values())), _one(digests.values())
     for each, several in found.items():
         if len(several) > 1:
             raise DataError(
@@ -100,7 +88,46 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
     one = signals.joined(
         {each: several[0] for each, several in found.items()}, list(parts), request
     )
-    return [one], digest
+    return [one], _one(digests.values())
+
+
+def _bag(folder: Path, most: float) -> tuple[list[Table], str]:
+    parts = _files(folder)
+    if not parts:
+        raise DataError(
+            "there is no .db3 or .mcap file in it", file=folder, remedy="copy all of it"
+        )
+    digests: dict[Path, str] = {}
+    with ExitStack() as stack:
+        for each in parts:
+            stack.enter_context(_unchanged(each, digests, most))
+        found = formats.bag(folder)
+    return found, _one(digests[each] for each in parts)
+
+
+@contextmanager
+def _unchanged(path: Path, digests: dict[Path, str], most: float) -> Iterator[BufferedReader]:
+    """Open a file, note its SHA-256 at the end, and refuse it if it changed in between."""
+    with opened(path, most=int(most)) as file:
+        before = os.fstat(file.fileno())
+        yield file
+        file.seek(0)
+        digests[path] = hashlib.file_digest(file, "sha256").hexdigest()
+        after = os.fstat(file.fileno())
+    if (before.st_mtime_ns, before.st_size) != (after.st_mtime_ns, after.st_size):
+        raise DataError(
+            "it changed while it was read",
+            file=path,
+            remedy="wait until whatever writes it is done, then read it again",
+        )
+
+
+def _one(digests: Iterable[str]) -> str:
+    """Return the digest of a recording of those of its files."""
+    several = list(digests)
+    if len(several) == 1:
+        return several[0]
+    return hashlib.sha256("".join(several).encode()).hexdigest()
 
 
 def read_with(path: Path) -> list[Path]:
@@ -122,7 +149,8 @@ def read_with(path: Path) -> list[Path]:
 
 
 def _files(folder: Path) -> list[Path]:
-    found = (each for each in _listed(folder) if each.suffix.casefold() in formats.READERS)
+    endings = {*formats.READERS, *([PACKED] if is_bag(folder) else ())}
+    found = (each for each in _listed(folder) if each.suffix.casefold() in endings)
     return [each for each in found if each.is_file()]
 
 

@@ -47,12 +47,8 @@ FAULTS = [
         "else np.concatenate(self._parts)",
         "else 10 * np.concatenate(self._parts)",
     ),
-    (
-        f"{FILES}/topics.py",
-        "values.astype(np.float64), unit",
-        "10 * values.astype(np.float64), unit",
-    ),
-    (f"{FILES}/tdms.py", "return values[:at]", "return 10 * values[:at]"),
+    (f"{FILES}/bags.py", "= np.array(values,", "= 10 * np.array(values,"),
+    (f"{FILES}/tdms.py", "channel[:], unit", "10 * channel[:], unit"),
     (f"{FILES}/parquet.py", "= cells.to_numpy()", "= 10 * cells.to_numpy()"),
     (f"{FILES}/hdf5.py", "else samples", "else 10 * samples"),
     (

@@ -8,12 +8,13 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from nptdms import ChannelObject, TdmsWriter
+from nptdms import ChannelObject, TdmsFile, TdmsWriter
 from scipy.io import loadmat, savemat
 
 import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.arrays import Array
+from mckibben.files import formats
 
 K = np.arange(40.0)
 P = 100 * (1 + np.sin(K / 6))
@@ -175,6 +176,52 @@ def test_a_tdms_file_without_times_begins_at_nothing(tmp_path: Path, timed: bool
     check(recording)
     assert recording.start_time == (1.0 if timed else 0.0)
     assert mckibben.read(tmp_path / "a.tdms")[0].sample_time == (0.02 if timed else None)
+
+
+@pytest.mark.parametrize(
+    ("step", "late_us"), [(0.02, 0), (0.05, 0), (0.02, 30_000)], ids=["alike", "slower", "later"]
+)
+def test_channels_of_tdms_have_the_clocks_that_the_file_states(
+    tmp_path: Path, step: float, late_us: int
+) -> None:
+    began = np.datetime64("2026-01-31T12:00:00.123456")
+    known = {"wf_start_offset": 0.5, "wf_increment": 0.02, "wf_start_time": began}
+    other = known | {"wf_increment": step, "wf_start_time": began + np.timedelta64(late_us, "us")}
+    kinds = np.array(["up", "down"])
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment(
+            [
+                ChannelObject("run", "pressure", P, {"unit_string": "kPa", **known}),
+                ChannelObject("run", "displacement", X, {"unit_string": "cm", **other}),
+                ChannelObject("run", "force", P[:0]),
+                ChannelObject("run", "valve", kinds),
+            ]
+        )
+    (table,) = formats.tables(tmp_path / "a.tdms")
+    assert table.unread == {"force": "no samples", "valve": "text"}
+    if (step, late_us) == (0.02, 0):
+        assert (table.sample_time, table.start_time, table.has_clocks) == (0.02, 0.5, False)
+        return
+    tracks = {  # as nptdms has them
+        channel.name: channel.time_track(absolute_time=True)
+        for channel in TdmsFile.read(tmp_path / "a.tdms")["run"].channels()[:2]
+    }
+    for one in table.columns:
+        since = (tracks[one.header] - began).astype("timedelta64[ns]").astype(float) * 1e-9
+        assert one.times == pytest.approx(since, abs=1e-9)
+    with pytest.warns(DataWarning, match="times of their own"):
+        (recording,) = mckibben.read(tmp_path / "a.tdms")
+    exact = np.interp(recording.time, 0.5 + 0.02 * K, P) / 100
+    assert recording["pressure"] == pytest.approx(exact)
+
+
+def test_a_channel_of_tdms_without_a_clock_is_left_out_where_others_differ(tmp_path: Path) -> None:
+    steps = {"pressure": {"wf_increment": 0.02}, "force": {"wf_increment": 0.05}, "angle": {}}
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment([ChannelObject("run", name, P, own) for name, own in steps.items()])
+    (table,) = formats.tables(tmp_path / "a.tdms")
+    assert [one.header for one in table.columns] == ["pressure", "force"]
+    assert list(table.unread) == ["angle"]
 
 
 @pytest.mark.parametrize("compression", [None, "gzip"])

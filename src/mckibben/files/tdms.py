@@ -1,29 +1,48 @@
-"""NI TDMS: one recording for each group, with units and time base from the properties."""
+"""NI TDMS: one recording for each group, with the units, starts and increments in its properties."""
 
 from __future__ import annotations
 
 import logging
 import math
-import os
-import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from io import BufferedReader
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.errors import DataError
-from mckibben.files.limits import MOST_TEXT, Budget
+from mckibben.files.headers import channel_of, parse
+from mckibben.files.limits import MOST_TEXT
 from mckibben.files.table import Column, Table, column, of_equal_length
 from mckibben.system.extras import demand
 
-_LEAD = struct.Struct("<4sIIQQ")
-_META_DATA, _NEW_LIST, _BIG_ENDIAN = 1 << 1, 1 << 2, 1 << 6
+_NUMBERS = "biufmM"
+"""Kinds of samples that are numbers or instants."""
 
-_Waveform = tuple[float | None, float]
+
+@dataclass(frozen=True)
+class _Clock:
+    """When the samples of a channel were taken.
+
+    Parameters
+    ----------
+    step, offset : float
+        Between two samples, and of the first one after the start [s].
+    start : numpy.datetime64, optional
+        In absolute time.
+    """
+
+    step: float
+    offset: float
+    start: np.datetime64 | None
+
+    def begin(self, starts: Sequence[np.datetime64]) -> float:
+        """Return the time of the first sample since the first of the starts [s]."""
+        late = self.start - min(starts) if self.start is not None else np.timedelta64(0)
+        return self.offset + float(late / np.timedelta64(1, "us")) / 1e6
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -31,8 +50,6 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     demand("nptdms", "tdms", "TDMS", file=path)
     from nptdms import TdmsFile
 
-    budget = Budget(file, path)
-    _count_segments(file, budget)
     with _quiet(), TdmsFile.open(file) as tree:
         if tree.file_status.incomplete_final_segment:
             raise DataError(
@@ -40,78 +57,67 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
                 file=path,
                 remedy="record or export it again",
             )
-        for group in tree.groups():
-            budget.parts(len(group))
-            budget.samples(sum(len(channel) for channel in group.channels()))
         meta = _plain(tree.properties)
         groups = [group for group in tree.groups() if any(len(c) for c in group.channels())]
         if not groups:
             raise DataError("no channel in it has samples", file=path, remedy="record it again")
         return [
-            _table(group, path, budget, meta, name=group.name if len(groups) > 1 else None)
+            _table(group, path, meta, name=group.name if len(groups) > 1 else None)
             for group in groups
         ]
 
 
-def _count_segments(file: BufferedReader, budget: Budget) -> None:
-    """Count the objects of all segments, from their lead-ins alone."""
-    objects, at = 1, 0
-    while len(lead := file.read(_LEAD.size)) == _LEAD.size:
-        tag, contents, _, length, _ = _LEAD.unpack(lead)
-        if tag != b"TDSm":
-            break
-        if contents & _META_DATA:
-            count = file.read(4)
-            order: Literal["big", "little"] = "big" if contents & _BIG_ENDIAN else "little"
-            kept = 1 if contents & _NEW_LIST else objects
-            objects = max(kept, int.from_bytes(count, order))
-            if contents & _BIG_ENDIAN:
-                length = int.from_bytes(length.to_bytes(8, "little"), "big")
-        budget.pieces(objects)
-        at += _LEAD.size + length
-        if at >= os.fstat(file.fileno()).st_size:
-            break
-        file.seek(at)
-    file.seek(0)
+def _table(group: Any, path: Path, meta: Mapping[str, Any], name: str | None) -> Table:
+    columns: dict[str, Column] = {}
+    clocks: dict[str, _Clock] = {}
+    unread: dict[str, str] = {}
+    for channel in group.channels():
+        place, kind = channel.name, channel.dtype.kind
+        if not len(channel):
+            unread[place] = "no samples"
+        elif kind not in _NUMBERS and not _is_time(place):
+            unread[place] = "complex numbers" if kind == "c" else "text"
+        else:
+            unit = channel.properties.get("unit_string") or None
+            columns[place] = column(place, channel[:], unit)
+            if (clock := _clock(channel.properties)) is not None:
+                clocks[place] = clock
+    meta = {**meta, **_plain(group.properties)}
+    if len(set(clocks.values())) <= 1:
+        table = of_equal_length(columns, path, meta=meta, name=name)
+        clock = next((clocks[one.header] for one in table.columns if one.header in clocks), None)
+        if clock is not None:
+            table = replace(table, sample_time=clock.step, start_time=clock.offset)
+        return replace(table, unread=unread)
+    starts = [clock.start for clock in clocks.values() if clock.start is not None]
+    clocked: list[Column] = []
+    for place, each in columns.items():
+        clock = None if _is_time(place) else clocks.get(place)
+        if clock is None or each.values is None or (starts and clock.start is None):
+            unread[place] = "its start and increment are not stated, and others differ in them"
+        else:
+            samples = np.arange(each.values.size, dtype=np.float64)
+            times = clock.begin(starts) + clock.step * samples
+            clocked.append(replace(each, times=times))
+    return Table(tuple(clocked), meta=meta, unread=unread, name=name)
 
 
-def _samples(channel: Any, budget: Budget) -> NDArray[Any]:
-    """Return the samples of a channel, read piece by piece to see how many there are."""
-    values: NDArray[Any] = np.empty(len(channel), dtype=channel.dtype)
-    at = 0
-    for piece in channel.data_chunks():
-        budget.pieces(1)
-        values[at : at + len(piece)] = piece[:]
-        at += len(piece)
-    return values[:at]
+def _is_time(header: str) -> bool:
+    return channel_of(parse(header)) == "time"
 
 
-def _table(group: Any, path: Path, budget: Budget, meta: dict[str, Any], name: str | None) -> Table:
-    channels = {channel.name: channel for channel in group.channels() if len(channel)}
-    columns: dict[str, Column] = {
-        place: column(
-            place, _samples(channel, budget), channel.properties.get("unit_string") or None
-        )
-        for place, channel in channels.items()
-    }
-    table = of_equal_length(columns, path, meta=meta | _plain(group.properties), name=name)
-    grids = {_waveform(channels[kept.header]) for kept in table.columns}
-    stated = {grid for grid in grids if grid[0] is not None}
-    if len(stated) > 1:
-        raise DataError(
-            f"the channels of group {group.name!r} have several time bases",
-            file=path,
-            remedy="save channels of one time base in one group",
-        )
-    step, start = next(iter(stated), (None, 0.0))
-    return Table(
-        table.columns, sample_time=step, start_time=start, meta=table.meta, name=table.name
-    )
+def _clock(properties: Mapping[str, Any]) -> _Clock | None:
+    step = properties.get("wf_increment")
+    offset = properties.get("wf_start_offset", 0.0)
+    if not isinstance(step, (int, float)) or not (math.isfinite(step) and step > 0):
+        return None
+    start = properties.get("wf_start_time")
+    return _Clock(float(step), float(offset), start if isinstance(start, np.datetime64) else None)
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep nptdms from printing what is said by errors here."""
+    """Prevent nptdms from printing what is said by errors here."""
     from nptdms.log import log_manager
 
     handler = log_manager.console_handler
@@ -123,14 +129,7 @@ def _quiet() -> Iterator[None]:
         handler.setLevel(level)
 
 
-def _waveform(channel: Any) -> _Waveform:
-    step = channel.properties.get("wf_increment")
-    start = channel.properties.get("wf_start_offset", 0.0)
-    usable = isinstance(step, (int, float)) and math.isfinite(step) and step > 0
-    return (float(step), float(start)) if usable else (None, 0.0)
-
-
-def _plain(properties: Any) -> dict[str, Any]:
+def _plain(properties: Mapping[str, Any]) -> dict[str, Any]:
     """Return the properties that JSON holds."""
     return {
         name: value

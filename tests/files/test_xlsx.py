@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import Recording
+from mckibben import DataError, DataWarning, Recording
+from mckibben.files import formats
 
 N = 40
 T = (np.arange(N) / 50).tolist()
@@ -67,4 +68,43 @@ def test_numbers_are_read_to_the_last_bit(tmp_path: Path) -> None:
 @pytest.mark.filterwarnings("ignore:.*no unit is given:mckibben.DataWarning")
 def test_dates_are_times(tmp_path: Path, instant: Any) -> None:
     rows = [["time", "p_bar", "Weg_mm"], *([instant(k), P[k], X[k]] for k in range(N))]
+    check(one(book(tmp_path / "a.xlsx", Data=rows)))
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        [["operator", "A"]],
+        [["operator", "A", "run", 3]],
+        [["Load (kg)", 5], ["Date", datetime.datetime(2026, 1, 31)], []],
+        [["a bench", None, "of nobody"], ["pressure", "in", "steps"]],
+    ],
+)
+@pytest.mark.parametrize("units", [None, ["s", "bar", "mm"], ["[s]", "(bar)", None], [None, "bar"]])
+@pytest.mark.filterwarnings("ignore:.*no unit is given:mckibben.DataWarning")
+def test_titles_are_passed_over_and_units_are_read(
+    tmp_path: Path, above: Rows, units: list[Any] | None
+) -> None:
+    names = SOUND[:1] if units is None else [["t", "p", "Weg"], units]
+    check(one(book(tmp_path / "a.xlsx", Data=[*above, *names, *SOUND[1:]])))
+
+
+def test_titles_are_no_names_and_other_sheets_are_listed(tmp_path: Path) -> None:
+    path = book(tmp_path / "a.xlsx", Notes=[["pressure"]], Run=[["pressure"], [], *SOUND[1:]])
+    with pytest.warns(DataWarning, match=r"(?s)column_1|'Notes'"):
+        (table,) = formats.tables(path)
+    assert [each.header for each in table.columns] == ["column_1", "column_2", "column_3"]
+    assert list(table.unread) == ["Notes"]
+
+
+@pytest.mark.parametrize("cell", ["1,5", "1.234", "1'000", "n/a"])
+@pytest.mark.parametrize("row", [1, 20])
+def test_text_that_may_be_several_numbers_is_refused(tmp_path: Path, cell: str, row: int) -> None:
+    rows = [list(each) for each in SOUND]
+    rows[row][1] = cell
+    rows[10][1] = str(P[9])  # which is a number
+    with pytest.raises(DataError, match=cell) as caught:
+        one(book(tmp_path / "a.xlsx", Data=rows))
+    assert (caught.value.channel, caught.value.row) == ("pressure", row + 1)
+    rows[row][1] = P[row - 1]
     check(one(book(tmp_path / "a.xlsx", Data=rows)))

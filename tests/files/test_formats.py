@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -222,6 +223,50 @@ def test_a_channel_of_tdms_without_a_clock_is_left_out_where_others_differ(tmp_p
     (table,) = formats.tables(tmp_path / "a.tdms")
     assert [one.header for one in table.columns] == ["pressure", "force"]
     assert list(table.unread) == ["angle"]
+
+
+COLUMNS = {"time": T.tolist(), "p": P.tolist(), "displacement": X.tolist()}
+RECORDS = [dict(zip(COLUMNS, row, strict=True)) for row in zip(*COLUMNS.values(), strict=True)]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        COLUMNS,
+        {"columns": COLUMNS, "units": {"p": "kPa", "displacement": "cm"}, "load": 2.5},
+        RECORDS,
+        {"p": COLUMNS["p"], "displacement": COLUMNS["displacement"], "fs": 50},
+    ],
+    ids=["columns", "with units", "records", "a rate"],
+)
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+def test_json_of_columns(tmp_path: Path, content: Any) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(content))
+    units = {} if "units" in content else {"pressure": "kPa", "displacement": "cm"}
+    (recording,) = mckibben.read(path, units=units)
+    check(recording)
+    assert recording.meta.get("load") == (2.5 if "load" in content else None)
+    (tmp_path / "run.csv").write_text("t_s,p_bar\n" + "".join(f"{k},{k}\n" for k in range(20)))
+    assert [each.name for each in mckibben.read(tmp_path)] == ["run"]
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ('{"format": "mckibben-model", "version": 1}', "of format .mckibben-model"),
+        ('{"p": [1, 2], "p": [3, 4]}', "twice"),
+        ('{"runs": {"a.csv": "train"}}', "no vectors"),
+        ("[1, 2, 3]", "without columns"),
+        ('{"columns": {"p": [1, 2]}, "units": {"pressure": "bar"}}', "'pressure'"),
+        ('{"p": [1, 2, "off", 4]}', "'off' is not a number"),
+        ('{"p": [1, 2', "damaged"),
+    ],
+)
+def test_other_json_is_refused(tmp_path: Path, text: str, named: str) -> None:
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(DataError, match=named):
+        mckibben.read(tmp_path / "a.json")
 
 
 @pytest.mark.parametrize("compression", [None, "gzip"])

@@ -115,9 +115,9 @@ class Recordings(Folder):
 
     def beside(self) -> list[Path]:
         """Return what looks like recordings in the folder itself, which nobody has dropped."""
-        from mckibben.files.formats import READERS
+        from mckibben.files.formats import SOUGHT
 
-        found = (path for path in self.folder.iterdir() if path.suffix.casefold() in READERS)
+        found = (path for path in self.folder.iterdir() if path.suffix.casefold() in SOUGHT)
         return sorted(path for path in found if path.is_file())
 
     # -- files as they came --------------------------------------------------------------------
@@ -138,7 +138,7 @@ class Recordings(Folder):
             If it is empty or too large, or no file of recordings by its name; or nothing can be
             written.
         """
-        from mckibben.files.formats import READERS
+        from mckibben.files.formats import SOUGHT
 
         given = Path(unescaped(name).replace("\\", "/")).name
         ending = "".join(re.findall(r"\.[A-Za-z0-9]{1,8}$", given)).lower()
@@ -147,10 +147,10 @@ class Recordings(Folder):
                 f"{name!r:.80} describes a recording and holds none",
                 remedy="drop the file beside it alone: its units are asked by “How it was read”",
             )
-        if ending not in READERS:
+        if ending not in SOUGHT:
             remedy = "unpack it and drop the files in it" if ending in ARCHIVES else "export as CSV"
             raise DataError(
-                f"{name!r:.80} is no file of recordings ({', '.join(READERS)})", remedy=remedy
+                f"{name!r:.80} is no file of recordings ({', '.join(SOUGHT)})", remedy=remedy
             )
         if not size:
             raise DataError(f"{name!r:.80} is empty", remedy="choose another file")

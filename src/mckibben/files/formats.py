@@ -28,8 +28,12 @@ READERS: dict[str, str] = {
     ".bag": "bags",
     ".mcap": "bags",
     ".db3": "bags",
+    ".json": "columns_json",
 }
 """Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
+
+SOUGHT: tuple[str, ...] = tuple(ending for ending in READERS if ending != ".json")
+"""Endings that a folder is searched for; descriptions and models are JSON too."""
 
 WRITERS: tuple[str, ...] = (".csv", ".tsv", ".parquet")
 """Endings whose module also has ``write(recording, path)``."""

@@ -149,7 +149,7 @@ def read_with(path: Path) -> list[Path]:
 
 
 def _files(folder: Path) -> list[Path]:
-    endings = {*formats.READERS, *([PACKED] if is_bag(folder) else ())}
+    endings = {*formats.SOUGHT, *([PACKED] if is_bag(folder) else ())}
     found = (each for each in _listed(folder) if each.suffix.casefold() in endings)
     return [each for each in found if each.is_file()]
 

@@ -91,7 +91,7 @@ def test_titles_are_passed_over_and_units_are_read(
 
 def test_titles_are_no_names_and_other_sheets_are_listed(tmp_path: Path) -> None:
     path = book(tmp_path / "a.xlsx", Notes=[["pressure"]], Run=[["pressure"], [], *SOUND[1:]])
-    with pytest.warns(DataWarning, match=r"(?s)column_1|'Notes'"):
+    with pytest.warns(DataWarning, match="column_1"):
         (table,) = formats.tables(path)
     assert [each.header for each in table.columns] == ["column_1", "column_2", "column_3"]
     assert list(table.unread) == ["Notes"]

@@ -21,7 +21,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files.headers import channel_of, parse, unit_of
-from mckibben.files.notices import listed, warn
+from mckibben.files.notices import listed
 from mckibben.files.table import WIDEST, Column, Table
 from mckibben.system.extras import demand
 
@@ -119,7 +119,7 @@ def folder(path: Path) -> list[Table]:
             remedy="mend it with rosbag reindex, ros2 bag reindex or mcap recover, or record it again",
         ) from None
     try:
-        topics, unread = _topics(reader, path)
+        topics, unread = _topics(reader)
     finally:
         reader.close()
     found = [topic for topic in topics if topic.columns]
@@ -173,7 +173,7 @@ def _reader(path: Path) -> Any:
     return database(path) if ending == ".db3" else storages[".mcap"](path)
 
 
-def _topics(reader: Any, path: Path) -> tuple[list[_Topic], dict[str, str]]:
+def _topics(reader: Any) -> tuple[list[_Topic], dict[str, str]]:
     """Return the topics of an open bag in the order of their first messages, and what is not read."""
     known: dict[tuple[str, ...], _Topic] = {}
     topics: dict[tuple[str, ...], _Topic] = {}
@@ -194,9 +194,6 @@ def _topics(reader: Any, path: Path) -> tuple[list[_Topic], dict[str, str]]:
             topic.take(when, raw)
         except Exception as error:
             unread[topic.name] = f"message {len(topic.recorded) + 1}: {_reason(error)}"
-    if unread:
-        said = listed([f"{name} ({problem})" for name, problem in unread.items()], 10)
-        warn(path, f"topics are left out: {said}")
     found = [topic for topic in topics.values() if topic.name not in unread]
     for topic in found:
         unread |= {topic.header(place): reason for place, reason in topic.unread.items()}

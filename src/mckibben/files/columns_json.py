@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ import numpy as np
 from mckibben.errors import DataError
 from mckibben.files import rates
 from mckibben.files.limits import MOST_TEXT
-from mckibben.files.table import Column, Flaw, Table, of_equal_length
+from mckibben.files.table import Column, Flaw, Table
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -58,7 +57,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         if name not in told
         and (_is_number(one) or (isinstance(one, str) and len(one) <= MOST_TEXT))
     }
-    return [replace(of_equal_length(columns, path, meta=meta), rates=told, unread=unread)]
+    return [Table(tuple(columns.values()), meta=meta, rates=told, unread=unread)]
 
 
 def _column(name: str, cells: Sequence[Any], unit: str | None) -> Column:

@@ -16,7 +16,7 @@ import numpy as np
 from mckibben.errors import DataError
 from mckibben.files.headers import channel_of, parse
 from mckibben.files.limits import MOST_TEXT
-from mckibben.files.table import Column, Table, column, of_equal_length
+from mckibben.files.table import Column, Table, column
 from mckibben.system.extras import demand
 
 _NUMBERS = "biufmM"
@@ -62,12 +62,11 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         if not groups:
             raise DataError("no channel in it has samples", file=path, remedy="record it again")
         return [
-            _table(group, path, meta, name=group.name if len(groups) > 1 else None)
-            for group in groups
+            _table(group, meta, name=group.name if len(groups) > 1 else None) for group in groups
         ]
 
 
-def _table(group: Any, path: Path, meta: Mapping[str, Any], name: str | None) -> Table:
+def _table(group: Any, meta: Mapping[str, Any], name: str | None) -> Table:
     columns: dict[str, Column] = {}
     clocks: dict[str, _Clock] = {}
     unread: dict[str, str] = {}
@@ -84,11 +83,10 @@ def _table(group: Any, path: Path, meta: Mapping[str, Any], name: str | None) ->
                 clocks[place] = clock
     meta = {**meta, **_plain(group.properties)}
     if len(set(clocks.values())) <= 1:
-        table = of_equal_length(columns, path, meta=meta, name=name)
-        clock = next((clocks[one.header] for one in table.columns if one.header in clocks), None)
-        if clock is not None:
-            table = replace(table, sample_time=clock.step, start_time=clock.offset)
-        return replace(table, unread=unread)
+        clock = next(iter(clocks.values()), None)
+        step, start = (None, 0.0) if clock is None else (clock.step, clock.offset)
+        kept = tuple(columns.values())
+        return Table(kept, None, step, start, meta=meta, unread=unread, name=name)
     starts = [clock.start for clock in clocks.values() if clock.start is not None]
     clocked: list[Column] = []
     for place, each in columns.items():

@@ -57,15 +57,9 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             rows = [[_cell(value) for value in row] for row in sheet.iter_rows(values_only=True)]
             if not any(map(_numbers, rows)):
                 continue
-            others = [name for name in names if name != sheet.title]
-            if wanted is None and others:
-                warn(
-                    path,
-                    f"sheet {sheet.title!r}, the first with numbers, was read, and not "
-                    f"{listed(list(map(repr, others)))}; say sheet in {NAME} where that is wrong",
-                )
-            unread = dict.fromkeys(others, "one sheet is read")
-            return [replace(_table(rows, path), unread=unread)]
+            reason = f"one sheet is read: the first with numbers, or sheet in {NAME}"
+            others = [] if wanted else [name for name in names if name != sheet.title]
+            return [replace(_table(rows, path), unread=dict.fromkeys(others, reason))]
     raise DataError(
         "no sheet in it has numbers" if wanted is None else f"sheet {wanted!r} has no numbers",
         file=path,

@@ -145,15 +145,6 @@ def hdf5(**datasets: object) -> bytes:
     return buffer.getvalue()
 
 
-def chunk(content: bytes, **packing: Any) -> bytes:
-    """Return an HDF5 file with one chunk of 160 bytes that is this instead."""
-    buffer = io.BytesIO()
-    with h5py.File(buffer, "w") as file:
-        data = file.create_dataset("pressure_bar", (20,), "f8", chunks=(20,), **packing)
-        data.id.write_direct_chunk((0,), content)
-    return buffer.getvalue()
-
-
 def tdms(n: int = N) -> bytes:
     """Return a TDMS file with pressure and displacement."""
     buffer = io.BytesIO()
@@ -182,12 +173,38 @@ def xlsx(**columns: Sequence[object]) -> bytes:
     return buffer.getvalue()
 
 
+def wrong_sum(path: Path) -> None:
+    """Have a checksum that is not that of the samples."""
+    with h5py.File(path, "w") as file:
+        file.create_dataset("pressure_bar", data=PRESSURE, chunks=(N,), fletcher32=True)
+    content, sample = path.read_bytes(), np.float64(PRESSURE[4]).tobytes()
+    assert content.count(sample) == 1
+    path.write_bytes(content.replace(sample, sample[::-1]))
+
+
+def cut_short(path: Path) -> None:
+    """Have fewer samples than the shape tells."""
+    with h5py.File(path, "w", libver="earliest") as file:
+        file["pressure_bar"] = np.arange(77.0)
+    content, shape = path.read_bytes(), (77).to_bytes(8, "little")
+    path.write_bytes(content.replace(shape, (7777).to_bytes(8, "little")) + bytes(80_000))
+
+
 def outside(path: Path) -> None:
     """Have the samples in another file."""
     (path.parent / "secret").write_bytes(bytes(range(160)))
     with h5py.File(path, "w") as file:
         where = [(str(path.parent / "secret"), 0, 160)]
         file.create_dataset("pressure_bar", (20,), "f8", external=where)
+
+
+def apart(path: Path) -> None:
+    """Have the pages of the columns in another file."""
+    found: list[pq.FileMetaData] = []
+    other = path.with_name("secret.parquet")
+    pq.write_table(pa.table({"pressure_bar": PRESSURE}), other, metadata_collector=found)
+    found[0].set_file_path(other.name)
+    found[0].write_metadata_file(path)
 
 
 def virtual(path: Path) -> None:
@@ -278,7 +295,8 @@ CASES: list[Case] = [
         5,
         "1 of 30",
     ),
-    Case("lists.parquet", parquet(pressure=[[1.0]] * N, displacement=DISPLACEMENT), P, 1),
+    Case("lists.parquet", parquet(pressure=[[1.0]] * N, displacement=DISPLACEMENT), P),
+    Case("apart.parquet", apart),
     # MATLAB
     Case("garbage.mat", GARBAGE),
     Case("scalars.mat", mat(pressure=2.0, displacement=7.0)),
@@ -297,7 +315,8 @@ CASES: list[Case] = [
     Case("images.hdf5", hdf5(pressure=np.zeros((9, 9)))),
     Case("huge.h5", hdf5(pressure_bar=(10**14,)), names="100000000000000"),
     Case("unequal.h5", hdf5(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT[:20]), X),
-    Case("wrong_sum.h5", chunk(bytes(160) + b"\1\2\3\4", fletcher32=True)),
+    Case("wrong_sum.h5", wrong_sum),
+    Case("cut_short.h5", cut_short),
     Case("outside.h5", outside, names="'pressure_bar'"),
     Case("virtual.h5", virtual, names="'pressure_bar'"),
     # TDMS

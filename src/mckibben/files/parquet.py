@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mckibben.files import pages, stored
-from mckibben.files.limits import MOST_PARTS, Budget
+from mckibben.files import stored
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table, column, of_equal_length
@@ -22,41 +22,25 @@ demand("pyarrow", "parquet", "Parquet")
 
 _KEY = b"mckibben"
 
-MOST_WORDS = 2**26
-"""Bytes of text that are read: that of some million instants."""
-
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read the one table of a Parquet file: its numbers and times, and text where there is little."""
+    """Read the one table of a Parquet file: its numbers, times and text."""
     import pyarrow.parquet as pq
 
-    budget = Budget(file, path)
-    parquet = pq.ParquetFile(file, thrift_container_size_limit=MOST_PARTS)
-    about, schema = parquet.metadata, parquet.schema_arrow
-    budget.parts(about.num_row_groups * about.num_columns)
-    groups = [about.row_group(i) for i in range(about.num_row_groups)]
-    rows = max(about.num_rows, sum(group.num_rows for group in groups))
-    numbers = [field.name for field in schema if _is_number(field.type)]
-    texts = {field.name for field in schema if _is_text(field.type)}
-    # of groups, not of columns: PyArrow ends the process over some damaged descriptions of those
-    size = sum(group.total_byte_size for group in groups)
-    if texts and size - 9 * rows * len(numbers) > MOST_WORDS:
-        warn(path, f"columns of text are not read, as there is more than {MOST_WORDS} bytes of it")
-        texts = set()
-    wanted = [field.name for field in schema if field.name in {*numbers, *texts}]
-    budget.samples(rows * len(wanted))
-    pages.look(file, set(wanted), 8 * budget.allowed + MOST_WORDS, budget)
-    # words that are repeated stay one word each, however often they are
-    parquet = pq.ParquetFile(file, metadata=about, read_dictionary=sorted(texts))
-    frame = parquet.read(columns=None if len(wanted) == len(schema) else wanted)
+    frame = pq.ParquetFile(file).read()
     text = (frame.schema.metadata or {}).get(_KEY)
     own = None if text is None else _own(frame, text, path)
     if own is not None:
         return [own]
-    unread = [""] * frame.num_rows
-    columns = {field.name: Column(field.name, None, texts=unread) for field in schema}
-    columns |= {name: _column(name, frame[i]) for i, name in enumerate(frame.column_names)}
-    return [of_equal_length(columns, path, meta={})]
+    columns: dict[str, Column] = {}
+    unread: dict[str, str] = {}
+    for i, name in enumerate(frame.column_names):
+        found = _column(name, frame.column(i))
+        if found is None:
+            unread[name] = f"a column of type {frame.schema.field(i).type}"
+        else:
+            columns[name if name not in columns else f"{name} ({i + 1})"] = found
+    return [replace(of_equal_length(columns, path, meta={}), unread=unread)]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -87,36 +71,22 @@ def _own(frame: Any, text: bytes, path: Path) -> Table | None:
     return None
 
 
-def _is_number(kind: Any) -> bool:
-    """Tell whether a column holds numbers, or instants or times that become some."""
+def _column(name: str, cells: Any) -> Column | None:
+    """Return a column of numbers, times or text, or None if it is of another type."""
     import pyarrow as pa
 
-    is_a = pa.types
+    is_a, kind = pa.types, cells.type
     if is_a.is_dictionary(kind):
-        return _is_number(kind.value_type)
-    kinds = (is_a.is_integer, is_a.is_floating, is_a.is_boolean, is_a.is_date)
-    return any(is_it(kind) for is_it in (*kinds, is_a.is_timestamp, is_a.is_duration))
-
-
-def _is_text(kind: Any) -> bool:
-    import pyarrow as pa
-
-    is_a = pa.types
-    if is_a.is_dictionary(kind):
-        return _is_text(kind.value_type)
-    return bool(is_a.is_string(kind) or is_a.is_large_string(kind) or is_a.is_string_view(kind))
-
-
-def _column(name: str, cells: Any) -> Column:
-    import pyarrow as pa
-
-    if not (pa.types.is_dictionary(cells.type) and _is_text(cells.type)):
-        return column(name, _array(cells))
-    texts: list[str] = []
-    for chunk in cells.chunks:
-        words = [word or "" for word in chunk.dictionary.to_pylist()]
-        texts += ["" if at is None else words[at] for at in chunk.indices.to_pylist()]
-    return Column(name, None, texts=texts)
+        kind = kind.value_type
+        cells = cells.cast(kind)
+    if is_a.is_string(kind) or is_a.is_large_string(kind) or is_a.is_string_view(kind):
+        return Column(
+            name, None, texts=["" if text is None else text for text in cells.to_pylist()]
+        )
+    if is_a.is_boolean(kind) or is_a.is_decimal(kind):
+        return column(name, _array(cells.cast(pa.float64())))
+    kinds = (is_a.is_integer, is_a.is_floating, is_a.is_date, is_a.is_timestamp, is_a.is_duration)
+    return column(name, _array(cells)) if any(is_it(kind) for is_it in kinds) else None
 
 
 def _array(cells: Any) -> np.ndarray[Any, Any]:

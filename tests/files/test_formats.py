@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import json
+import pickle
+import struct
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, TdmsFile, TdmsWriter
 from scipy.io import loadmat, savemat
+from scipy.sparse import csc_array
 
 import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.arrays import Array
-from mckibben.files import formats
+from mckibben.files.formats import tables
 
 K = np.arange(40.0)
 P = 100 * (1 + np.sin(K / 6))
@@ -121,48 +128,6 @@ def test_scalars_that_cannot_be_are_refused_where_they_count(
     check(mckibben.read(tmp_path / name)[0])
 
 
-def test_vectors_of_matlab_files_are_those_that_scipy_reads(tmp_path: Path) -> None:
-    numbers = np.arange(12)
-    kinds = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "?")
-    content: dict[str, Any] = {f"v{kind.strip('?')}": numbers.astype(kind) for kind in kinds}
-    content |= {"matrix": np.eye(3), "complex": numbers * 1j, "words": ["up", "down"]}
-    older = {"v": numbers.astype("f4"), "matrix": np.eye(3), "words": ["up", "down"], "w": numbers}
-    savemat(tmp_path / "4.mat", older | {"complex": numbers * 1j}, format="4")
-    (recording,) = mckibben.read(tmp_path / "4.mat")
-    assert list(recording.channels) == ["v", "w"]
-    assert all(np.array_equal(recording[name], numbers) for name in "vw")
-    content |= {
-        "cell": np.array([numbers, "a"], dtype=object),
-        "deep": {"er": {"p": numbers * 0.5}},
-    }
-    for packed, column in ((False, "row"), (True, "column")):
-        path = tmp_path / f"{packed}.mat"
-        savemat(path, content, do_compression=packed, oned_as=column)  # type: ignore[arg-type]
-        (recording,) = mckibben.read(path, units={"pressure": "bar"})
-        known = loadmat(path, squeeze_me=True)
-        for kind in kinds:
-            name = f"v{kind.strip('?')}"
-            assert np.array_equal(recording[name], known[name])
-        assert np.array_equal(recording["pressure"], numbers * 0.5)
-        assert len(recording.channels) == len(kinds) + 1
-
-
-def test_links_of_hdf5_do_not_lead_out_of_a_file_nor_round_in_it(tmp_path: Path) -> None:
-    with h5py.File(tmp_path / "other.h5", "w") as file:
-        file["a"] = np.arange(20.0)
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["b"] = np.arange(20.0) ** 2
-        file["again"] = file["b"]
-        file["round"] = file["/"]
-        file["out"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "a")
-        file["soft"] = h5py.SoftLink("/out")
-        for name, kind in (("r", h5py.ref_dtype), ("v", h5py.vlen_dtype("f8"))):
-            file.create_dataset(name, (20,), kind)
-        file.create_dataset("c", (20,), [("a", "f8"), ("b", "S5000")])
-    (recording,) = mckibben.read(tmp_path / "a.h5")
-    assert list(recording.channels) == ["again"]
-
-
 @pytest.mark.parametrize("timed", [True, False])
 def test_a_tdms_file_without_times_begins_at_nothing(tmp_path: Path, timed: bool) -> None:
     shared = {"wf_increment": 0.02, "wf_start_offset": 1.0} if timed else {}
@@ -198,7 +163,7 @@ def test_channels_of_tdms_have_the_clocks_that_the_file_states(
                 ChannelObject("run", "valve", kinds),
             ]
         )
-    (table,) = formats.tables(tmp_path / "a.tdms")
+    (table,) = tables(tmp_path / "a.tdms")
     assert table.unread == {"force": "no samples", "valve": "text"}
     if (step, late_us) == (0.02, 0):
         assert (table.sample_time, table.start_time, table.has_clocks) == (0.02, 0.5, False)
@@ -220,7 +185,7 @@ def test_a_channel_of_tdms_without_a_clock_is_left_out_where_others_differ(tmp_p
     steps = {"pressure": {"wf_increment": 0.02}, "force": {"wf_increment": 0.05}, "angle": {}}
     with TdmsWriter(tmp_path / "a.tdms") as writer:
         writer.write_segment([ChannelObject("run", name, P, own) for name, own in steps.items()])
-    (table,) = formats.tables(tmp_path / "a.tdms")
+    (table,) = tables(tmp_path / "a.tdms")
     assert [one.header for one in table.columns] == ["pressure", "force"]
     assert list(table.unread) == ["angle"]
 
@@ -269,20 +234,334 @@ def test_other_json_is_refused(tmp_path: Path, text: str, named: str) -> None:
         mckibben.read(tmp_path / "a.json")
 
 
-@pytest.mark.parametrize("compression", [None, "gzip"])
-@pytest.mark.parametrize("kind", ["<f8", ">f8", "<f4", "<f2", ">i2", "u1", "<i8", "?"])
-def test_samples_in_chunks_are_those_that_h5py_reads(
-    tmp_path: Path, kind: str, compression: str | None
+# Trees of groups and structs -------------------------------------------------------------------
+
+KINDS = ("<f8", ">f8", "<f4", "<i2", ">i4", "u1", "<u2", "i1", "<u4", "<i8")
+
+
+def a_tree(rng: np.random.Generator, depth: int = 0) -> dict[str, Any]:
+    """Return vectors of 12 samples in structs, each by a name of its own, among other things."""
+    tree: dict[str, Any] = {"note": "no numbers", "gain": 2.5, "cube": np.ones((2, 2, 2))}
+    for _ in range(int(rng.integers(1, 5))):
+        name, shape = f"v{rng.integers(10**12)}", [(12,), (12, 1), (1, 12)][rng.integers(3)]
+        tree[name] = rng.integers(0, 100, shape).astype(rng.choice(KINDS))
+        if depth < 3 and rng.random() < 0.3:
+            tree[f"s{name}"] = a_tree(rng, depth + 1)
+    return tree
+
+
+def put(group: h5py.Group, tree: dict[str, Any], **packing: Any) -> None:
+    """Write a tree as HDF5."""
+    for name, each in tree.items():
+        if isinstance(each, dict):
+            put(group.create_group(name), each, **packing)
+        else:
+            group.create_dataset(name, data=each, **(packing if np.size(each) > 1 else {}))
+
+
+def by_scipy(struct: Any) -> dict[str, Array]:
+    """Return the vectors that SciPy finds, by name."""
+    if isinstance(struct, dict):
+        items = [(name, each) for name, each in struct.items() if name[0] != "_"]
+    else:
+        items = [(name, struct[name][0, 0]) for name in struct.dtype.names]
+    inner = [by_scipy(each) for _, each in items if each.dtype.names]
+    own = {name: each.reshape(-1) for name, each in items if name[0] == "v"}
+    return own | {name: each for one in inner for name, each in one.items()}
+
+
+def by_h5py(path: Path) -> dict[str, Array]:
+    """Return the vectors that h5py finds, by name."""
+    found: dict[str, Array] = {}
+
+    def visit(place: str, each: Any) -> None:
+        name = place.rpartition("/")[2]
+        if name[0] == "v":
+            found[name] = each[()].reshape(-1)
+
+    with h5py.File(path) as file:
+        file.visititems(visit)
+    return found
+
+
+def test_vectors_are_those_that_scipy_and_h5py_read(tmp_path: Path) -> None:
+    packings: list[dict[str, Any]] = [{}, {"chunks": True, "compression": "gzip", "shuffle": True}]
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        tree, packed = a_tree(rng), seed % 2
+        flat = {name: each for name, each in tree.items() if name[0] == "v"}
+        old = {name: each for name, each in flat.items() if each.dtype != np.int64}
+        savemat(tmp_path / "a.mat", tree, do_compression=bool(packed))
+        savemat(tmp_path / "old.mat", old | {"other": np.arange(12.0)}, format="4")
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            put(file, tree, **packings[packed])
+        for name in ("a.mat", "old.mat", "a.h5"):
+            path = tmp_path / name
+            known = by_h5py(path) if name == "a.h5" else by_scipy(loadmat(path))
+            (table,) = tables(path)
+            found = {column.header: column.values for column in table.columns}
+            assert found.keys() - {"other"} == known.keys()
+            for header, samples in known.items():
+                np.testing.assert_array_equal(found[header], samples.astype(np.float64))
+            inner = [place for place in table.unread if place.endswith("cube")]
+            assert ("cube" in inner) is (name != "old.mat")
+            assert {table.unread[place] for place in inner} <= {"an array of 2 x 2 x 2"}
+
+
+def structs(names: str, *rows: tuple[Any, ...]) -> Any:
+    """Return a struct array."""
+    made = np.zeros((1, len(rows)), [(name, "O") for name in names.split()])
+    for i, row in enumerate(rows):
+        made[0, i] = row
+    return made
+
+
+def cell(*elements: Any) -> Any:
+    """Return a cell array."""
+    made = np.empty(len(elements), dtype=object)
+    made[:] = elements
+    return made
+
+
+def write_73(path: Path, tree: dict[str, Any]) -> None:
+    """Write a tree as MATLAB 7.3 does: text as numbers; struct arrays and cells as references."""
+
+    def put(group: Any, name: str, value: Any) -> Any:
+        if isinstance(value, dict):
+            made, kind = group.create_group(name), "struct"
+            for inner, each in value.items():
+                put(made, inner, each)
+        elif isinstance(value, str):
+            letters = np.frombuffer(value.encode("utf-16-le"), "<u2")
+            made, kind = group.create_dataset(name, data=letters.reshape(-1, 1)), "char"
+        elif np.asarray(value).dtype.names:
+            made, kind = group.create_group(name), "struct"
+            for inner in value.dtype.names:
+                refer(made, inner, value[inner].reshape(-1))
+        elif value.dtype == object:
+            made, kind = refer(group, name, value), "cell"
+        else:
+            made, kind = group.create_dataset(name, data=np.atleast_2d(value).T), "double"
+        made.attrs["MATLAB_class"] = np.bytes_(kind)
+        return made
+
+    def refer(group: Any, name: str, values: Any) -> Any:
+        made = group.create_dataset(name, (len(values), 1), h5py.ref_dtype)
+        for i, value in enumerate(values):
+            made[i, 0] = put(kept, f"{len(kept)}", value).ref
+        return made
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        kept = file.create_group("#refs#")
+        for name, value in tree.items():
+            put(file, name, value)
+
+
+BOTH = np.column_stack([P, X])
+CONVENTIONS: dict[str, dict[str, Any]] = {
+    "structs": {"run": {"time_s": T, "signals": {"p_kPa": P, "disp_cm": X}}},
+    "ControlDesk": {
+        "exp1": {
+            "X": {"Name": "time", "Unit": "s", "Data": T},
+            "Y": structs("Name Unit Data", ("pressure", "kPa", P), ("displacement", "cm", X)),
+        }
+    },
+    "one X of many": {
+        "e": {
+            "X": structs("Name Data", ("time", T)),
+            "Y": structs("Name Unit Data", ("p", "kPa", P), ("pos", "cm", X)),
+        }
+    },
+    "a struct a signal": {
+        "pressure": {"t": T, "y": P, "unit": "kPa"},
+        "displacement": {"t": T, "y": X, "unit": "cm"},
+    },
+    "Simulink": {
+        "out": {
+            "time": T,
+            "signals": structs("values label", (P[:, None], "p [kPa]"), (X[:, None], "pos [cm]")),
+            "blockName": "model/log",
+        }
+    },
+    "Simulink's matrix": {
+        "out": {"time": T, "signals": {"values": BOTH, "label": cell("p_kPa", "pos_cm")}}
+    },
+    "units": {"t": T, "p": P, "pos": X, "units": {"p": "kPa", "pos": "cm"}},
+    "names": {"t": T, "data": BOTH, "names": cell("p", "pos"), "units": cell("kPa", "cm")},
+    "cells": {"t": T, "log": cell({"p_kPa": P}, {"pos_cm": X})},
+    "a struct a sample": {"s": structs("t p_kPa pos_cm", *map(tuple, np.column_stack([T, BOTH])))},
+}
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+@pytest.mark.parametrize("convention", CONVENTIONS)
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_signals_are_found_where_programs_put_them(
+    tmp_path: Path, convention: str, version: str
 ) -> None:
-    samples = (10 + 90 * np.sin(np.arange(100.0) / 9)).clip(0, 100).astype(kind)
-    for shuffle, sums, shape in ((False, False, (100,)), (True, True, (100, 1))):
-        path = tmp_path / f"{shuffle}.h5"
-        packing: dict[str, Any] = {"compression": compression, "shuffle": shuffle}
-        with h5py.File(path, "w") as file:
-            chunks = (7, *shape[1:])
-            data = file.create_dataset(
-                "a", shape, kind, chunks=chunks, fillvalue=1, fletcher32=sums, **packing
-            )
-            data[20:] = samples.reshape(shape)[20:]  # two chunks are never written
-            expected = data[()].reshape(-1).astype(np.float64)
-        np.testing.assert_array_equal(mckibben.read(path)[0]["a"], expected)
+    path, tree = tmp_path / "a.mat", CONVENTIONS[convention]
+    if version == "5":
+        savemat(path, tree)
+    else:
+        write_73(path, tree)
+    (recording,) = mckibben.read(path, channels=["pressure", "displacement"])
+    check(recording)
+    assert set(recording.channels) == {"pressure", "displacement"}
+    assert not tables(path)[0].unread
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_vectors_have_the_times_nearest_to_them(tmp_path: Path, version: str) -> None:
+    path = tmp_path / "a.mat"
+    slow = np.arange(30.0)
+    tree = {
+        "pressure": {"t": T, "y": P},
+        "displacement": {"t_ms": 100 * slow, "y": slow**2},
+        "other": np.ones(40),
+    }
+    (savemat if version == "5" else write_73)(path, tree)
+    (table,) = tables(path)
+    columns = {column.header: column for column in table.columns}
+    assert sorted(columns) == ["displacement.y", "pressure.y"]
+    assert columns["pressure.y"].times == pytest.approx(T)
+    assert columns["displacement.y"].times == pytest.approx(slow / 10)
+    assert table.unread == {"other": "it has no times, and others have their own"}
+
+
+def test_a_name_that_several_groups_have_is_told_by_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        put(file, {"one": {"p_kPa": P, "q7": P}, "two": {"p_kPa": 2 * P, "q7": X}, "disp_cm": X})
+    with pytest.raises(DataError, match="'one/p_kPa' and 'two/p_kPa'"):
+        mckibben.read(path)
+    (recording,) = mckibben.read(path, rate=50, columns={"pressure": "two/p_kPa"})
+    assert recording["pressure"] == pytest.approx(P / 50)
+    assert {"one_q7", "two_q7"} < set(recording.channels)
+
+
+def opaque(name: bytes, kind: bytes) -> bytes:
+    """Return a variable of version 5 that is an object, as tables and time series are."""
+
+    def element(code: int, content: bytes) -> bytes:
+        return struct.pack("<II", code, len(content)) + content + b"\0" * (-len(content) % 8)
+
+    numbers = element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 1, 1))
+    numbers += element(1, b"") + element(6, b"\0\0\0\0")
+    head = element(6, struct.pack("<II", 17, 0)) + element(1, name) + element(1, b"MCOS")
+    return element(14, head + element(1, kind) + element(14, numbers))
+
+
+def test_what_holds_numbers_and_is_not_read_is_listed(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    other: dict[str, Any] = {"z": P * 1j, "m": np.ones((9, 9)), "sp": csc_array(np.eye(3))}
+    other |= {"log": np.array([["t", "p"], [1.0, 2.0]], dtype=object), "words": ["up", "down"]}
+    savemat(path, {"p": P, "fast": np.ones(90), "run": other})
+    path.write_bytes(path.read_bytes() + opaque(b"tab", b"table"))
+    (table,) = tables(path)
+    assert table.unread == {
+        "run.z": "complex numbers",
+        "run.m": "an array of 9 x 9",
+        "run.sp": "a sparse matrix",
+        "run.log{1}": "a cell of text and numbers",
+        "run.log{2}": "a cell of text and numbers",
+        "run.words": "text",
+        "tab": "an object of class table",
+    }
+    path.write_bytes(path.read_bytes() + opaque(b"ts", b"timeseries"))
+    assert tables(path)[0].unread["ts"] == "an object of class timeseries, and 1 more object(s)"
+    savemat(path, {"run": other})
+    with pytest.raises(DataError, match=r"run\.z \(complex numbers\)"):
+        mckibben.read(path)
+
+
+def test_variables_of_one_name_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    savemat(path, {"p": P})
+    path.write_bytes(path.read_bytes() + path.read_bytes()[128:])
+    with pytest.raises(DataError, match="one name"):
+        mckibben.read(path)
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+def test_fields_of_a_table_in_hdf5_are_columns(tmp_path: Path) -> None:
+    rows = np.zeros(
+        40, [("t", "f8"), ("p_kPa", ">f4"), ("mark", "S3"), ("values_block_0", "f8", 2)]
+    )
+    rows["t"], rows["p_kPa"], rows["values_block_0"] = T, P, BOTH
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["log"] = rows
+        file["disp_cm"] = X
+        file["names"] = ["a", "b"]
+        file["log"].attrs["values_block_0_kind"] = np.bytes_(pickle.dumps(["p", "pos"]))
+    (recording,) = mckibben.read(tmp_path / "a.h5", channels=["pressure", "displacement"])
+    assert recording["pressure"] == pytest.approx(P / 100, rel=1e-6)
+    assert recording["displacement"] == pytest.approx(10 * X)
+    (table,) = tables(tmp_path / "a.h5")
+    headers = ["disp_cm", "t", "p_kPa", "values_block_0[1]", "values_block_0[2]", "mark"]
+    assert [column.header for column in table.columns] == headers
+    assert np.array_equal(table.columns[4].values, X)  # type: ignore[arg-type]
+
+
+def test_links_of_hdf5_do_not_lead_out_of_a_file_nor_round_in_it(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["a"] = np.arange(20.0)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["b"] = np.arange(20.0) ** 2
+        file["again"] = file["b"]
+        file["round"] = file["/"]
+        file["out"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "a")
+        file["soft"] = h5py.SoftLink("/out")
+        for name, kind in (("r", h5py.ref_dtype), ("v", h5py.vlen_dtype("f8"))):
+            file.create_dataset(name, (20,), kind)
+    (table,) = tables(tmp_path / "a.h5")
+    assert [column.header for column in table.columns] == ["again"]
+    assert table.unread["out"] == "it is in another file"
+    assert sorted(table.unread) == ["out", "r", "v"]
+
+
+def test_columns_of_parquet_are_those_that_pandas_reads(tmp_path: Path) -> None:
+    kinds = [kind.replace(">", "<") for kind in KINDS]
+    frame = pd.DataFrame({f"v{i}": np.arange(12).astype(kind) for i, kind in enumerate(kinds)})
+    frame["maybe"] = pd.array([True, False, None] * 4, dtype="boolean")
+    frame["few"] = pd.array([1, 2, None] * 4, dtype="Int64")
+    frame["price"] = pd.Series([Decimal("1.5")] * 12, dtype=object)
+    frame["when"] = pd.date_range("2024-01-01", periods=12, freq="20ms")
+    frame["word"] = pd.Categorical(["up", None, "down"] * 4)
+    frame["list"] = pd.Series([[1.0]] * 12, dtype=object)
+    frame.to_parquet(tmp_path / "a.parquet")
+    (table,) = tables(tmp_path / "a.parquet")
+    columns = {column.header: column for column in table.columns}
+    known = pd.read_parquet(tmp_path / "a.parquet")
+    for name in [*frame.columns[: len(KINDS)], "maybe", "few", "price"]:
+        expected = known[name].astype("Float64").to_numpy(np.float64, na_value=np.nan)
+        np.testing.assert_array_equal(columns[name].values, expected)
+    assert columns["when"].values == pytest.approx(np.arange(12) / 50)
+    assert columns["word"].texts == ["up", "", "down"] * 4
+    assert list(table.unread) == ["list"]
+
+
+CALLS: list[str] = []
+
+
+class Trap:
+    """Calls a function where it is unpickled."""
+
+    def __reduce__(self) -> Any:
+        return CALLS.append, ("called",)
+
+
+def test_pickles_in_files_are_not_loaded(tmp_path: Path) -> None:
+    trap = pickle.dumps(Trap())
+    marks = {
+        b"ARROW:extension:name": b"arrow.py_extension_type",
+        b"ARROW:extension:metadata": trap,
+    }
+    schema = pa.schema([pa.field("p_kPa", pa.float64(), metadata=marks)])
+    pq.write_table(pa.table([P], schema=schema), tmp_path / "a.parquet")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["p_kPa"] = P
+        for item in (file, file["p_kPa"]):
+            item.attrs["units"] = np.bytes_(trap)
+    for name in ("a.parquet", "a.h5"):
+        assert tables(tmp_path / name)[0].columns[0].values == pytest.approx(P)
+    assert not CALLS

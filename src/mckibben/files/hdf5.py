@@ -1,213 +1,169 @@
-"""HDF5: the vectors, and matrices of a few, anywhere in its tree, with the units in their attributes.
+"""HDF5: the vectors, and matrices of a few, anywhere in its groups, with the units in their attributes.
 
-A data set of HDF5 can name another file that holds its samples. One that does is refused: whoever
-sends a file must not choose what else is read.
+A data set of HDF5 can have its samples in another file, and a link can lead there. The first is refused
+and the second not followed: whoever sends a file must not choose what else is read.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import replace
 from io import BufferedReader
-from operator import add, ge
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.errors import DataError
-from mckibben.files import hdf5_pieces, rates
-from mckibben.files.chunks import DEFLATE, FLETCHER32, SHUFFLE, unpacked
-from mckibben.files.limits import MOST_TEXT, Budget
-from mckibben.files.table import Column, Table, column, columns_of, is_matrix, of_equal_length
+from mckibben.files import tree
+from mckibben.files.limits import MOST_SAMPLES, MOST_TEXT
+from mckibben.files.table import Table
+from mckibben.files.tree import ATTRIBUTES, Node, Unread
 from mckibben.system.extras import demand
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def is_hdf5(file: BufferedReader) -> bool:
-    """Tell whether a file is HDF5, also behind the 512 bytes that MATLAB puts in front."""
+    """Return whether a file is HDF5, also behind the 512 bytes that MATLAB puts in front."""
     start = file.read(520)
     file.seek(0)
-    return hdf5_pieces.SIGNATURE in (start[:8], start[512:])
+    return SIGNATURE in (start[:8], start[512:])
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read the vectors of an HDF5 file."""
+    """Read the vectors of an HDF5 file, or of a MAT file of version 7.3."""
     demand("h5py", "hdf5", "HDF5", file=path)
     import h5py
 
-    hdf5_pieces.look(file)
-    budget = Budget(file, path)
-    found: dict[str, Column] = {}
-    told: dict[str, float] = {}
-    numbers = (h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.ENUM, h5py.h5t.BITFIELD)
-    with h5py.File(file, "r") as tree:
-        for place, data in _data_sets(tree, budget):
-            _refuse_elsewhere(place, data, path)
-            name = place.rpartition("/")[2]
-            rate = data.size == 1 and rates.is_one(name)
-            vector = data.ndim == 1 or (data.ndim == 2 and 1 in data.shape)
-            # types can be made of types without end: those are not asked for more
-            number = data.id.get_type().get_class() in numbers
-            matrix = not vector and is_matrix(data.shape or ())
-            wanted = number and (vector or matrix or rate)
-            if wanted and data.dtype.kind in "biuf" and not _is_text(data):
-                budget.samples(data.size)
-                if data.chunks is not None:
-                    steps = zip(data.shape, data.chunks, strict=True)
-                    padded = math.prod(-(-n // step) * step for n, step in steps)
-                    budget.at_once(max(math.prod(data.chunks), padded // 2))
-                samples = _samples(place, data, file, path)
-                unit = _text(data, "units") or _text(data, "unit")
-                if rate:
-                    told[place] = float(samples.reshape(-1)[0])
-                elif matrix:
-                    budget.parts(min(data.shape))
-                    found |= columns_of(place, name, samples, unit)
-                else:
-                    found[place] = column(name, samples.reshape(-1), unit)
-        budget.parts(h5py.h5a.get_num_attrs(tree.id))
-        meta = {name: _plain(tree, name) for name in tree.attrs}
+    matlab = path.suffix.casefold() == ".mat"
+    with h5py.File(file, "r") as root:
+        names = [name for name in root if not (matlab and name.startswith("#"))]
+        found = _Tree(path, matlab).group(root, names)
+        meta = {name: _attribute(root, name) for name in root.attrs}
     meta = {name: value for name, value in meta.items() if value is not None}
-    return [replace(of_equal_length(found, path, meta=meta), rates=told)]
+    return [tree.table(found, path, dot="." if matlab else "/", meta=meta)]
 
 
-def _data_sets(tree: Any, budget: Budget) -> Iterator[tuple[str, Any]]:
-    """Return every data set once, in the order of names.
+class _Tree:
+    """Makes a plain tree of the groups of a file.
 
-    Only hard links are followed, which cannot leave the file; they can lead round in circles.
+    Parameters
+    ----------
+    path : path
+        The name to give in errors.
+    matlab : bool
+        Whether MATLAB wrote it: text are numbers then, and struct arrays and cells are references.
     """
-    import h5py
 
-    seen: set[int] = set()
-    waiting: list[tuple[str, Any, bytes, int]] = [("", tree.id, b".", 0)]
-    while waiting:
-        place, parent, name, at = waiting.pop()
-        if at in seen:
-            continue
-        seen.add(at)
-        node = h5py.h5o.open(parent, name)
-        if isinstance(node, h5py.h5d.DatasetID):
-            yield place, h5py.Dataset(node)
-        elif isinstance(node, h5py.h5g.GroupID):
-            budget.parts(node.get_num_objs())
-            budget.depth(place.count("/") + bool(place))
-            names: list[bytes] = []
-            node.links.iterate(names.append)
-            for name in reversed(names):
-                hidden = not place and name.startswith(b"#")  # what MATLAB refers to
-                link = node.links.get_info(name)
-                if not hidden and link.type == h5py.h5l.TYPE_HARD:
-                    below = (f"{place}/" if place else "") + name.decode("utf-8", "replace")
-                    budget.place(below)
-                    waiting.append((below, node, name, link.u))
+    def __init__(self, path: Path, matlab: bool) -> None:
+        self._path = path
+        self._matlab = matlab
+        self._seen: set[int] = set()
+
+    def group(self, group: Any, names: list[str]) -> dict[str, Node]:
+        """Return what hard links lead to, each once: they can lead round in circles."""
+        import h5py
+
+        self._seen.add(h5py.h5o.get_info(group.id).addr)
+        found: dict[str, Node] = {}
+        units: dict[str, Node] = {}
+        for name in names:
+            link = group.get(name, getlink=True)
+            if isinstance(link, h5py.ExternalLink):
+                found[name] = Unread("it is in another file")
+            if not isinstance(link, h5py.HardLink):
+                continue  # a soft link leads to what is read under its own name, or out of the file
+            item = group[name]
+            at = h5py.h5o.get_info(item.id).addr
+            if at in self._seen:
+                continue
+            self._seen.add(at)
+            found[name] = self._node(item)
+            for attribute in ("unit", "units"):
+                if isinstance(unit := _attribute(item, attribute), str) and unit:
+                    units[name] = unit
+        return found | {ATTRIBUTES: units}
+
+    def _node(self, item: Any) -> Node:
+        import h5py
+
+        if isinstance(item, h5py.Dataset):
+            return self._values(item)
+        if not isinstance(item, h5py.Group):
+            return ""  # a type that has a name
+        if self._matlab and "MATLAB_sparse" in item.attrs:
+            return Unread("a sparse matrix")
+        found = self.group(item, list(item))
+        # a struct array has references in its fields, which unlike those of cells have no class
+        arrays = [
+            name
+            for name, node in found.items()
+            if isinstance(node, list) and "MATLAB_class" not in item[name].attrs
+        ]
+        if not self._matlab or not arrays:
+            return found
+        columns: list[Any] = [found[name] for name in arrays]
+        return [dict(zip(arrays, each, strict=True)) for each in zip(*columns, strict=True)]
+
+    def _values(self, data: Any) -> Node:
+        """Return the samples of a data set, or its text, or what its references lead to."""
+        import h5py
+
+        if data.is_virtual or data.external:  # asking for its shape would open other files
+            raise DataError(
+                f"data set {data.name.strip('/')!r} has its samples in another file",
+                file=self._path,
+                remedy="save all samples in this file",
+            )
+        kind = _attribute(data, "MATLAB_class") if self._matlab else None
+        if data.shape is None or "MATLAB_empty" in data.attrs:
+            return ""
+        if kind is not None and "MATLAB_object_decode" in data.attrs:
+            return Unread(f"an object of class {kind}")
+        if data.size > MOST_SAMPLES:
+            return Unread(f"{data.size} samples, more than {MOST_SAMPLES}")
+        if h5py.check_string_dtype(data.dtype) is not None:
+            text = data.asstr("utf-8", "replace")[()]
+            return text if isinstance(text, str) else [str(each) for each in text.reshape(-1)]
+        if self._matlab and h5py.check_ref_dtype(data.dtype) is h5py.Reference:
+            columns = data[()] if min(data.shape, default=0) > 1 else data[()].reshape(1, -1)
+            cells = [[self._node(data.file[at]) if at else "" for at in each] for each in columns]
+            return cells if len(cells) > 1 else cells[0]
+        if kind == "char":
+            lines = [row.astype("<u2").tobytes() for row in np.atleast_2d(data[()].T)]
+            texts = [line.decode("utf-16-le", "replace") for line in lines]
+            return texts[0] if len(texts) == 1 else texts
+        return _fields(np.asarray(data[()]))
 
 
-def _refuse_elsewhere(place: str, data: Any, path: Path) -> None:
-    """Refuse a data set that is made of other files; its shape is not asked, that opens them."""
-    if data.is_virtual or data.external:
-        raise DataError(
-            f"data set {place!r} keeps its samples in another file",
-            file=path,
-            remedy="save all samples in this file",
+def _fields(samples: NDArray[Any]) -> Node:
+    """Return samples, those of a table as one array a field."""
+    names = samples.dtype.names
+    if names is None:
+        if samples.dtype.kind == "S":
+            return [each.decode("utf-8", "replace") for each in samples.reshape(-1)]
+        return (
+            Unread("objects, or lists of several lengths") if samples.dtype.hasobject else samples
         )
+    if names == ("real", "imag"):
+        return Unread("complex numbers")
+    return {name: _fields(samples[name]) for name in names}
 
 
-def _samples(place: str, data: Any, file: BufferedReader, path: Path) -> np.ndarray[Any, Any]:
-    """Return samples that take just the room that their shape says: HDF5 reads on past their end.
-
-    What is in chunks is unpacked here, since HDF5 would make room for all that comes out.
-    """
-    import h5py
-    from h5py import h5d
-
-    def refuse(problem: str) -> NoReturn:
-        raise DataError(
-            f"data set {place!r} {problem}",
-            file=path,
-            remedy="save it with gzip or without compression",
-        )
-
-    about, kind, shape = data.id.get_create_plist(), data.id.get_type(), data.chunks
-    size = kind.get_size()
-    if shape is None:
-        kept = about.get_layout() == h5d.COMPACT or data.id.get_offset() is not None
-        if kept and data.id.get_storage_size() < data.size * size:
-            refuse("has fewer samples than it says")
-        return np.asarray(data[()])
-    described = [about.get_filter(i) for i in range(about.get_nfilters())]
-    filters = [(number, values) for number, _, values, _ in described]
-    numbers = {number for number, _ in filters}
-    known = numbers <= {DEFLATE, SHUFFLE, FLETCHER32} and len(numbers) == len(filters)
-    if not known or any(one == SHUFFLE and values != (size,) for one, values in filters):
-        names = ", ".join(name.decode("ascii", "replace") for *_, name in described)
-        refuse(f"is packed by {names}: only deflate, shuffle and fletcher32 are read, each once")
-    room = math.prod(shape) * size
-    places = math.prod(-(-n // step) for n, step in zip(data.shape, shape, strict=True))
-    if data.id.get_num_chunks() > places:
-        refuse("has more chunks than it says")
-    chunks: list[Any] = []
-    data.id.chunk_iter(chunks.append)
-    offsets = {chunk.chunk_offset for chunk in chunks}
-    if len(offsets) < len(chunks) or any(any(map(ge, at, data.shape)) for at in offsets):
-        refuse("has more chunks than it says")
-    if not filters and all(chunk.size == room for chunk in chunks):
-        return np.asarray(data[()])  # nothing is packed, and HDF5 finds it fastest
-    # older libraries do not count what stands before HDF5 in a file, as MATLAB's header
-    placed = data.file.userblock_size == 0 or h5py.version.hdf5_version_tuple >= (2, 0, 0)
-    samples, dtype = None, data.dtype
-    if h5py.h5t.py_create(dtype, logical=True) == kind:  # else HDF5 converts them
-        samples = np.full(data.shape, data.fillvalue, dtype)
-    for chunk in chunks:
-        content = None
-        if chunk.size <= room + room // 8 + 1024:
-            used = [one for i, one in enumerate(filters) if not chunk.filter_mask >> i & 1]
-            if placed and samples is not None:  # which takes a tenth of the time
-                file.seek(chunk.byte_offset)
-                packed = file.read(chunk.size)
-            else:
-                packed = data.id.read_direct_chunk(chunk.chunk_offset)[1]
-            content = unpacked(packed, used, room)
-        if content is None:
-            refuse("is packed more or less closely than it says")
-        if samples is not None:
-            block = np.frombuffer(content, dtype).reshape(shape)
-            of = tuple(map(slice, chunk.chunk_offset, map(add, chunk.chunk_offset, shape)))
-            left = samples[of].shape  # of a chunk at the end
-            samples[of] = block[tuple(map(slice, left))]
-    return np.asarray(data[()]) if samples is None else samples
-
-
-def _is_text(data: Any) -> bool:
-    return _text(data, "MATLAB_class") in ("char", "cell", "struct")
-
-
-def _text(item: Any, name: str) -> str | None:
-    plain = _plain(item, name)
-    return plain if isinstance(plain, str) else None
-
-
-def _plain(item: Any, name: str) -> str | float | int | bool | None:
+def _attribute(item: Any, name: str) -> str | float | int | bool | None:
     """Return an attribute as JSON holds it, or None where it does not or there is none."""
-    import h5py
-
-    if name not in item.attrs:
+    try:
+        value = item.attrs.get(name)
+    except TypeError:  # NumPy has no such type
         return None
-    about = h5py.h5a.open(item.id, name.encode("utf-8", "surrogateescape"))
-    scalar = about.get_space().get_simple_extent_npoints() == 1
-    kinds = (h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING, h5py.h5t.ENUM)
-    if not scalar or about.get_type().get_class() not in kinds:
-        return None
-    if about.get_storage_size() > MOST_TEXT:
-        return None
-    value = item.attrs[name]
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.reshape(-1)[0]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, bytes):
         value = value.decode("utf-8", "replace")
-    if isinstance(value, float) and not np.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         return None
     if isinstance(value, str) and len(value) > MOST_TEXT:
         return None

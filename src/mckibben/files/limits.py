@@ -31,12 +31,6 @@ MOST_PARTS = 10_000
 MOST_PIECES = 500_000
 """Stretches in which the samples of the columns lie scattered over a file, one read for each."""
 
-MOST_DEPTH = 32
-"""Groups, structs or cells within each other."""
-
-LONGEST_PLACE = 4096
-"""Characters of a place in a file: names of parts within each other."""
-
 MOST_TEXT = 2**16
 """Characters of a text about the recording, such as a unit; longer ones are left out."""
 
@@ -98,22 +92,4 @@ class Budget:
                 f"its samples lie scattered in more than {MOST_PIECES} places",
                 file=self._path,
                 remedy="defragment the file, or save each channel in one piece",
-            )
-
-    def depth(self, of: int) -> None:
-        """Refuse what is nested too deeply."""
-        if of > MOST_DEPTH:
-            raise DataError(
-                f"its parts are nested more than {MOST_DEPTH} deep",
-                file=self._path,
-                remedy="save each channel as a vector of its own",
-            )
-
-    def place(self, of: str) -> None:
-        """Refuse places of names without end."""
-        if len(of) > LONGEST_PLACE:
-            raise DataError(
-                f"names of its parts have more than {LONGEST_PLACE} characters",
-                file=self._path,
-                remedy="give shorter names",
             )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +16,7 @@ from mckibben.errors import DataError
 
 if TYPE_CHECKING:
     from mckibben.excitation import Gap
+    from mckibben.files.choosing import Seen
     from mckibben.recording import Recording
 
 
@@ -38,12 +41,33 @@ def info(
         _models(as_json)
     elif not files:
         raise DataError("there is nothing to tell about", remedy="give a file, or --models")
-    elif len(files) == 1 and files[0].suffix.lower() == ".json":
+    elif len(files) == 1 and files[0].suffix.lower() == ".json" and not _is_columns(files[0]):
         _model(files[0], as_json)
     else:
         named = [*(inputs or ()), *(outputs or ())] or None
         recordings = reading.read(files, named, informative=False)
-        _recordings(recordings, _untold(recordings, inputs, outputs, model), as_json)
+        columns = {str(file): _columns(file, reading) for file in files if file.is_file()}
+        gaps = _untold(recordings, inputs, outputs, model)
+        _recordings(recordings, columns, gaps, as_json)
+
+
+def _is_columns(file: Path) -> bool:
+    """Tell whether a JSON file holds columns of samples rather than a model."""
+    from mckibben.files import columns_of
+
+    try:
+        return bool(columns_of(file))
+    except DataError:
+        return False
+
+
+def _columns(file: Path, reading: Reading) -> list[Seen]:
+    """Return the columns of a file, and the channel that each is read as."""
+    from mckibben.files import columns_of
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # issued when its recordings were read
+        return columns_of(file, **reading.options())
 
 
 def _models(as_json: bool) -> None:
@@ -106,7 +130,14 @@ def _untold(
         return str(error)
 
 
-def _recordings(recordings: list[Recording], gaps: tuple[Gap, ...] | str, as_json: bool) -> None:
+def _recordings(
+    recordings: list[Recording],
+    columns: dict[str, list[Seen]],
+    gaps: tuple[Gap, ...] | str,
+    as_json: bool,
+) -> None:
+    from mckibben.files.condition import condition
+
     described: list[dict[str, Any]] = [
         {
             "name": recording.name,
@@ -118,24 +149,41 @@ def _recordings(recordings: list[Recording], gaps: tuple[Gap, ...] | str, as_jso
                     "unit": recording.units[name],
                     "min": float(samples.min()),
                     "max": float(samples.max()),
+                    **asdict(condition(samples)),
                 }
                 for name, samples in recording.channels.items()
             },
+            "lag_samples": _lag(recording),
             "meta": recording.known,
         }
         for recording in recordings
     ]
     if as_json:
         told = gaps if isinstance(gaps, str) else [gap.to_dict() for gap in gaps]
-        print_json({"recordings": described, "untold": told})
+        files = {file: [asdict(column) for column in found] for file, found in columns.items()}
+        print_json({"files": files, "recordings": described, "untold": told})
         return
-    for recording in recordings:
-        say(str(recording))
+    for file, found in columns.items():
+        say(file)
         rows = [
-            [name, recording.units[name] or "-", f"{s.min():.6g}", f"{s.max():.6g}"]
-            for name, s in recording.channels.items()
+            [one.header, one.unit or "-", ", ".join(one.first), one.channel or "-"] for one in found
         ]
-        print_table(["channel", "unit", "lowest", "highest"], rows)
+        print_table(["column", "unit", "first cells", "read as"], rows)
+    for recording, about in zip(recordings, described, strict=True):
+        say(repr(recording))
+        rows = [
+            [
+                name,
+                one["unit"] or "-",
+                *(f"{one[end]:.6g}" for end in ("min", "max")),
+                f"{100 * one['saturated']:.3g} %",
+                str(one["stuck"]),
+            ]
+            for name, one in about["channels"].items()
+        ]
+        print_table(["channel", "unit", "lowest", "highest", "at a limit", "stuck samples"], rows)
+        if about["lag_samples"] is not None:
+            say(f"Lag of the output on the input: {about['lag_samples']} samples")
         for note in recording.notes:
             say(f"Note: {note}")
     say()
@@ -147,3 +195,14 @@ def _recordings(recordings: list[Recording], gaps: tuple[Gap, ...] | str, as_jso
     )
     for gap in gaps:
         say(f"- {gap}")
+
+
+def _lag(recording: Recording) -> int | None:
+    """Return the lag of the one channel that pressure or voltage moves, None of several."""
+    from mckibben.files.condition import DRIVEN, lag
+
+    inputs = [name for name in recording.channels if name.startswith(("pressure", "voltage"))]
+    outputs = [name for name in recording.channels if name.partition("_")[0] in DRIVEN]
+    if len(inputs) != 1 or len(outputs) != 1:
+        return None
+    return lag(recording, inputs[0], outputs[0])

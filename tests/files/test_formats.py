@@ -565,3 +565,12 @@ def test_pickles_in_files_are_not_loaded(tmp_path: Path) -> None:
     for name in ("a.parquet", "a.h5"):
         assert tables(tmp_path / name)[0].columns[0].values == pytest.approx(P)
     assert not CALLS
+
+
+def test_packed_numbers_of_hdf5_are_unpacked(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        packed = file.create_dataset("displacement_mm", data=np.rint((X + 3) / 0.002).astype("i2"))
+        packed.attrs.update(scale_factor=0.002, add_offset=-3.0)
+        file["pressure_kPa"] = P
+    (table,) = tables(tmp_path / "a.h5")
+    assert table.columns[0].values == pytest.approx(X, abs=0.002)

@@ -219,6 +219,8 @@ def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column
             named[channel] = column
     order = {id(column): place for place, column in enumerate(table.columns)}
     named = dict(sorted(named.items(), key=lambda item: order.get(id(item[1]), len(order))))
+    if "time" not in named and not table.own and not table.has_clocks:
+        named, left_out = _with_time(named, left_out, table, path)
     renamed = {} if table.own else _by_units(named, request)
     said = [f"{named[name].header!r} as {channel}" for name, channel in renamed.items()]
     named = {renamed.get(channel, channel): column for channel, column in named.items()}
@@ -349,6 +351,37 @@ def _described(table: Table, request: Request, path: Path) -> dict[str, Column]:
     return found
 
 
+def _with_time(
+    named: dict[str, Column], left_out: dict[str, str], table: Table, path: Path
+) -> tuple[dict[str, Column], dict[str, str]]:
+    """Return columns with the one that can only be the time: in seconds, or of dates, and rising."""
+    found = [name for name, column in named.items() if _rises(column)]
+    if len(found) == 1:
+        return {"time" if name == found[0] else name: c for name, c in named.items()}, left_out
+    dates = [
+        c for c in table.columns if c.values is None and c.texts and _are_dates(c, table, path)
+    ]
+    if len(dates) != 1:
+        return named, left_out
+    rest = {header: why for header, why in left_out.items() if header != dates[0].header}
+    return {"time": dates[0]} | named, rest
+
+
+def _rises(column: Column) -> bool:
+    unit = find(column.unit or parse(column.label).unit or "")
+    seconds = unit is not None and unit.target == "s"
+    return seconds and column.values is not None and bool(np.all(np.diff(column.values) > 0))
+
+
+def _are_dates(column: Column, table: Table, path: Path) -> bool:
+    if not instants.may_be_instant(column.texts[0]):
+        return False
+    try:
+        return bool(np.all(np.diff(instants.seconds(column.texts, table, path)) >= 0))
+    except DataError:
+        return False
+
+
 def _by_units(named: Mapping[str, Column], request: Request) -> dict[str, str]:
     """Return the channels of columns without a known name, such as u1, by their units.
 
@@ -409,7 +442,7 @@ def _converted(
     if final != unit.name:
         notes.converted.append(f"{channel} from {unit.name} to {final}")
     if not table.own or channel in request.units or calibrated:
-        if not table.own and unit_of(channel) is not None:
+        if not table.own:
             samples = quality.without_codes(channel, samples, raw, table, path)
         quality.refuse_impossible(channel, samples, unit_of(channel), unit.name, table, path)
         if not table.own and unit_of(channel) is not None:
@@ -477,7 +510,7 @@ def _unit(
     if text is None:
         text = _stated(channel, column, table, request, path)
     if text is None:
-        return _assumed(channel, values, notes)
+        return _assumed(channel, values, path, notes)
     if (
         table.own
         and channel not in request.units
@@ -540,16 +573,26 @@ def _stated(channel: str, column: Column, table: Table, request: Request, path: 
     return list(texts.values())[-1] if texts else None
 
 
-def _assumed(channel: str, values: Array, notes: _Notes) -> Unit:
+def _assumed(channel: str, values: Array, path: Path, notes: _Notes) -> Unit:
+    """Return the package's unit; `DataError` of a size that is a common one in another unit."""
     expected = unit_of(channel)
     if expected is None:
         return Unit("", "")
+    finite = np.abs(values[np.isfinite(values)])
+    largest = float(finite.max()) if finite.size else 0.0
+    if 0 < largest < quality.DOUBTFUL.get(expected, 0.0):
+        fitting = quality.fitting_units(largest, expected, expected)[0]
+        raise DataError(
+            f"it has no unit, and reaches {largest:.3g}: is it in {fitting}?",
+            file=path,
+            channel=channel,
+            remedy=f"name its unit, as in --unit {channel}={fitting}, or --unit {channel}={expected} "
+            "where that is right",
+        )
     if expected:
         notes.assumed.append(f"{channel} in {expected}")
-    elif np.any(np.abs(values) > 1.5):
-        notes.assumed.append(
-            f"{channel} in parts of one (up to {np.nanmax(np.abs(values)):.3g}: is it in %?)"
-        )
+    elif largest > 1.5:
+        notes.assumed.append(f"{channel} in parts of one (up to {largest:.3g}: is it in %?)")
     return Unit(expected, expected)
 
 
@@ -565,6 +608,14 @@ def _time(
     values = _numbers("time", column, table, path)
     stated = request.units.get("time") or _stated("time", column, table, request, path)
     unit = None if stated else timebase.unit_by_size(values, table, path)
+    if not stated and unit is None and timebase.counts(values):
+        raise DataError(
+            "it has no unit and counts in whole numbers: is it in ms?",
+            file=path,
+            channel="time",
+            row=table.row(0),
+            remedy="name its unit, as in --unit time=ms, or --unit time=s where that is right",
+        )
     if unit is None:
         unit = _unit("time", column, values, table, request, path, notes).name
     else:

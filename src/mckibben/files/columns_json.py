@@ -23,7 +23,11 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         names = dict.fromkeys(name for record in content for name in record)
         content = {name: [record.get(name) for record in content] for name in names}
     said = content.get("format") if isinstance(content, dict) else None  # models and jobs have one
-    found = content.get("columns", content) if isinstance(content, dict) else None
+    if isinstance(content, dict) and isinstance(content.get("meta"), dict):
+        content = content["meta"] | content
+    found = content
+    for name in ("columns", "data"):
+        found = content.get(name, found) if isinstance(content, dict) else None
     if said is not None or not isinstance(found, dict):
         what = "without columns" if said is None else f"of format {said!r:.40}"
         raise DataError(

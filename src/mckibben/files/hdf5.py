@@ -134,7 +134,23 @@ class _Tree:
             lines = [row.astype("<u2").tobytes() for row in np.atleast_2d(data[()].T)]
             texts = [line.decode("utf-16-le", "replace") for line in lines]
             return texts[0] if len(texts) == 1 else texts
-        return _fields(np.asarray(data[()]))
+        return _scaled(data, _fields(np.asarray(data[()])))
+
+
+def _scaled(data: Any, samples: Node) -> Node:
+    """Return samples in the unit that is stated, where the file has packed numbers.
+
+    By "NetCDF Climate and Forecast Metadata Conventions", 8.1: scale_factor, add_offset.
+    """
+    gain, offset = (_attribute(data, name) for name in ("scale_factor", "add_offset"))
+    if not isinstance(samples, np.ndarray) or samples.dtype.kind not in "iuf":
+        return samples
+    if gain is None and offset is None:
+        return samples
+    if isinstance(gain, str) or isinstance(offset, str):
+        return Unread("a scale_factor or add_offset that is no number")
+    unpacked: NDArray[Any] = samples * float(1.0 if gain is None else gain) + float(offset or 0.0)
+    return unpacked
 
 
 def _fields(samples: NDArray[Any]) -> Node:

@@ -36,6 +36,9 @@ POSSIBLE: dict[str, tuple[float, float]] = {
 SMALLEST_BAR, ZERO_BAR = 1e-7, 1e-12
 """A pressure whose largest value lies between these [bar] is in another unit, not the rounding of 0."""
 
+DOUBTFUL = {"bar": 0.6, "mm": 0.5}
+"""Package unit -> size below which a channel without a unit may well be in another."""
+
 TYPICAL = {"bar": 5.0, "mm": 30.0, "N": 300.0, "s": 1.7e9, "rad": 1.0, "V": 5.0, "mm/s": 100.0}
 """Package unit -> common size of measurements, by which another unit is proposed (times: since 1970)."""
 

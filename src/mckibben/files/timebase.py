@@ -186,6 +186,13 @@ def unit_by_size(time: Array, table: Table, path: Path) -> str | None:
     return None
 
 
+def counts(time: Array) -> bool:
+    """Tell whether times are whole numbers that step by one or more, as counters do."""
+    finite = time[np.isfinite(time)]
+    whole = finite.size > 1 and np.array_equal(finite, np.rint(finite))
+    return bool(whole and np.median(np.diff(finite)) >= 1)
+
+
 def gaps(time: Array) -> NDArray[np.intp]:
     """Return the samples, from 0, that come after a gap."""
     steps = np.diff(time)

@@ -3,41 +3,28 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from mckibben.files.units import find, find_listed
+from mckibben.files.names import CHANNELS, ROLES, words_of
+from mckibben.files.units import COUNTS, GAUGE, MASSES, find, find_listed
 from mckibben.recording import standard_unit
 
-ALIASES: dict[str, str] = {
-    "time": "t time timestamp time_stamp datetime elapsed elapsed_time zeit",
-    "pressure": "p press pressure druck",
-    "voltage": "u voltage valve_voltage command_voltage spannung",
-    "displacement": "disp displacement pos position stroke shortening weg hub",
-    "length": "l length länge laenge",
-    "contraction": "contraction contraction_ratio kontraktion",
-    "force": "f force load kraft",
-    "velocity": "velocity vel speed geschwindigkeit",
-    "angle": "angle theta winkel",
-    "temperature": "temperature temp temperatur",
-}
-"""Standard channel -> the names that people give it, in lower snake case."""
-
-ROLES: dict[str, str] = {
-    "reference": "reference ref setpoint desired target sollwert",
-    "command": "command commanded cmd",
-}
-"""What a loop is told and what it sends -> the words for it beside, or instead of, a channel's name."""
-
 QUANTITIES = {"mm": "displacement", "N": "force", "bar": "pressure", "V": "voltage", "rad": "angle"}
-"""Unit -> the channel of what has no telling name."""
+"""Unit -> the channel of what has no name of a channel."""
 
-_ROLES = {word: role for role, words in ROLES.items() for word in words.split()}
-_CHANNELS = {alias: channel for channel, names in ALIASES.items() for alias in names.split()}
-_NUMBERED = {alias for alias in _CHANNELS if len(alias) > 1} | {"p"}
+LONGEST = 256
+"""Characters of a header."""
+
+_ROLES, _CHANNELS = words_of(ROLES), words_of(CHANNELS)
+_ATTACHED = re.compile("|".join(w for w in sorted(_ROLES, key=len, reverse=True) if w > "\u3000"))
+"""Words for the ends of a loop that languages without blanks put before the channel: 目標圧力."""
 _EXTENSOR = {"extensor", "ext"}
+_ABOUT = {"variance", "var", "covariance", "std", "stddev", "status", "valid", "flag", "count"}
+"""Words for properties of a channel that are not in its unit: ``pressure_variance``."""
 _DOUBTFUL = {"in", "min", "rev", "turn"}
 """Endings that are units only where the channel suits: ``pressure_in`` is that of an inlet."""
 _LETTERS = {"m", "s", "N", "V"}
@@ -46,10 +33,11 @@ _SYMBOLS = {
     *("bar", "mbar", "Pa", "hPa", "kPa", "MPa", "psi", "mm", "cm", "m", "um", "N", "kN", "mN"),
     *("s", "ms", "us", "deg", "rad", "mrad", "V", "mV", "mA", "Hz"),
 }
-"""Words that are a part of a unit where another one follows: ``torque_N_m``, ``q_deg_s``."""
+"""Words that are a part of a unit where another one follows: ``stiffness_N_mm``, ``rate_bar_s``."""
 _AMOUNTS = {"l", "L", "ml", "g", "kg"}
 """What flows in a time, where it is no name: ``flow_l_s``, but ``muscle_l_mm``."""
-_GAUGE_ENDINGS = {"barg", "bara", "psig", "psia"}
+_MASSES = {spelling for spellings in MASSES.values() for spelling in spellings}
+_TARGETS = {"torque": "N*m"}
 
 _BRACKETED = re.compile(r"(?P<name>.*?)[\s_,/]*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]")
 _IN = re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)")  # Kraft in N
@@ -59,18 +47,17 @@ _COMPOSITE = re.compile(  # speed mm/s, flow_l/min
 _OVER = re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*\(?(?P<unit>[^()]*)\)?")  # length/mm
 _ENDINGS = (
     re.compile(r"(?P<name>.*[^\s_])[\s_]*(?P<unit>%|°C|°F|°)"),  # contraction_%, angle°
-    re.compile(r"(?P<name>.*[^\s_])[\s_]+(?P<unit>[^\s_]+_s)"),  # velocity_mm_s
+    re.compile(  # pressure kPa abs
+        r"(?P<name>.*[^\s_,])[\s_,]+(?P<unit>[A-Za-z]+[\s_]\(?(?:gauge|absolute|abs)\)?)", re.I
+    ),
+    re.compile(r"(?P<name>.*[^\s_])[\s_]+(?P<unit>[^\s_]+_[sm])"),  # velocity_mm_s, torque_N_m
     re.compile(r"(?P<name>.*[^\s_,.:;-])[\s_,.:;-]+(?P<unit>[^\s_,.:;-]+)"),  # force_N, Druck, bar
 )
 
 
-LONGEST = 256
-"""Characters of a header."""
-
-
 @dataclass(frozen=True)
 class Header:
-    """What a header says: ``name`` without the unit, and the unit's text or None."""
+    """The parts of a header: ``name`` without the unit, and the unit's text or None."""
 
     name: str
     unit: str | None
@@ -84,13 +71,20 @@ def parse(text: str) -> Header:
     (Header(name='Pressure', unit='kPa'), Header(name='length', unit='mm'))
     >>> parse("valve_voltage_V"), parse("pressure_in")
     (Header(name='valve_voltage', unit='V'), Header(name='pressure_in', unit=None))
+    >>> parse("current (2)")
+    Header(name='current 2', unit=None)
     """
-    text = " ".join(text.split())
+    text = " ".join(_plain(text).split())
     if len(text) > LONGEST:  # the forms below take time by the square of the length
         return Header(text, None)
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
-        return Header(bracketed["name"], bracketed["unit"].strip())
+        name, unit = bracketed["name"], bracketed["unit"].strip()
+        pure = unit == "1" and _expected(name) == ""  # contraction [1]
+        if unit.isdecimal() and not pure:  # the second of several alike: pos (2)
+            inner = parse(name)
+            return Header(f"{inner.name} {unit}", inner.unit)
+        return Header(name, unit)
     over = _OVER.fullmatch(text)
     named = over is not None and _names(_last(over["name"]), over["unit"])
     for form in (_IN, *(() if named else (_COMPOSITE,))):
@@ -119,11 +113,14 @@ def channel_of(header: Header) -> str:
     standard = _standard(name)
     if standard is None and (of_loop := _of_loop(name, header)) is not None:
         return of_loop
+    if standard is None and unit_of(name) is not None and name.rpartition("_")[2] in _ABOUT:
+        rest, _, about = name.rpartition("_")
+        return f"{about}_of_{rest}"
     if standard is None or header.unit is None:
         return standard or name
     unit = find(header.unit)
     base = standard.partition("_")[0]
-    if unit is None or unit.target == unit_of(base):
+    if unit is None or unit.target == _TARGETS.get(base, unit_of(base)):
         return standard
     if base == "contraction" and unit.target == "mm":
         return standard.replace("contraction", "displacement")
@@ -133,14 +130,15 @@ def channel_of(header: Header) -> str:
 
 
 def _of_loop(name: str, header: Header) -> str | None:
-    """Return the channel of a loop's reference or command, or None: a pressure wished for is sent.
+    """Return the channel of a loop's reference or command, or None: a desired pressure is sent.
 
     >>> channel_of(parse("desired position [mm]")), channel_of(parse("ref_mm"))
     ('reference_displacement', 'reference_displacement')
-    >>> channel_of(parse("p_cmd_kPa")), channel_of(parse("setpoint"))
-    ('command_pressure', 'reference_displacement')
+    >>> channel_of(parse("p_cmd_kPa")), channel_of(parse("setpoint")), channel_of(parse("目標圧力"))
+    ('command_pressure', 'reference_displacement', 'command_pressure')
     """
-    words = name.replace("set_point", "setpoint").split("_")
+    name = _ATTACHED.sub(r"_\g<0>_", name.replace("set_point", "setpoint"))
+    words = [word for word in name.split("_") if word]
     roles = [_ROLES[word] for word in words if word in _ROLES]
     if len(roles) != 1:
         return None
@@ -161,7 +159,7 @@ def _of_loop(name: str, header: Header) -> str | None:
 
 
 def by_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return the channels of what has no telling name, such as u1, or output: by its unit and number.
+    """Return the channels of what has no name of a channel, such as u1, or output: by its unit and number.
 
     Parameters
     ----------
@@ -189,7 +187,23 @@ def snake_case(name: str) -> str:
     >>> snake_case("Valve Voltage"), snake_case("TipPosition-2")
     ('valve_voltage', 'tip_position_2')
     """
-    return "_".join(_words(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)))
+    return "_".join(_words(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", _plain(name))))
+
+
+def foreign_words(text: str) -> int:
+    """Return how many letters of words and units beyond ASCII a text has, as a measure of its encoding.
+
+    >>> foreign_words("Länge (µm)"), foreign_words("Lضnge (╡m)")
+    (6, 0)
+    """
+    text = _plain(text).casefold()
+    words = {word for word in (*_CHANNELS, *_ROLES, "°", "μ") if not word.isascii()}
+    return sum(text.count(word) * len(word) for word in words)
+
+
+def _plain(text: str) -> str:
+    """Return text with one sign for each of those that Unicode has in several widths and forms."""
+    return text if text.isascii() else unicodedata.normalize("NFKC", text.replace("º", "°"))
 
 
 def _words(text: str) -> list[str]:
@@ -206,21 +220,30 @@ def _standard(name: str) -> str | None:
         return _CHANNELS[name]
     without = name.rstrip("0123456789")
     alias, number = without.removesuffix("_"), name[len(without) :]
-    if number and alias in _NUMBERED:
+    if number and alias in _CHANNELS and (len(alias) > 1 or alias == "p" or not alias.isascii()):
         channel = _CHANNELS[alias]
         return None if channel == "time" else f"{channel}_{number}"
     return None
 
 
+def _expected(name: str) -> str | None:
+    """Return the unit of the package for what a header names, None where there is none."""
+    channel = _standard(snake_case(name)) or snake_case(name)
+    return _TARGETS.get(channel.partition("_")[0], unit_of(channel))
+
+
 def _is_unit(text: str, name: str) -> bool:
-    """Tell whether the ending of a header is a unit and no part of the name."""
+    """Return whether the ending of a header is a unit and no part of the name."""
     if text in ("-", "1", "none"):
         return False
-    unit = find_listed(text) or (find(text) if text.casefold() in _GAUGE_ENDINGS else None)
-    expected = unit_of(_standard(snake_case(name)) or snake_case(name))
-    if unit is None:  # force_n, valve_voltage_v
+    unit = find_listed(text) or (find(text) if GAUGE.fullmatch(text) else None)
+    expected = _expected(name)
+    if unit is None and (text.casefold() in COUNTS or text.casefold() == "nm"):
+        return expected is not None  # which the unit is has to be asked, instead of the usual one
+    if unit is None:  # load_kg, force_n, valve_voltage_v
         capital = find_listed(text.upper()) if len(text) == 1 else None
-        return capital is not None and capital.target == expected
+        fits = capital is not None and capital.target == expected
+        return fits or (expected == "N" and text in _MASSES)
     if unit.target == expected or (expected == "" and unit.target == "mm"):
         return True
     if text.casefold() in _DOUBTFUL or (len(text) == 1 and text.isalpha()):
@@ -233,7 +256,7 @@ def _last(name: str) -> str:
 
 
 def _names(word: str, unit: str) -> bool:
-    """Tell whether a word is the name of what has a unit: the l of ``muscle_l/mm`` is no litre."""
+    """Return whether a word names what has a unit: the l of ``muscle_l/mm`` is no litre."""
     channel, found = _CHANNELS.get(word.casefold()), find(unit)
     if found is not None and word.casefold() in _DOUBTFUL:  # pressure_in/bar, but speed_in/s
         return found.target != "s"
@@ -241,14 +264,14 @@ def _names(word: str, unit: str) -> bool:
 
 
 def _is_part(name: str, unit: str) -> bool:
-    """Tell whether what is before a stroke belongs to the unit, as in ``flow_Nl/min``, ``rate_1/s``."""
+    """Return whether what is before a stroke is of the unit, as in ``flow_Nl/min``, ``rate_1/s``."""
     word, found = _last(name), find(unit)
     timed = found is not None and found.target == "s"
     return word != name and (word in _SYMBOLS or (timed and (len(word) <= 4 or word.isdigit())))
 
 
 def _goes_on(name: str, unit: str) -> bool:
-    """Tell whether a unit is the last part of one, as in ``torque_N_m`` and ``q_deg_per_s``."""
+    """Return whether a unit is the last part of one, as in ``stiffness_N_mm`` and ``q_deg_per_s``."""
     word, found = _last(name), find(unit)
     if word == name or _names(word, unit):
         return False

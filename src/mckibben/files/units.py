@@ -7,6 +7,7 @@ reads everything that is not listed. It is only imported when there is something
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any, Literal
@@ -15,58 +16,41 @@ from mckibben.arrays import Array
 
 SPELLINGS: dict[str, dict[str, str]] = {
     "bar": {
-        "bar": "bar bars",
-        "mbar": "mbar",
-        "Pa": "Pa",
-        "hPa": "hPa",
-        "kPa": "kPa",
-        "MPa": "MPa",
-        "mPa": "mPa",
-        "psi": "psi lbf/in^2",
-        "atm": "atm",
-    },
+        "bar": "bar bars", "mbar": "mbar", "Pa": "Pa 帕", "hPa": "hPa", "kPa": "kPa 千帕",
+        "MPa": "MPa 兆帕", "mPa": "mPa", "psi": "psi lbf/in^2 lbf/in2", "atm": "atm"},
     "mm": {
-        "mm": "mm millimeter millimeters millimetre millimetres",
-        "cm": "cm",
-        "m": "m meter meters metre metres",
-        "um": "um micron microns",
-        "inch": "in inch inches",
-    },
+        "mm": "mm millimeter millimeters millimetre millimetres 毫米", "cm": "cm 厘米",
+        "m": "m meter meters metre metres", "inch": "in inch inches",
+        "um": "um micron microns micrometer micrometers 微米"},
     "N": {
-        "N": "N newton newtons",
-        "kN": "kN",
-        "mN": "mN",
-        "gf": "gf",
-        "kgf": "kgf kp",
-        "lbf": "lbf",
-    },
+        "N": "N newton newtons 牛", "kN": "kN", "mN": "mN", "gf": "gf", "kgf": "kgf kp", "lbf": "lbf"},
     "s": {
-        "s": "s sec secs second seconds",
-        "ms": "ms msec millisecond milliseconds",
-        "us": "us usec microsecond microseconds",
-        "ns": "ns nsec nanosecond nanoseconds",
-        "min": "min minute minutes",
-        "hour": "h hr hour hours",
-        "day": "day days",
-    },
+        "s": "s sec secs second seconds 秒 초", "ms": "ms msec millisecond milliseconds 毫秒",
+        "us": "us usec microsecond microseconds 微秒", "ns": "ns nsec nanosecond nanoseconds",
+        "min": "min minute minutes", "hour": "h hr hour hours", "day": "day days"},
     "rad": {
-        "rad": "rad radian radians",
-        "mrad": "mrad",
-        "deg": "° deg degs degree degrees",
-        "turn": "rev revolution revolutions turn turns",
-    },
+        "rad": "rad radian radians", "mrad": "mrad", "deg": "° deg degs degree degrees 度 도",
+        "turn": "rev revolution revolutions turn turns"},
     "V": {"V": "V volt volts", "mV": "mV"},
-    "mm/s": {
-        "mm/s": "mm/s mm_s mmps",
-        "cm/s": "cm/s cm_s",
-        "m/s": "m/s m_s mps",
-    },
+    "mm/s": {"mm/s": "mm/s mm_s mmps", "cm/s": "cm/s cm_s", "m/s": "m/s m_s mps"},
     "degC": {"degC": "°C degC C celsius", "K": "K kelvin", "degF": "°F degF fahrenheit"},
     "": {"": "- 1 none dimensionless mm/mm m/m", "percent": "% percent pct"},
-    "A": {"A": "A amp amps ampere", "mA": "mA"},
+    "A": {"A": "A amp amps ampere amperes", "mA": "mA"},
     "Hz": {"Hz": "Hz", "kHz": "kHz"},
-}
-"""Package unit -> unit as pint calls it -> spellings, separated by blanks."""
+    "N*m": {"N*m": "N*m N·m N-m N.m Nm N_m", "mN*m": "mN*m mN·m mNm", "N*mm": "N*mm N·mm Nmm"},
+    "rad/s": {
+        "rad/s": "rad/s rad_s", "deg/s": "deg/s deg_s °/s dps", "rpm": "rpm r/min rev/min U/min"},
+}  # fmt: skip
+"""Package unit -> unit as pint calls it -> spellings, separated by blanks; any of them is proposed."""
+
+RARE: dict[str, dict[str, str]] = {
+    "bar": {
+        "ksi": "ksi", "kgf/cm^2": "kgf/cm^2 kgf/cm2 kg/cm^2 kg/cm2", "torr": "Torr torr",
+        "mmHg": "mmHg", "inHg": "inHg", "cmH2O": "cmH2O", "inH2O": "inH2O"},
+    "mm": {"nm": "nm nanometer nanometers", "thou": "mil mils thou", "dm": "dm", "km": "km"},
+    "N": {"daN": "daN", "cN": "cN"},
+}  # fmt: skip
+"""The same for units that are understood and never proposed."""
 
 MASSES = {
     "gf": ("g", "gram", "grams"),
@@ -75,11 +59,18 @@ MASSES = {
 }
 """Unit of force -> those of the mass that hangs with it."""
 
-_GAUGE = re.compile(
+COUNTS = frozenset(
+    {"count", "counts", "cnt", "cts", "lsb", "lsbs", "ticks", "digits", "px", "pixel", "pixels"}
+)
+"""What converters and cameras count: no unit, and never that of a channel."""
+
+GAUGE = re.compile(
     r"(?P<unit>m?bar|[hkM]?Pa|psi)[\s_(\[]*(?P<kind>gauge|absolute|abs|g|a)[)\]]?", re.IGNORECASE
 )
 _WORD = r"[A-Za-zΩ°%]+(?:(?:\*\*|\^)?-?[1-3])?"
 _READABLE = re.compile(rf"{_WORD}(?:[*/· ]\(?{_WORD}\)?)*")
+_POWER = re.compile(r"(?<=[A-Za-z])(?=-?[1-3](?![\d.]))")
+_LOOK_ALIKES = str.maketrans({"º": "°", "µ": "u", "μ": "u", "⋅": "·", "∙": "·", "−": "-"})
 
 LONGEST = 40
 """Characters of a unit; what is longer is none."""
@@ -95,9 +86,9 @@ class Unit:
         As pint reads it.
     target : str or None
         The package's unit of that dimension; None where the package has none, so that the samples
-        are kept as they are.
+        are not converted.
     reference : {"gauge", "absolute"} or None
-        What a pressure is measured from, where the unit said so; no offset is ever removed.
+        What a pressure is measured from, where the unit states it; no offset is ever removed.
     """
 
     name: str
@@ -108,7 +99,8 @@ class Unit:
 def find_listed(text: str) -> Unit | None:
     """Return the unit of a spelling in `SPELLINGS`, or None; longer ones in any case.
 
-    Not where that would make a thousandth of a million: MN are no mN.
+    Not where that would make a thousandth of a million: MN are no mN. Nor where two would be meant:
+    NM may be newton metres or nanometres.
     """
     text = text.strip()
     if len(text) > LONGEST:
@@ -133,17 +125,18 @@ def find(text: str) -> Unit | None:
     text = _plain(text)
     if not text:
         return Unit("", "")
+    if text.casefold() in COUNTS:
+        return Unit("count", None)
     listed = find_listed(text)
     if listed is not None:
         return listed
-    gauge = _GAUGE.fullmatch(text)
-    if gauge:
-        unit = find_listed(gauge["unit"])
-        if unit is not None:
-            kind = "gauge" if gauge["kind"].casefold().startswith("g") else "absolute"
-            return Unit(unit.name, unit.target, "gauge" if kind == "gauge" else "absolute")
+    gauge = GAUGE.fullmatch(text)
+    unit = None if gauge is None else find_listed(gauge["unit"])
+    if gauge is not None and unit is not None:
+        kind = gauge["kind"].casefold()
+        return Unit(unit.name, unit.target, "gauge" if kind.startswith("g") else "absolute")
     # pint evaluates numbers, so only products of words with small exponents are handed to it.
-    return _ask_pint(text) if _READABLE.fullmatch(text) else None
+    return _ask_pint(_POWER.sub("^", text)) if _READABLE.fullmatch(text) else None
 
 
 def weight(text: str) -> str:
@@ -173,15 +166,16 @@ def convert(samples: Array, unit: str, target: str) -> Array:
 def _lookup() -> tuple[dict[str, Unit], dict[str, Unit]]:
     exact = {
         spelling: Unit(name, target)
-        for target, names in SPELLINGS.items()
+        for target, names in (*SPELLINGS.items(), *RARE.items())
         for name, spellings in names.items()
         for spelling in spellings.split(" ")
     }
-    folded: dict[str, Unit] = {}
+    folded: dict[str, Unit | None] = {}
     for spelling, unit in exact.items():
         if spelling != "mPa":  # "mpa" in a lower-case header is never the millipascal
-            folded[spelling.casefold()] = unit
-    return exact, folded
+            same = folded.get(spelling.casefold(), unit)
+            folded[spelling.casefold()] = unit if same == unit else None
+    return exact, {spelling: unit for spelling, unit in folded.items() if unit is not None}
 
 
 @cache
@@ -204,7 +198,7 @@ def _ask_pint(text: str) -> Unit | None:
     for target in SPELLINGS:
         if target == "Hz" and "hertz" not in str(unit):  # turns in a minute are no frequency
             continue
-        if target in ("", "rad"):  # pint takes angles for pure numbers; those in use are listed
+        if target in ("", "rad", "rad/s", "N*m"):  # angles are pure numbers to pint, joules torques
             continue
         if unit.dimensionality == registry.Unit(target).dimensionality:
             return Unit(str(unit), target)
@@ -213,6 +207,5 @@ def _ask_pint(text: str) -> Unit | None:
 
 def _plain(text: str) -> str:
     """Write the look-alikes of one sign in one way."""
-    for looks, is_ in (("µ", "u"), ("μ", "u"), ("º", "°"), ("℃", "°C"), ("℉", "°F")):
-        text = text.replace(looks, is_)
+    text = unicodedata.normalize("NFKC", text.replace("º", "°")).translate(_LOOK_ALIKES)
     return re.sub(r" ?([/*·]) ?", r"\1", " ".join(text.split()))

@@ -15,10 +15,11 @@ from mckibben.files.table import Table, printable
 from mckibben.system.ordinary import opened
 
 READERS: dict[str, str] = {
-    ".csv": "delimited",
-    ".tsv": "delimited",
-    ".txt": "delimited",
-    ".dat": "delimited",
+    ".csv": "text",
+    ".tsv": "text",
+    ".txt": "text",
+    ".dat": "text",
+    ".lvm": "lvm",
     ".parquet": "parquet",
     ".mat": "matlab",
     ".h5": "hdf5",

@@ -13,9 +13,9 @@ from mckibben.system import manifest, ordinary
 
 def description(path: Path) -> Path | None:
     """Return where the description of a text file lies; None for other formats."""
-    if READERS.get(path.suffix.casefold()) != "delimited":
+    if READERS.get(path.suffix.casefold()) != "text":
         return None
-    from mckibben.files.delimited import sidecar
+    from mckibben.files.text import sidecar
 
     return sidecar(path)
 

@@ -33,7 +33,7 @@ MOST_PARTS = 5000
 
 RECORDED = (
     *(".csv", ".tsv", ".txt", ".dat", ".parquet", ".mat", ".h5", ".hdf5", ".tdms", ".xlsx"),
-    *(".bag", ".mcap", ".db3"),
+    *(".lvm", ".bag", ".mcap", ".db3"),
 )
 """Endings of recordings' names."""
 

@@ -159,7 +159,7 @@ def _of_loop(name: str, header: Header) -> str | None:
 
 
 def by_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return the channels of what has no name of a channel, such as u1, or output: by its unit and number.
+    """Return the channels of what has no telling name, such as u1 or output, by its unit and number.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ def decoded(data: bytes, path: Path) -> bytes:
 
 
 def _foreign(data: bytes, path: Path) -> bytes:
-    """Decode text of other encodings than Unicode's: by which of them its header has words of `names`."""
+    """Decode text in no encoding of Unicode's: by that in which its header has words of `names`."""
     texts = {}
     for encoding in _ENCODINGS:
         try:

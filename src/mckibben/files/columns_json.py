@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files import rates
+from mckibben.files import timebase
 from mckibben.files.limits import MOST_TEXT
 from mckibben.files.table import Column, Flaw, Table
 
@@ -54,7 +54,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             remedy="give units by the names of columns",
         )
     single = {**content, **found}.items()
-    told = {name: float(one) for name, one in single if _is_number(one) and rates.is_one(name)}
+    told = {name: float(one) for name, one in single if _is_number(one) and timebase.is_rate(name)}
     meta = {
         name: one
         for name, one in single

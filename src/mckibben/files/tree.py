@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import rates
+from mckibben.files import timebase
 from mckibben.files.headers import channel_of, parse, unit_of
 from mckibben.files.notices import listed
 from mckibben.files.table import Column, Table, column, columns_of, is_matrix, of_equal_length
@@ -190,7 +190,7 @@ class _Walk:
         if node.size == 0:
             return False
         if not shape:
-            if number and rates.is_one(field):
+            if number and timebase.is_rate(field):
                 self.rates[place] = float(node.reshape(-1)[0])
             return False
         if not number:

@@ -15,7 +15,7 @@ import pytest
 import mckibben
 from mckibben import DataError
 from mckibben.files import formats
-from mckibben.files.folders import roles
+from mckibben.files.sources import roles
 from mckibben.files.table import Table
 
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.DataWarning")

@@ -12,7 +12,7 @@ import pytest
 import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files.channels import NAME
-from mckibben.files.folders import roles
+from mckibben.files.sources import roles
 
 N = 60
 T = np.arange(N) / 50

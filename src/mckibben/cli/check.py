@@ -28,7 +28,7 @@ def check(
     Recordings that the model was not fitted to tell most. A folder stands for all recordings in it.
     """
     from mckibben.blocks.core.saving import load
-    from mckibben.files.folders import expanded
+    from mckibben.files.sources import expanded
     from mckibben.outputs import Results
     from mckibben.recording import notes_by_file
     from mckibben.report.check_page import check_page

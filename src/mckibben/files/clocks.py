@@ -11,7 +11,6 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files.headers import unit_of
-from mckibben.files.limits import MOST_SAMPLES
 from mckibben.files.notices import warn
 from mckibben.files.request import Request
 from mckibben.files.table import Column
@@ -109,12 +108,6 @@ def _grid(needed: Mapping[str, Column], slowest: str, request: Request, path: Pa
     if request.rate is None:
         times = _times(needed[slowest])
         grid = times[(times >= start) & (times <= stop)]
-    elif (stop - start) * request.rate * len(needed) > MOST_SAMPLES:
-        raise DataError(
-            f"{request.rate:g} samples a second are more than {MOST_SAMPLES} in all",
-            file=path,
-            remedy="give a smaller --rate",
-        )
     else:
         grid = (
             start + np.arange(max(0, int((stop - start) * request.rate + 1e-6) + 1)) / request.rate

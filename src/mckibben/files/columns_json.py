@@ -12,8 +12,7 @@ import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files import timebase
-from mckibben.files.limits import MOST_TEXT
-from mckibben.files.table import Column, Flaw, Table
+from mckibben.files.table import MOST_TEXT, Column, Flaw, Table
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:

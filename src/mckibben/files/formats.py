@@ -10,9 +10,11 @@ from pathlib import Path
 from types import ModuleType
 
 from mckibben.errors import DataError, MckibbenError, TooLargeError
-from mckibben.files.limits import MOST_BYTES
 from mckibben.files.table import Table, printable
 from mckibben.system.ordinary import opened
+
+MOST_BYTES = 2**31
+"""Largest file that is read [bytes], unless another size is given."""
 
 READERS: dict[str, str] = {
     ".csv": "text",

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from mckibben.errors import DataError
 from mckibben.files import tree
-from mckibben.files.limits import MOST_SAMPLES, MOST_TEXT
-from mckibben.files.table import Table
+from mckibben.files.table import MOST_TEXT, Table
 from mckibben.files.tree import ATTRIBUTES, Node, Unread
 from mckibben.system.extras import demand
 
@@ -121,8 +120,6 @@ class _Tree:
             return ""
         if kind is not None and "MATLAB_object_decode" in data.attrs:
             return Unread(f"an object of class {kind}")
-        if data.size > MOST_SAMPLES:
-            return Unread(f"{data.size} samples, more than {MOST_SAMPLES}")
         if h5py.check_string_dtype(data.dtype) is not None:
             text = data.asstr("utf-8", "replace")[()]
             return text if isinstance(text, str) else [str(each) for each in text.reshape(-1)]

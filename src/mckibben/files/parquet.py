@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from mckibben.files import stored
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
-from mckibben.files.table import Column, Table, column, of_equal_length
+from mckibben.files.table import Column, Table, column
 from mckibben.recording import Recording
 from mckibben.system.atomic import replacing
 from mckibben.system.extras import demand
@@ -40,7 +39,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             unread[name] = f"a column of type {frame.schema.field(i).type}"
         else:
             columns[name if name not in columns else f"{name} ({i + 1})"] = found
-    return [replace(of_equal_length(columns, path, meta={}), unread=unread)]
+    return [Table(tuple(columns.values()), unread=unread)]
 
 
 def write(recording: Recording, path: Path) -> None:

@@ -1,10 +1,11 @@
-"""What one recording is on disk: a file, files with one signal each, or the folder of a bag."""
+"""What a path stands for: a file, files with one signal each, a bag's folder, or several recordings."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from io import BufferedReader
 from pathlib import Path
@@ -15,7 +16,7 @@ from mckibben.files.channels import NAME, described
 from mckibben.files.own import description
 from mckibben.files.request import Request
 from mckibben.files.table import Table
-from mckibben.system.ordinary import opened
+from mckibben.system.ordinary import DESCRIPTION, opened, read_text
 
 BAG = "metadata.yaml"
 """In the folder of a bag of ROS 2."""
@@ -57,6 +58,60 @@ def inside(path: Path) -> list[Path]:
     if len(firsts) == len(found) and not any(map(is_bag, found)) and signals.are_one(found, said):
         return [path]
     return list(firsts)
+
+
+def roles(folder: Path) -> dict[str, list[Path]]:
+    """Return the recordings of a folder by role, as its protocol.json has them, or all to train.
+
+    A folder that is one recording itself, as of files with one signal each, stands for that.
+
+    Raises
+    ------
+    DataError
+        If there are none, or it cannot be told which files are one.
+    """
+    protocol = folder / PROTOCOL
+    found = inside(folder)
+    if not os.path.lexists(protocol):
+        return {"train": found}
+    text = read_text(protocol, most=DESCRIPTION)
+    try:
+        given = {str(run["name"]): str(run["role"]) for run in json.loads(text)["runs"]}
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise DataError(
+            "its protocol.json is not readable", file=folder, remedy="repair or remove it"
+        ) from None
+    by_role: dict[str, list[Path]] = {}
+    for path in found:
+        by_role.setdefault(given.get(path.stem, "train"), []).append(path)
+    return by_role
+
+
+def expanded(
+    files: Sequence[Path], test: Sequence[Path]
+) -> tuple[list[Path], list[Path], list[Path]]:
+    """Return files to train, to validate and to test on, folders replaced by what is in them.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Files to train on; of folders, each recording has its own role.
+    test : sequence of Path
+        Files to test on; of folders, everything.
+
+    Raises
+    ------
+    DataError
+        On a folder without recordings.
+    """
+    found: dict[str, list[Path]] = {"train": [], "validation": [], "test": []}
+    for file in files:
+        for role, paths in (roles(file) if file.is_dir() else {"train": [file]}).items():
+            found.setdefault(role, []).extend(paths)
+    for file in test:
+        several = roles(file).values() if file.is_dir() else [[file]]
+        found["test"] += [path for paths in several for path in paths]
+    return found["train"], found["validation"], found["test"]
 
 
 def tables(path: Path, request: Request) -> tuple[list[Table], str]:

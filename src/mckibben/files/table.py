@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.files.headers import parse
 
+MOST_TEXT = 2**16
+"""Most characters of a text about the recording; longer ones are left out."""
+
 WIDEST = 64
 """Most columns of a matrix that are read as channels."""
 
@@ -212,11 +215,3 @@ def _plain_value(value: Any) -> Any:
     if isinstance(value, str):
         return plain(value)
     return [_plain_value(item) for item in value] if isinstance(value, list) else value
-
-
-def of_equal_length(
-    columns: Mapping[str, Column], path: Any, *, meta: Mapping[str, Any], name: str | None = None
-) -> Table:
-    """Return the table of columns by their places."""
-    del path
-    return Table(tuple(columns.values()), meta=meta, name=name)

@@ -15,8 +15,7 @@ import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files.headers import channel_of, parse
-from mckibben.files.limits import MOST_TEXT
-from mckibben.files.table import Column, Table, column
+from mckibben.files.table import MOST_TEXT, Column, Table, column
 from mckibben.system.extras import demand
 
 _NUMBERS = "biufmM"

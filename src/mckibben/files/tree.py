@@ -22,7 +22,7 @@ from mckibben.errors import DataError
 from mckibben.files import timebase
 from mckibben.files.headers import channel_of, parse, unit_of
 from mckibben.files.notices import listed
-from mckibben.files.table import Column, Table, column, columns_of, is_matrix, of_equal_length
+from mckibben.files.table import Column, Table, column, columns_of, is_matrix
 from mckibben.files.units import convert, find
 
 DATA = {"data", "samples", "signal", "value", "values", "y"}
@@ -128,11 +128,7 @@ def table(
     for place, lines in texts.items():
         if len(lines) in lengths:
             columns[place] = Column(place.rpartition(dot)[2], None, texts=lines)
-    if times:
-        found = Table(tuple(columns.values()), meta=meta or {})
-    else:
-        found = of_equal_length(columns, path, meta=meta or {})
-    return replace(found, rates=walk.rates, unread=unread)
+    return Table(tuple(columns.values()), meta=meta or {}, rates=walk.rates, unread=unread)
 
 
 class _Walk:

@@ -1,4 +1,4 @@
-"""Spreadsheets: one sheet, its cells as a text table, so that titles, units and headers are found alike."""
+"""Spreadsheets: a sheet as a text table, so that titles, units and headers are found alike."""
 
 from __future__ import annotations
 

@@ -561,7 +561,9 @@ def _stated(channel: str, column: Column, table: Table, request: Request, path: 
             stated = ({} if calibrated else stated) | {NAME: described.unit}
     texts = {place: text for place, text in stated.items() if text is not None}
     units = {place: find(text) for place, text in texts.items()}
-    kinds = {(unit.name, unit.reference) if unit else texts[place] for place, unit in units.items()}
+    kinds = {(unit.name, unit.reference) for unit in units.values() if unit}
+    if kinds:
+        texts = {place: text for place, text in texts.items() if units[place]}
     if len(kinds) > 1:
         said = ", ".join(f"{text!r} in {place}" for place, text in texts.items())
         raise DataError(

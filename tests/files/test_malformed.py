@@ -313,7 +313,7 @@ CASES: list[Case] = [
     # HDF5
     Case("empty.h5", hdf5()),
     Case("images.hdf5", hdf5(pressure=np.zeros((9, 9)))),
-    Case("huge.h5", hdf5(pressure_bar=(10**14,)), names="100000000000000"),
+    Case("huge.h5", hdf5(pressure_bar=(10**14,)), names="memory"),
     Case("unequal.h5", hdf5(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT[:20]), X),
     Case("wrong_sum.h5", wrong_sum),
     Case("cut_short.h5", cut_short),

@@ -38,6 +38,9 @@ READERS: dict[str, str] = {
 SOUGHT: tuple[str, ...] = tuple(ending for ending in READERS if ending != ".json")
 """Endings that a folder is searched for; descriptions and models are JSON too."""
 
+BOM, LABVIEW = b"\xef\xbb\xbf", b"LabVIEW Measurement"
+"""Beginnings of a text: the mark of UTF-8, and the name that LabVIEW writes, whatever the ending."""
+
 WRITERS: tuple[str, ...] = (".csv", ".tsv", ".parquet")
 """Endings whose module also has ``write(recording, path)``."""
 
@@ -81,6 +84,10 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     module = _reader(path)
     with _refusing(path):
         _refuse_impostor(file, path)
+        if READERS[path.suffix.casefold()] == "text" and file.peek(64).lstrip(BOM).startswith(
+            LABVIEW
+        ):
+            module = import_module("mckibben.files.lvm")
         return [printable(table) for table in module.read(file, path)]
 
 

@@ -263,7 +263,7 @@ def _excluded(at: Mask, known: Array) -> bool:
     return bool(
         inside.size
         and np.count_nonzero(inside) > inside.size / 2
-        and steps[edges].min() > JUMP * inside.max()
+        and steps[edges].min() / JUMP > inside.max()
     )
 
 

@@ -70,15 +70,12 @@ def sidecar(path: Path) -> Path:
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read the table of a text file, or those of one that LabVIEW wrote."""
-    from mckibben.files import lvm
-
+    """Read the table of a text file."""
     data = file.read()
     description = _described(path, data)
     if description is not None:
         return [_own(data, description)]
-    data = decoded(data, path)
-    return lvm.tables(data, path) if data.startswith(lvm.BEGINNING) else [parsed(data, path)]
+    return [parsed(decoded(data, path), path)]
 
 
 def write(recording: Recording, path: Path) -> None:

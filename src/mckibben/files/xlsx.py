@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
+import re
 from contextlib import closing
 from dataclasses import replace
 from io import BufferedReader
@@ -16,6 +17,9 @@ from mckibben.files.channels import NAME, about
 from mckibben.files.notices import listed
 from mckibben.files.table import Table
 from mckibben.system.extras import demand
+
+_DOUBTFUL = re.compile(r"[+-]?\d{1,3}[.,]\d{3}", re.ASCII)
+"""Text that is a number of thousands to some and one with decimals to others."""
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -85,4 +89,6 @@ def _cell(value: object) -> str:
     if isinstance(value, (datetime.date, datetime.time)):
         return value.isoformat()
     text = " ".join(str(value).replace('"', "''").split())
+    if _DOUBTFUL.fullmatch(text):  # a number that the program took for text, as its mark is another
+        return f"{text} (text)"
     return f'"{text}"' if text[:1] in "#%;/" else text  # which begin comments

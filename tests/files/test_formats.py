@@ -70,6 +70,7 @@ def test_columns_of_a_matrix_are_named_by_number(
         mckibben.read(tmp_path / name, columns={"pressure": "data"})
 
 
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 def test_a_matrix_goes_with_vectors_of_its_length(tmp_path: Path) -> None:
     path = tmp_path / "a.mat"
     write(path, data=np.column_stack([P, X]), t=T, gains=T[:3], table=np.ones((20, 2)))

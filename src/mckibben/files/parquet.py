@@ -12,6 +12,7 @@ from mckibben.files import stored
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table, column
+from mckibben.files.tree import without_numbers
 from mckibben.recording import Recording
 from mckibben.system.atomic import replacing
 from mckibben.system.extras import demand
@@ -39,6 +40,8 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             unread[name] = f"a column of type {frame.schema.field(i).type}"
         else:
             columns[name if name not in columns else f"{name} ({i + 1})"] = found
+    if not columns:
+        raise without_numbers(unread, path)
     return [Table(tuple(columns.values()), unread=unread)]
 
 

@@ -117,18 +117,24 @@ def table(
         vectors = [each for each in vectors if each.place in times]
     lengths = set() if times else {each.length for each in vectors}
     unread |= {place: "text" for place, lines in texts.items() if len(lines) not in lengths}
-    if not vectors and unread:
-        reasons = [f"{place} ({reason})" for place, reason in unread.items()]
-        raise DataError(
-            f"there are no vectors of numbers in it; not read: {listed(reasons)}",
-            file=path,
-            remedy="save each channel as one vector, all of one length, or as a column of one matrix",
-        )
+    if not vectors:
+        raise without_numbers(unread, path)
     columns = _columns(vectors, times)
     for place, lines in texts.items():
         if len(lines) in lengths:
             columns[place] = Column(place.rpartition(dot)[2], None, texts=lines)
     return Table(tuple(columns.values()), meta=meta or {}, rates=walk.rates, unread=unread)
+
+
+def without_numbers(unread: Mapping[str, str], path: Path) -> DataError:
+    """Return the error for a file that has no vectors, only what is not read."""
+    reasons = [f"{place} ({reason})" for place, reason in unread.items()]
+    return DataError(
+        "there are no vectors of numbers in it"
+        + (f"; not read: {listed(reasons)}" if reasons else ""),
+        file=path,
+        remedy="save each channel as one vector, all of one length, or as a column of one matrix",
+    )
 
 
 class _Walk:

@@ -410,3 +410,15 @@ def test_any_bytes_are_a_recording_or_a_data_error(
     tmp_path_factory: pytest.TempPathFactory, content: bytes
 ) -> None:
     answers(tmp_path_factory.mktemp("any") / "a.csv", content)
+
+
+def test_elements_of_unknown_type_in_mat_files_are_refused(tmp_path: Path) -> None:
+    """SciPy would follow a pointer that such an element chooses."""
+    path = tmp_path / "run.mat"
+    savemat(path, {"pressure": np.arange(40.0), "displacement": np.arange(40.0)})
+    content = bytearray(path.read_bytes())
+    at = content.index(b"\x09\x00\x00\x00\x40\x01\x00\x00")  # the tag of 40 doubles
+    content[at] = 250
+    path.write_bytes(content)
+    with pytest.raises(DataError):
+        mckibben.read(path)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import struct
 import warnings
+import zlib
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,11 @@ from mckibben.files import hdf5, tree
 from mckibben.files.table import Table
 from mckibben.files.tree import Node, Unread
 
+_TYPES = {*range(1, 8), 9, *range(12, 19)}
+"""Types of elements in "MAT-File Format" (MathWorks)."""
+
+_MATRIX, _COMPRESSED = 14, 15
+
 _OBJECTS = '"None"'
 """Name that SciPy gives to all objects, of which it returns the last."""
 
@@ -24,6 +31,8 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the vectors of a MAT file, of version 4 to 7.3."""
     if hdf5.is_hdf5(file):
         return hdf5.read(file, path)
+    _refuse_unknown_types(file.read())
+    file.seek(0)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         variables: dict[str, Any] = loadmat(file)  # type: ignore[arg-type]  # the stubs take no files
@@ -42,6 +51,31 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         elif not name.startswith("__"):  # a str is what SciPy has to say of one that it cannot read
             found[name] = Unread(value) if isinstance(value, str) else _node(value)
     return [tree.table(found, path)]
+
+
+def _refuse_unknown_types(data: bytes) -> None:
+    """Refuse version 5 with elements of unknown types, by which SciPy indexes a C array unchecked.
+
+    A received file could make it follow a pointer of its choice; see scipy/scipy#25829.
+    """
+    order = "<" if data[126:128] == b"IM" else ">"
+    if data[126:128] not in (b"IM", b"MI"):
+        return  # version 4, which has no such elements
+    waiting = [(data, 128)]
+    while waiting:
+        content, at = waiting.pop()
+        while at + 8 <= len(content):
+            kind, size = struct.unpack_from(f"{order}II", content, at)
+            start, at = at + 8, at + 8 + size + (-size % 8 if kind != _COMPRESSED else 0)
+            if kind >> 16:  # a small element, whose few bytes are in its tag
+                kind, size, at = kind & 0xFFFF, 0, start
+            if kind not in _TYPES:
+                raise ValueError(f"it has an element of the unknown type {kind}")
+            inside = content[start : start + size]
+            if kind == _COMPRESSED:
+                waiting.append((zlib.decompressobj().decompress(inside), 0))
+            elif kind == _MATRIX:
+                waiting.append((inside, 0))
 
 
 def _node(value: Any) -> Node:

@@ -1,8 +1,9 @@
-"""JSON of columns by name, or of records with one value of each."""
+"""JSON as a tree of columns by name, or of records with one value of each."""
 
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from io import BufferedReader
 from pathlib import Path
@@ -11,22 +12,21 @@ from typing import Any
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files import timebase
-from mckibben.files.table import MOST_TEXT, Column, Flaw, Table
+from mckibben.files import timebase, tree
+from mckibben.files.table import MOST_TEXT, Table
+from mckibben.files.tree import Node, Unread
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Read ``{"pressure": [...]}``, ``{"columns": {...}, "units": {...}}`` or ``[{"pressure": 1}]``."""
-    content = json.loads(file.read(), object_pairs_hook=_distinct)
-    if isinstance(content, list) and content and all(isinstance(one, dict) for one in content):
-        names = dict.fromkeys(name for record in content for name in record)
-        content = {name: [record.get(name) for record in content] for name in names}
-    said = content.get("format") if isinstance(content, dict) else None  # models and jobs have one
-    if isinstance(content, dict) and isinstance(content.get("meta"), dict):
-        content = content["meta"] | content
-    found = content
-    for name in ("columns", "data"):
-        found = content.get(name, found) if isinstance(content, dict) else None
+    """Read ``{"pressure": [...]}``, the same in ``columns`` or ``data``, or ``[{"pressure": 1}]``.
+
+    ``units`` may be beside, also in ``meta``. A ``.jsonl`` file has a record a line.
+    """
+    text: Any = file.read()
+    if path.suffix.casefold() == ".jsonl":
+        text = b"[" + b",".join(filter(None, map(bytes.strip, text.splitlines()))) + b"]"
+    found = _node(json.loads(text, object_pairs_hook=_distinct))
+    said = found.get("format") if isinstance(found, dict) else None  # models and jobs have one
     if said is not None or not isinstance(found, dict):
         what = "without columns" if said is None else f"of format {said!r:.40}"
         raise DataError(
@@ -34,49 +34,68 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             file=path,
             remedy='give JSON such as {"columns": {"time": [...], "pressure": [...]}}',
         )
-    given = content.get("units")
-    units = given if isinstance(given, dict) else {}
-    columns: dict[str, Column] = {}
-    unread: dict[str, str] = {}
-    for name, cells in found.items():
-        if not isinstance(cells, list):
-            continue
-        if any(isinstance(cell, (list, dict)) for cell in cells):
-            unread[name] = "lists or objects within a list"
-        else:
-            columns[name] = _column(name, cells, units.get(name))
-    strange = [name for name in units if name not in found or not isinstance(units[name], str)]
-    if strange:
-        raise DataError(
-            f"its units have {strange[0]!r:.40}, which is no column, or no text",
-            file=path,
-            remedy="give units by the names of columns",
-        )
-    single = {**content, **found}.items()
-    told = {name: float(one) for name, one in single if _is_number(one) and timebase.is_rate(name)}
-    meta = {
-        name: one
-        for name, one in single
-        if name not in told
-        and (_is_number(one) or (isinstance(one, str) and len(one) <= MOST_TEXT))
-    }
-    return [Table(tuple(columns.values()), meta=meta, rates=told, unread=unread)]
+    for wrapper in ("meta", "columns", "data"):
+        if isinstance(inner := found.get(wrapper), dict):
+            del found[wrapper]
+            found = inner | found if wrapper == "meta" else found | inner
+    units = found.get("units")
+    for name in units if isinstance(units, dict) else {}:
+        if name not in found:
+            raise DataError(
+                f"its units have {name!r:.40}, which is no column",
+                file=path,
+                remedy="give units by the names of columns",
+            )
+    return [tree.table(found, path, meta=_meta(found))]
 
 
-def _column(name: str, cells: Sequence[Any], unit: str | None) -> Column:
-    texts = [k for k, cell in enumerate(cells) if isinstance(cell, str)]
-    if 2 * len(texts) > len(cells):
-        return Column(name, None, unit, ["" if cell is None else str(cell) for cell in cells])
-    flaw = None
+def _node(value: Any) -> Node:
+    """Return a value as a plain tree."""
+    if isinstance(value, dict):
+        return {name: _node(each) for name, each in value.items()}
+    if isinstance(value, str) or value is None:
+        return value or ""
+    if not isinstance(value, list):
+        return np.array(value)
+    filled = [each for each in value if each is not None]
+    if filled and all(isinstance(each, dict) for each in filled):
+        return _records([each or {} for each in value])
+    texts = [each for each in filled if isinstance(each, str)]
+    if 2 * len(texts) > len(value):
+        return ["" if each is None else str(each) for each in value]
     if texts:
-        problem = f"{cells[texts[0]][:40]!r} is not a number"
-        flaw = Flaw(texts[0], problem, "correct it, or write null and say --gaps split")
-    numbers = [None if isinstance(cell, str) else cell for cell in cells]
-    return Column(name, np.array(numbers, dtype=np.float64), unit, flaw=flaw)
+        return Unread(f"{texts[0]!r:.40} is not a number")
+    try:
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return Unread("lists or objects within a list")
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
+def _records(records: Sequence[Mapping[str, Any]]) -> Node:
+    """Return the columns of records; those with none of the numbers that most have are events."""
+    ((usual, _),) = Counter(tuple(record) for record in records if record).most_common(1)
+    first = next(record for record in records if tuple(record) == usual)
+    numbers = {name for name in usual if not isinstance(first[name], str)} or set(usual)
+    rows = [each for each in records if not each or numbers & each.keys()]
+    names = dict.fromkeys(name for record in rows for name in record)
+    columns = {name: _node([record.get(name) for record in rows]) for name in names}
+    others = len(records) - len(rows)
+    return columns | (
+        {"other records": Unread(f"{others} without {', '.join(usual)}")} if others else {}
+    )
+
+
+def _meta(found: Mapping[str, Node]) -> dict[str, Any]:
+    """Return texts and numbers beside the columns."""
+    texts = {name: one for name, one in found.items() if isinstance(one, str)}
+    numbers = {
+        name: one.item()
+        for name, one in found.items()
+        if isinstance(one, np.ndarray) and one.ndim == 0 and not timebase.is_rate(name)
+    }
+    return {name: one for name, one in texts.items() if len(one) <= MOST_TEXT} | {
+        name: one for name, one in numbers.items() if np.isfinite(one)
+    }
 
 
 def _distinct(pairs: Sequence[tuple[str, Any]]) -> Mapping[str, Any]:

@@ -32,6 +32,7 @@ READERS: dict[str, str] = {
     ".mcap": "bags",
     ".db3": "bags",
     ".json": "columns_json",
+    ".jsonl": "columns_json",
 }
 """Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
 

@@ -1,4 +1,4 @@
-"""The vectors in a tree of groups, as MATLAB, Simulink, dSPACE and HDF5 files hold them.
+"""The vectors in a tree of groups, as MATLAB, Simulink, dSPACE, HDF5 and JSON files hold them.
 
 Readers make a plain tree of a file: groups and structs are dicts, struct arrays and cells are lists,
 numbers are arrays, text is str or a list of it. What follows is where those programs put signals, their
@@ -28,7 +28,7 @@ from mckibben.files.units import convert, find
 DATA = {"data", "samples", "signal", "value", "values", "y"}
 """Fields with the samples of a struct that is one signal: the only one of their length but times."""
 
-NAMES = {"name", "names", "label", "labels", "channels", "headers"}
+NAMES = {"name", "names", "label", "labels", "channels", "columns", "headers"}
 """Fields with the name of such a signal, or with those of the columns of a matrix."""
 
 UNITS = {"unit", "units"}
@@ -51,22 +51,11 @@ Group: TypeAlias = Mapping[str, Node]
 
 @dataclass(frozen=True)
 class _Vector:
-    """A vector or matrix, and what is written about it.
+    """A vector or matrix without axes of one element, and what is written about it.
 
-    Parameters
-    ----------
-    place : str
-    home : tuple of str
-        The groups that it is in. It shares the times in the innermost of them that has some; times
-        belong to the vectors in their ``home`` and below.
-    name : str
-    values : numpy.ndarray
-        Without axes of one element.
-    unit : str, optional
-    says : str, optional
-        The name of its struct, where that names the channel.
-    columns : mapping of str to (str or None)
-        Names and units of the columns of a matrix.
+    Its ``home`` are the groups around it: it shares the times in the innermost that has some. Its
+    ``says`` is the name of its struct, where that names the channel; its ``columns`` are the names and
+    units of the columns of a matrix.
     """
 
     place: str
@@ -82,14 +71,13 @@ class _Vector:
         return max(self.values.shape)
 
     @property
-    def is_time(self) -> bool:
-        return self.values.ndim == 1 and _is_time(self.says or self.name)
-
-    @property
-    def time_unit(self) -> str | None:
-        """The unit of times, or None if it is unknown or none of time."""
-        unit = find(self.unit or parse(self.says or self.name).unit or "s")
-        return unit.name if unit is not None and unit.target == "s" else None
+    def seconds(self) -> Array | None:
+        """The samples [s], if these are times."""
+        label = self.says or self.name
+        unit = find(self.unit or parse(label).unit or "s")
+        if self.values.ndim > 1 or not _is_time(label) or unit is None or unit.target != "s":
+            return None
+        return convert(np.asarray(self.values, dtype=np.float64), unit.name, "s")
 
 
 def table(
@@ -110,10 +98,10 @@ def table(
     walk = _Walk(dot)
     walk.group(tree, ())
     unread, texts = walk.unread, walk.texts
-    vectors, times = _clocks(walk.vectors)
+    vectors, times = _clocks([walk.with_units(each) for each in walk.vectors])
     if times:
-        without = {each.place for each in vectors if each.place not in times}
-        unread |= dict.fromkeys(sorted(without), "it has no times, and others have their own")
+        without = sorted(each.place for each in vectors if each.place not in times)
+        unread |= dict.fromkeys(without, "it has no times, and others have their own")
         vectors = [each for each in vectors if each.place in times]
     lengths = set() if times else {each.length for each in vectors}
     unread |= {place: "text" for place, lines in texts.items() if len(lines) not in lengths}
@@ -122,8 +110,8 @@ def table(
     columns = _columns(vectors, times)
     for place, lines in texts.items():
         if len(lines) in lengths:
-            columns[place] = Column(place.rpartition(dot)[2], None, texts=lines)
-    return Table(tuple(columns.values()), meta=meta or {}, rates=walk.rates, unread=unread)
+            columns.append(Column(place.rpartition(dot)[2], None, texts=lines))
+    return Table(tuple(columns), meta=meta or {}, rates=walk.rates, unread=unread)
 
 
 def without_numbers(unread: Mapping[str, str], path: Path) -> DataError:
@@ -138,14 +126,15 @@ def without_numbers(unread: Mapping[str, str], path: Path) -> DataError:
 
 
 class _Walk:
-    """What was found in a tree, by its place."""
+    """What was found in a tree, by its place; ``legends`` are units by name, each with its group."""
 
     def __init__(self, dot: str) -> None:
         self.dot = dot
         self.vectors: list[_Vector] = []
-        self.texts: dict[str, Sequence[str]] = {}
+        self.texts: dict[str, Sequence[Any]] = {}
         self.rates: dict[str, float] = {}
         self.unread: dict[str, str] = {}
+        self.legends: list[tuple[tuple[str, ...], dict[str, str]]] = []
 
     def group(self, group: Group, home: tuple[str, ...]) -> None:
         """Add what is in a group."""
@@ -157,52 +146,74 @@ class _Walk:
         }
         signal = _signal(nodes)
         names, units = _field(nodes, NAMES), _field(nodes, UNITS)
-        if isinstance(names, list) and isinstance(units, list) and len(names) == len(units):
-            units = dict(zip(names, units, strict=True))
-        by_name = _texts(units) | _texts(group.get(ATTRIBUTES))
+        attributes: Any = group.get(ATTRIBUTES, {})
+        if isinstance(units, list) and isinstance(names, list) and len(names) == len(units):
+            attributes = dict(zip(names, units, strict=True)) | attributes
+        elif isinstance(units, list) and len(set(units) - {""}) == 1:  # one for each sample
+            units = max(units)
         for field, node in nodes.items():
             place = self.dot.join((*home, field))
             if isinstance(node, Mapping):
+                if legend := _legend(node, named=field.casefold() in UNITS):
+                    self.legends.append((home, legend))
                 self.group(node, (*home, field))
-            elif isinstance(node, Unread):
-                self.unread[place] = node.reason
             elif isinstance(node, list):
                 if node and field.casefold() not in NAMES | UNITS:
                     self.texts[place] = node
-            elif isinstance(node, np.ndarray) and self._is_vector(place, field, node):
-                unit, name, says, above = by_name.get(field), field, None, home
-                if field == signal and unit is None and isinstance(units, str):
+            elif isinstance(node, np.ndarray) and np.squeeze(node).ndim == 0:
+                if node.dtype.kind in "biuf" and timebase.is_rate(field):
+                    self.rates[place] = float(node.reshape(-1)[0])
+            elif reason := _unreadable(node):
+                self.unread[place] = reason
+            elif isinstance(node, np.ndarray) and node.size:
+                values, name, says, above = np.squeeze(node), field, None, home
+                unit = attributes.get(field) or _field(nodes.get(f"{field}Info"), UNITS)
+                if field == signal and unit is None:
                     unit = units
+                if isinstance(unit, list) and values.shape == (len(unit),):
+                    self.unread[place] = "its unit changes"
+                    continue
                 if field == signal and home and field.casefold() in DATA:
                     if isinstance(names, str) and names.strip():
                         name = names
-                    elif np.squeeze(node).ndim == 1:
+                    elif values.ndim == 1:
                         says = home[-1]
                     above = home[:-1] if _is_time(says or name) else home
-                values, columns = np.squeeze(node), {}
+                unit, columns = unit if isinstance(unit, str) and unit else None, {}
                 if isinstance(names, list) and values.ndim == 2:
-                    columns = {each: by_name.get(each) or unit for each in names}
+                    columns = {str(each): attributes.get(each) or unit for each in names}
                     if len(columns) != min(values.shape):
                         columns = {}
                 self.vectors.append(_Vector(place, above, name, values, unit, says, columns))
 
-    def _is_vector(self, place: str, field: str, node: NDArray[Any]) -> bool:
-        """Return whether an array is a vector or a matrix of channels; others are added here."""
-        number, shape = node.dtype.kind in "biuf", np.squeeze(node).shape
-        if node.size == 0:
-            return False
-        if not shape:
-            if number and timebase.is_rate(field):
-                self.rates[place] = float(node.reshape(-1)[0])
-            return False
-        if not number:
-            kind = "complex numbers" if node.dtype.kind == "c" else f"values of type {node.dtype}"
-            self.unread[place] = kind
-        elif len(shape) > 1 and not is_matrix(shape):
-            self.unread[place] = f"an array of {' x '.join(map(str, node.shape))}"
-        else:
-            return True
-        return False
+    def with_units(self, vector: _Vector) -> _Vector:
+        """Return a vector with the units that a struct beside it or a group around it has for it."""
+
+        def unit_for(name: str) -> str | None:
+            known = {
+                home: {legend[name] for at, legend in self.legends if at == home and name in legend}
+                for home in (vector.home[:i] for i in range(len(vector.home) + 1))
+            }
+            (*_, nearest) = [set(), *filter(None, known.values())]
+            return nearest.pop() if len(nearest) == 1 else None
+
+        columns = {name: unit or unit_for(name) for name, unit in vector.columns.items()}
+        unit = vector.unit or unit_for(vector.says or vector.name)
+        return replace(vector, unit=unit, columns=columns)
+
+
+def _unreadable(node: Node) -> str | None:
+    """Return why what is no scalar is no vector or matrix of channels, or None if it is."""
+    if isinstance(node, Unread):
+        return node.reason
+    if not isinstance(node, np.ndarray) or node.size == 0:
+        return None
+    if node.dtype.kind not in "biuf":
+        return "complex numbers" if node.dtype.kind == "c" else f"values of type {node.dtype}"
+    shape = np.squeeze(node).shape
+    if len(shape) > 1 and not is_matrix(shape):
+        return f"an array of {' x '.join(map(str, node.shape))}"
+    return None
 
 
 def _spread(name: str, node: Node) -> dict[str, Node]:
@@ -217,8 +228,7 @@ def _spread(name: str, node: Node) -> dict[str, Node]:
         isinstance(each, str) or (isinstance(each, np.ndarray) and each.size < 2) for each in node
     ):
         return {name: Unread("a cell of text and numbers")}
-    structs = all(isinstance(each, Mapping) for each in node)
-    form = "{}({})" if structs else "{}{{{}}}"
+    form = "{}({})" if all(isinstance(each, Mapping) for each in node) else "{}{{{}}}"
     return {
         inner: one
         for i, each in enumerate(node, start=1)
@@ -226,16 +236,15 @@ def _spread(name: str, node: Node) -> dict[str, Node]:
     }
 
 
-def _together(nodes: Sequence[Node]) -> Node | None:
+def _together(nodes: Sequence[Any]) -> Node | None:
     """Return the vector of scalars, the texts, or the struct of such of a struct array, or None."""
     if all(isinstance(each, str) for each in nodes):
         return list(nodes)
     if all(isinstance(each, np.ndarray) and each.size == 1 for each in nodes):
-        return np.array([each.reshape(-1)[0] for each in nodes if isinstance(each, np.ndarray)])
-    structs = [each for each in nodes if isinstance(each, Mapping)]
-    if len(structs) < len(nodes) or any(each.keys() != structs[0].keys() for each in structs):
+        return np.array([each.reshape(-1)[0] for each in nodes])
+    if not all(isinstance(each, Mapping) and each.keys() == nodes[0].keys() for each in nodes):
         return None
-    fields = {name: _together([each[name] for each in structs]) for name in structs[0]}
+    fields = {name: _together([each[name] for each in nodes]) for name in nodes[0]}
     found = {name: node for name, node in fields.items() if node is not None}
     return found if len(found) == len(fields) else None
 
@@ -251,74 +260,69 @@ def _signal(nodes: Group) -> str | None:
     return longest[0] if len(longest) == 1 else None
 
 
-def _field(nodes: Group, names: set[str]) -> Node | None:
-    return next((node for name, node in nodes.items() if name.casefold() in names), None)
+def _field(nodes: Node | None, names: set[str]) -> Any:
+    group = nodes if isinstance(nodes, Mapping) else {}
+    return next((node for name, node in group.items() if name.casefold() in names), None)
 
 
-def _texts(node: Node | None) -> dict[str, str]:
-    found = node if isinstance(node, Mapping) else {}
-    return {name: text for name, text in found.items() if isinstance(text, str) and text}
+def _legend(group: Group, *, named: bool) -> dict[str, str]:
+    """Return units by name from a struct of texts, or of structs with a field for the unit.
+
+    Unless its name is that of units, it has to hold one that is known.
+    """
+    units = {
+        name: node if isinstance(node, str) else _field(node, UNITS)
+        for name, node in group.items()
+        if not (isinstance(node, Mapping) and _signal(node))
+    }
+    found = {name: unit for name, unit in units.items() if isinstance(unit, str) and unit}
+    return found if named or any(map(find, found.values())) else {}
 
 
 def _is_time(name: str) -> bool:
     return channel_of(parse(name)) == "time"
 
 
-def _clocks(vectors: list[_Vector]) -> tuple[list[_Vector], dict[str, Array]]:
+def _clocks(vectors: Sequence[_Vector]) -> tuple[list[_Vector], dict[str, Array]]:
     """Return the vectors without repeated times, and the times [s] by place where clocks differ."""
-    times = [each for each in vectors if each.is_time and each.time_unit is not None]
-    clocks: dict[str, _Vector] = {}
+    seconds = {each.place: times for each in vectors if (times := each.seconds) is not None}
+    clocks: dict[str, str] = {}
     for each in vectors:
-        mine = [
+        shared = [
             time
-            for time in times
-            if time.length == each.length and each.home[: len(time.home)] == time.home
+            for time in vectors
+            if time.place in seconds
+            and time.length == each.length
+            and each.home[: len(time.home)] == time.home
         ]
-        depth = max((len(time.home) for time in mine), default=0)
-        nearest = [time for time in mine if len(time.home) == depth]
-        if len(nearest) == 1 and not each.is_time:
+        depth = max((len(time.home) for time in shared), default=0)
+        nearest = [time.place for time in shared if len(time.home) == depth]
+        if len(nearest) == 1 and each.place not in seconds:
             clocks[each.place] = nearest[0]
-    used = list({time.place: time for time in clocks.values()}.values())
-    repeated = {
-        time.place
-        for time in used[1:]
-        if time.time_unit == used[0].time_unit
-        and np.array_equal(time.values, used[0].values, equal_nan=True)
-    }
-    if len(used) == len(repeated) + 1 or not used:
-        return [each for each in vectors if each.place not in repeated], {}
-    seconds = {
-        time.place: convert(np.asarray(time.values, dtype=np.float64), time.time_unit or "s", "s")
-        for time in used
-    }
-    rest = [each for each in vectors if each.place not in seconds]
-    return rest, {place: seconds[time.place] for place, time in clocks.items()}
+    first, *others = dict.fromkeys(clocks.values()) or [""]
+    alike = all(np.array_equal(seconds[first], seconds[other], equal_nan=True) for other in others)
+    dropped = others if alike else [first, *others]
+    rest = [each for each in vectors if each.place not in dropped]
+    return rest, {} if alike else {place: seconds[time] for place, time in clocks.items()}
 
 
-def _columns(vectors: Sequence[_Vector], times: Mapping[str, Array]) -> dict[str, Column]:
-    """Return the columns of vectors by place; where a name is not unique, its place is the header."""
+def _columns(vectors: Sequence[_Vector], times: Mapping[str, Array]) -> list[Column]:
+    """Return the columns of vectors; where a name is not unique, the place is the header."""
     names = Counter(name for each in vectors for name in each.columns or [each.name])
-    columns: dict[str, Column] = {}
+    columns: list[Column] = []
     for each in vectors:
         unique = names[each.name] == 1
         if each.values.ndim == 1:
             header = each.name if unique and each.says is None else each.place
-            found = {each.place: column(header, each.values.reshape(-1), each.unit)}
             says = each.says or (None if unique else _label(each.name, each.place))
-            found[each.place] = replace(found[each.place], says=says)
+            found = {each.place: replace(column(header, each.values, each.unit), says=says)}
         else:
             header = each.says or (each.name if unique else each.place)
             found = columns_of(each.place, header, each.values, each.unit)
         for (place, one), (name, unit) in zip(found.items(), each.columns.items(), strict=False):
-            said = (
-                {"header": name, "says": None}
-                if names[name] == 1
-                else {"header": place, "says": _label(name, place)}
-            )
-            found[place] = replace(one, unit=unit, **said)
-        if times:
-            found = {place: replace(one, times=times[each.place]) for place, one in found.items()}
-        columns |= found
+            header, says = (name, None) if names[name] == 1 else (place, _label(name, place))
+            found[place] = replace(one, unit=unit, header=header, says=says)
+        columns += [replace(one, times=times.get(each.place)) for one in found.values()]
     return columns
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from io import BufferedReader
 from pathlib import Path
 from types import ModuleType
 
-from mckibben.errors import DataError, MckibbenError, TooLargeError
+from mckibben.errors import DataError, MckibbenError
 from mckibben.files.table import Table, printable
 from mckibben.system.ordinary import opened
 
@@ -36,8 +36,8 @@ READERS: dict[str, str] = {
 }
 """Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
 
-SOUGHT: tuple[str, ...] = tuple(ending for ending in READERS if ending != ".json")
-"""Endings that a folder is searched for; descriptions and models are JSON too."""
+SOUGHT: tuple[str, ...] = tuple(ending for ending in READERS if READERS[ending] != "columns_json")
+"""Endings that a folder is searched for; descriptions, models and logs are JSON too."""
 
 BOM, LABVIEW = b"\xef\xbb\xbf", b"LabVIEW Measurement"
 """Beginnings of a text: the mark of UTF-8, and the name that LabVIEW writes, whatever the ending."""
@@ -60,7 +60,7 @@ _SIGNATURES: dict[bytes, tuple[str, tuple[str, ...]]] = {
 
 
 def tables(path: Path) -> list[Table]:
-    """Return what is in a file, as it stands there; errors are those of `read`."""
+    """Return what is in a file, before it is interpreted; errors are those of `read`."""
     with opening(path) as file:
         return read(file, path)
 
@@ -68,21 +68,20 @@ def tables(path: Path) -> list[Table]:
 @contextmanager
 def opening(path: Path, most: float = MOST_BYTES) -> Iterator[BufferedReader]:
     """Open a recording's file; `DataError` if its ending is unknown, or there is none to be read."""
-    _reader(path)
+    _module(path, READERS, "read")
     with opened(path, most=int(most)) as file:
         yield file
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
-    """Return what is in an open file, as it stands there.
+    """Return what is in an open file, before it is interpreted.
 
     Raises
     ------
     DataError
-        If its ending is none that is known or not that of its content, it is damaged, or it holds
-        more than is read.
+        If its ending is unknown or not that of its content, or it is damaged.
     """
-    module = _reader(path)
+    module = _module(path, READERS, "read")
     with _refusing(path):
         _refuse_impostor(file, path)
         if READERS[path.suffix.casefold()] == "text" and file.peek(64).lstrip(BOM).startswith(
@@ -98,6 +97,11 @@ def bag(folder: Path) -> list[Table]:
         return [printable(table) for table in import_module("mckibben.files.bags").folder(folder)]
 
 
+def writer(path: Path) -> ModuleType:
+    """Return the module that writes files of this ending."""
+    return _module(path, WRITERS, "written")
+
+
 @contextmanager
 def _refusing(path: Path) -> Iterator[None]:
     """Turn whatever a library raises into errors that name the file."""
@@ -105,34 +109,23 @@ def _refusing(path: Path) -> Iterator[None]:
         yield
     except MckibbenError:
         raise
-    except OSError as error:
-        if error.strerror is None:  # the libraries' own, about the content
-            raise _damaged(path, error) from None
-        raise DataError(
-            f"it cannot be read ({error.strerror})",
-            file=path,
-            remedy="check the path and its rights",
-        ) from None
-    except MemoryError:
-        raise TooLargeError(
-            "it needs more memory than there is",
-            file=path,
-            remedy="split it into shorter recordings",
-        ) from None
-    except Exception as error:  # damaged files make the libraries raise anything at all
-        raise _damaged(path, error) from None
+    except Exception as error:
+        problem = f"it is damaged, or not {path.suffix[1:] or 'a bag'} ({reason(error)})"
+        remedy = "export it again from its source"
+        if isinstance(error, OSError) and error.strerror:  # without, it is about the content
+            problem, remedy = (
+                f"it cannot be read ({error.strerror})",
+                "check the path and its rights",
+            )
+        raise DataError(problem, file=path, remedy=remedy) from None
 
 
-def writer(path: Path) -> ModuleType:
-    """Return the module that writes files of this ending."""
-    return _module(path, WRITERS, "written")
+def reason(error: Exception) -> str:
+    """Return an error of a library in one line."""
+    return " ".join(str(error).split())[:200] or type(error).__name__
 
 
-def _reader(path: Path) -> ModuleType:
-    return _module(path, tuple(READERS), "read")
-
-
-def _module(path: Path, endings: tuple[str, ...], done: str) -> ModuleType:
+def _module(path: Path, endings: Iterable[str], done: str) -> ModuleType:
     ending = path.suffix.casefold()
     if ending not in endings:
         raise DataError(
@@ -155,12 +148,3 @@ def _refuse_impostor(file: BufferedReader, path: Path) -> None:
         if start.startswith(signature) and path.suffix.casefold() not in endings:
             better = f"rename it to end in {endings[0]}" if endings else "export it as CSV"
             raise DataError(f"by its content it is {name}", file=path, remedy=better)
-
-
-def _damaged(path: Path, error: Exception) -> DataError:
-    reason = " ".join(str(error).split())[:200] or type(error).__name__
-    return DataError(
-        f"it is damaged, or not {path.suffix[1:] or 'a bag'} ({reason})",
-        file=path,
-        remedy="export it again from its source",
-    )

@@ -23,9 +23,6 @@ _TYPES = {*range(1, 8), 9, *range(12, 19)}
 
 _MATRIX, _COMPRESSED = 14, 15
 
-_OBJECTS = '"None"'
-"""Name that SciPy gives to all objects, of which it returns the last."""
-
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the vectors of a MAT file, of version 4 to 7.3."""
@@ -36,19 +33,19 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         variables: dict[str, Any] = loadmat(file)  # type: ignore[arg-type]  # the stubs take no files
-    said = [str(each.message) for each in caught]
-    doubled = [each for each in said if each.startswith("Duplicate variable name")]
-    objects = [each for each in doubled if _OBJECTS in each]
-    if len(objects) < len(doubled):
+    # SciPy names all objects "None", and returns the last of one name
+    doubled = [each for each in caught if str(each.message).startswith("Duplicate variable name")]
+    objects = sum('"None"' in str(each.message) for each in doubled)
+    if objects < len(doubled):
         raise ValueError("two variables have one name")
     found: dict[str, Node] = {}
     for name, value in variables.items():
         if isinstance(value, MatlabOpaque):
             last = value.reshape(-1)[0]
-            kind = f"an object of class {_word(last['s2'])}"
-            more = f", and {len(objects)} more object(s)" if objects else ""
-            found[_word(last["s0"])] = Unread(kind + more)
-        elif not name.startswith("__"):  # a str is what SciPy has to say of one that it cannot read
+            kind = f"an object of class {last['s2'].decode('latin-1')}"
+            more = f", and {objects} more object(s)" if objects else ""
+            found[last["s0"].decode("latin-1")] = Unread(kind + more)
+        elif not name.startswith("__"):  # a str is SciPy's reason why it cannot read a variable
             found[name] = Unread(value) if isinstance(value, str) else _node(value)
     return [tree.table(found, path)]
 
@@ -82,10 +79,8 @@ def _node(value: Any) -> Node:
     """Return a variable as a plain tree."""
     if value is None or isinstance(value, MatlabFunction):  # a struct without fields is None
         return ""
-    if isinstance(value, MatlabOpaque):
-        return Unread("an object")
-    if issparse(value):
-        return Unread("a sparse matrix")
+    if isinstance(value, MatlabOpaque) or issparse(value):
+        return Unread("a sparse matrix" if issparse(value) else "an object")
     array = np.asarray(value)
     if array.dtype.names is not None:
         names = array.dtype.names
@@ -99,7 +94,3 @@ def _node(value: Any) -> Node:
         lines = [str(line) for line in array.reshape(-1)]
         return lines if len(lines) > 1 else "".join(lines)
     return array
-
-
-def _word(name: Any) -> str:
-    return name.decode("latin-1") if isinstance(name, bytes) else str(name)

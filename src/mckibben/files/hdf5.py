@@ -37,8 +37,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
     matlab = path.suffix.casefold() == ".mat"
     with h5py.File(file, "r") as root:
-        names = [name for name in root if not (matlab and name.startswith("#"))]
-        found = _Tree(path, matlab).group(root, names)
+        found = _Tree(path, matlab).group(root)
         meta = {name: _attribute(root, name) for name in root.attrs}
     meta = {name: value for name, value in meta.items() if value is not None}
     return [tree.table(found, path, dot="." if matlab else "/", meta=meta)]
@@ -47,12 +46,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 class _Tree:
     """Makes a plain tree of the groups of a file.
 
-    Parameters
-    ----------
-    path : path
-        The name to give in errors.
-    matlab : bool
-        Whether MATLAB wrote it: text are numbers then, and struct arrays and cells are references.
+    In those that MATLAB wrote, text is numbers, and struct arrays and cells are references.
     """
 
     def __init__(self, path: Path, matlab: bool) -> None:
@@ -60,28 +54,26 @@ class _Tree:
         self._matlab = matlab
         self._seen: set[int] = set()
 
-    def group(self, group: Any, names: list[str]) -> dict[str, Node]:
+    def group(self, group: Any) -> dict[str, Node]:
         """Return what hard links lead to, each once: they can lead round in circles."""
         import h5py
 
         self._seen.add(h5py.h5o.get_info(group.id).addr)
         found: dict[str, Node] = {}
         units: dict[str, Node] = {}
-        for name in names:
+        for name in group:
             link = group.get(name, getlink=True)
             if isinstance(link, h5py.ExternalLink):
                 found[name] = Unread("it is in another file")
-            if not isinstance(link, h5py.HardLink):
+            if not isinstance(link, h5py.HardLink) or (self._matlab and name.startswith("#")):
                 continue  # a soft link leads to what is read under its own name, or out of the file
             item = group[name]
             at = h5py.h5o.get_info(item.id).addr
-            if at in self._seen:
-                continue
-            self._seen.add(at)
-            found[name] = self._node(item)
-            for attribute in ("unit", "units"):
-                if isinstance(unit := _attribute(item, attribute), str) and unit:
-                    units[name] = unit
+            if at not in self._seen:
+                self._seen.add(at)
+                found[name] = self._node(item)
+                unit = _attribute(item, "unit") or _attribute(item, "units")
+                units |= {name: unit} if isinstance(unit, str) else {}
         return found | {ATTRIBUTES: units}
 
     def _node(self, item: Any) -> Node:
@@ -93,17 +85,17 @@ class _Tree:
             return ""  # a type that has a name
         if self._matlab and "MATLAB_sparse" in item.attrs:
             return Unread("a sparse matrix")
-        found = self.group(item, list(item))
+        found = self.group(item)
         # a struct array has references in its fields, which unlike those of cells have no class
-        arrays = [
-            name
+        arrays: dict[str, Any] = {
+            name: node
             for name, node in found.items()
             if isinstance(node, list) and "MATLAB_class" not in item[name].attrs
-        ]
+        }
         if not self._matlab or not arrays:
             return found
-        columns: list[Any] = [found[name] for name in arrays]
-        return [dict(zip(arrays, each, strict=True)) for each in zip(*columns, strict=True)]
+        rows = zip(*arrays.values(), strict=True)
+        return [dict(zip(arrays, each, strict=True)) for each in rows]
 
     def _values(self, data: Any) -> Node:
         """Return the samples of a data set, or its text, or what its references lead to."""
@@ -118,7 +110,7 @@ class _Tree:
         kind = _attribute(data, "MATLAB_class") if self._matlab else None
         if data.shape is None or "MATLAB_empty" in data.attrs:
             return ""
-        if kind is not None and "MATLAB_object_decode" in data.attrs:
+        if "MATLAB_object_decode" in data.attrs:
             return Unread(f"an object of class {kind}")
         if h5py.check_string_dtype(data.dtype) is not None:
             text = data.asstr("utf-8", "replace")[()]
@@ -131,53 +123,39 @@ class _Tree:
             lines = [row.astype("<u2").tobytes() for row in np.atleast_2d(data[()].T)]
             texts = [line.decode("utf-16-le", "replace") for line in lines]
             return texts[0] if len(texts) == 1 else texts
-        return _scaled(data, _fields(np.asarray(data[()])))
-
-
-def _scaled(data: Any, samples: Node) -> Node:
-    """Return samples in the unit that is stated, where the file has packed numbers.
-
-    By "NetCDF Climate and Forecast Metadata Conventions", 8.1: scale_factor, add_offset.
-    """
-    gain, offset = (_attribute(data, name) for name in ("scale_factor", "add_offset"))
-    if not isinstance(samples, np.ndarray) or samples.dtype.kind not in "iuf":
-        return samples
-    if gain is None and offset is None:
-        return samples
-    if isinstance(gain, str) or isinstance(offset, str):
-        return Unread("a scale_factor or add_offset that is no number")
-    unpacked: NDArray[Any] = samples * float(1.0 if gain is None else gain) + float(offset or 0.0)
-    return unpacked
+        samples = _fields(np.asarray(data[()]))
+        gain, offset = _attribute(data, "scale_factor"), _attribute(data, "add_offset")
+        if (gain, offset) == (None, None) or not isinstance(samples, np.ndarray):
+            return samples
+        if isinstance(gain, str) or isinstance(offset, str) or samples.dtype.kind not in "iuf":
+            return Unread("packed by a scale_factor or add_offset that is no number")
+        # packed by "NetCDF Climate and Forecast Metadata Conventions", 8.1
+        return np.asarray(samples * float(1.0 if gain is None else gain) + float(offset or 0.0))
 
 
 def _fields(samples: NDArray[Any]) -> Node:
     """Return samples, those of a table as one array a field."""
     names = samples.dtype.names
-    if names is None:
-        if samples.dtype.kind == "S":
-            return [each.decode("utf-8", "replace") for each in samples.reshape(-1)]
-        return (
-            Unread("objects, or lists of several lengths") if samples.dtype.hasobject else samples
-        )
     if names == ("real", "imag"):
         return Unread("complex numbers")
-    return {name: _fields(samples[name]) for name in names}
+    if names is not None:
+        return {name: _fields(samples[name]) for name in names}
+    if samples.dtype.kind == "S":
+        return [each.decode("utf-8", "replace") for each in samples.reshape(-1)]
+    return Unread("objects, or lists of several lengths") if samples.dtype.hasobject else samples
 
 
-def _attribute(item: Any, name: str) -> str | float | int | bool | None:
+def _attribute(item: Any, name: str) -> str | float | None:
     """Return an attribute as JSON holds it, or None where it does not or there is none."""
     try:
         value = item.attrs.get(name)
     except TypeError:  # NumPy has no such type
         return None
-    if isinstance(value, np.ndarray) and value.size == 1:
-        value = value.reshape(-1)[0]
-    if isinstance(value, np.generic):
+    if isinstance(value, (np.ndarray, np.generic)) and value.size == 1:
         value = value.item()
     if isinstance(value, bytes):
         value = value.decode("utf-8", "replace")
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, str) and len(value) > MOST_TEXT:
-        return None
-    return value if isinstance(value, (str, int, float, bool)) else None
+    fits = (isinstance(value, str) and len(value) <= MOST_TEXT) or (
+        isinstance(value, (int, float)) and math.isfinite(value)
+    )
+    return value if fits else None

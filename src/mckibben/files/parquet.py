@@ -32,17 +32,17 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     own = None if text is None else _own(frame, text, path)
     if own is not None:
         return [own]
-    columns: dict[str, Column] = {}
+    columns: list[Column] = []
     unread: dict[str, str] = {}
-    for i, name in enumerate(frame.column_names):
-        found = _column(name, frame.column(i))
+    for field, cells in zip(frame.schema, frame.columns, strict=True):
+        found = _column(field.name, cells)
         if found is None:
-            unread[name] = f"a column of type {frame.schema.field(i).type}"
+            unread[field.name] = f"a column of type {field.type}"
         else:
-            columns[name if name not in columns else f"{name} ({i + 1})"] = found
+            columns.append(found)
     if not columns:
         raise without_numbers(unread, path)
-    return [Table(tuple(columns.values()), unread=unread)]
+    return [Table(tuple(columns), unread=unread)]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -50,7 +50,7 @@ def write(recording: Recording, path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    description = Stored.describe(recording, _samples(recording.channels.values()), path)
+    description = Stored.describe(recording, _samples(recording.channels), path)
     time = {} if recording.sample_time is None else {"time": recording.time}
     frame = pa.table({**time, **recording.channels})
     frame = frame.replace_schema_metadata({_KEY: description.to_json(path)})
@@ -63,12 +63,11 @@ def _own(frame: Any, text: bytes, path: Path) -> Table | None:
     if isinstance(description, str):
         problem = f"the description in it is not by this package ({description})"
     else:
-        names = list(description.units)
-        if set(names) <= set(frame.column_names):
-            values = {name: _array(frame[name]) for name in names}
-            if digest(_samples(values.values())) == description.sha256:
-                return description.table(values)
         problem = "the description in it is of other samples"
+        if description.units.keys() <= set(frame.column_names):
+            values = {name: frame[name].to_numpy() for name in description.units}
+            if digest(_samples(values)) == description.sha256:
+                return description.table(values)
     warn(path, f"{problem}; it is ignored, and units are taken from the names of the columns")
     return None
 
@@ -77,24 +76,19 @@ def _column(name: str, cells: Any) -> Column | None:
     """Return a column of numbers, times or text, or None if it is of another type."""
     import pyarrow as pa
 
-    is_a, kind = pa.types, cells.type
-    if is_a.is_dictionary(kind):
-        kind = kind.value_type
-        cells = cells.cast(kind)
+    is_a = pa.types
+    if is_a.is_dictionary(cells.type):
+        cells = cells.cast(cells.type.value_type)
+    kind = cells.type
     if is_a.is_string(kind) or is_a.is_large_string(kind) or is_a.is_string_view(kind):
-        return Column(
-            name, None, texts=["" if text is None else text for text in cells.to_pylist()]
-        )
+        return Column(name, None, texts=[text or "" for text in cells.to_pylist()])
     if is_a.is_boolean(kind) or is_a.is_decimal(kind):
-        return column(name, _array(cells.cast(pa.float64())))
-    kinds = (is_a.is_integer, is_a.is_floating, is_a.is_date, is_a.is_timestamp, is_a.is_duration)
-    return column(name, _array(cells)) if any(is_it(kind) for is_it in kinds) else None
-
-
-def _array(cells: Any) -> np.ndarray[Any, Any]:
-    array: np.ndarray[Any, Any] = cells.to_numpy()
-    return array
+        cells = cells.cast(pa.float64())
+    elif not (is_a.is_integer(kind) or is_a.is_floating(kind) or is_a.is_temporal(kind)):
+        return None
+    return column(name, cells.to_numpy())
 
 
 def _samples(channels: Any) -> bytes:
-    return b"".join(np.asarray(values).astype("<f8").tobytes() for values in channels)
+    arrays = (np.asarray(values) for values in channels.values())
+    return b"".join(values.astype("<f8").tobytes() for values in arrays)

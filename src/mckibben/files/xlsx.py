@@ -32,57 +32,41 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         openpyxl.load_workbook(file, read_only=True, data_only=True, keep_links=False)
     ) as book:
         names = [sheet.title for sheet in book.worksheets]
-        if wanted is not None and wanted not in names:
-            raise DataError(
-                f"it has no sheet {wanted!r}; there are {listed(names)}",
-                file=path,
-                remedy=f"correct sheet in {NAME}",
-            )
         for sheet in book.worksheets:
             if wanted not in (None, sheet.title):
                 continue
             sheet.reset_dimensions()  # which are claims
-            text = _text(sheet)
-            if text is None:
-                continue
-            reason = f"one sheet is read: the first with numbers, or sheet in {NAME}"
-            others = [] if wanted else [name for name in names if name != sheet.title]
-            found = texts.parsed(text, path, ("\t",))
-            return [replace(found, unread={**found.unread, **dict.fromkeys(others, reason)})]
+            if (text := _text(sheet)) is not None:
+                found = texts.parsed(text, path, ("\t",))
+                reason = f"one sheet is read: the first with numbers, or sheet in {NAME}"
+                others = [name for name in names if wanted is None and name != sheet.title]
+                return [replace(found, unread={**found.unread, **dict.fromkeys(others, reason)})]
     raise DataError(
-        "no sheet in it has numbers" if wanted is None else f"sheet {wanted!r} has no numbers",
+        f"there are no numbers in it, in {f'sheet {wanted!r} of ' if wanted else ''}{listed(names)}",
         file=path,
-        remedy="save samples in columns under one line of names",
+        remedy=f"save samples in columns under one line of names, or correct sheet in {NAME}",
     )
 
 
 def _text(sheet: Any) -> bytes | None:
     """Return a sheet as text, a line for each row and tabs between; None where it has no numbers."""
-    lines: list[str] = []
-    width, numbers = 0, 0
-    for row in sheet.iter_rows(values_only=True):
-        cells = [_cell(value) for value in row]
-        while cells and not cells[-1]:
-            cells.pop()
-        numbers += sum(isinstance(value, (int, float)) for value in row)
-        width = max(width, len(cells))
-        lines.append("\t".join(cells))
-    if not numbers:
+    rows = list(sheet.iter_rows(values_only=True))
+    if not any(isinstance(value, (int, float)) for row in rows for value in row):
         return None
-    rows = (line and line + "\t" * (width - 1 - line.count("\t")) for line in lines)
-    return ("\n".join(rows) + "\n").encode()
+    lines = ["\t".join(map(_cell, row)).rstrip("\t") for row in rows]
+    width = max(line.count("\t") for line in lines)
+    filled = (line and line + "\t" * (width - line.count("\t")) for line in lines)
+    return ("\n".join(filled) + "\n").encode()
 
 
 def _cell(value: object) -> str:
     """Return a cell as the reader of texts takes it; numbers in a form that has no second meaning."""
     if value is None:
         return ""
-    if isinstance(value, bool):
-        return str(int(value))
     if isinstance(value, datetime.timedelta):
         value = value.total_seconds()
-    if isinstance(value, int):
-        return str(value) if abs(value) < 1e300 else "inf"
+    if isinstance(value, int):  # also a bool
+        return str(int(value)) if abs(value) < 1e300 else "inf"
     if isinstance(value, float):
         written = repr(value)
         return written if "e" in written or not math.isfinite(value) else f"{written}e0"

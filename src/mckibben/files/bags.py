@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import partial
 from io import BufferedReader
@@ -18,15 +18,12 @@ from urllib.parse import quote
 
 import numpy as np
 
-from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.files.formats import reason
 from mckibben.files.headers import channel_of, parse, unit_of
 from mckibben.files.notices import listed
 from mckibben.files.table import WIDEST, Column, Table
 from mckibben.system.extras import demand
-
-_PLAIN = ("data", "value")
-"""Names of fields that name no channel; there the topic's name does."""
 
 _UNITS = {
     "sensor_msgs/msg/FluidPressure": {"fluid_pressure": "Pa"},
@@ -37,7 +34,6 @@ _UNITS = {
 }
 """Units that a type of message demands, by field."""
 
-_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _SECTION = re.compile(r"={80}\n(?:IDL: .*\n)?")
 """What separates the definitions in IDL of several types."""
 
@@ -46,18 +42,8 @@ _SECTION = re.compile(r"={80}\n(?:IDL: .*\n)?")
 class _Topic:
     """The messages of one type on one topic.
 
-    Parameters
-    ----------
-    name, kind : str
-        Of the topic, and of the type of its messages.
-    decode : callable
-        What makes a message of its bytes.
-    recorded, stamps : list of int
-        When each message was recorded, and the stamp in its header or 0 [ns].
-    columns : dict of str to ([int], [float])
-        By field: the messages that have it, counted from 0, and its values.
-    unread : dict of str to str
-        Other fields, and why they are no columns.
+    ``recorded`` and ``stamps`` are when each message was recorded and the stamp in its header or 0 [ns];
+    ``columns`` are, by field, the messages that have it and its values.
     """
 
     name: str
@@ -73,7 +59,7 @@ class _Topic:
         message = self.decode(raw)
         stamp: Any = getattr(getattr(message, "header", None), "stamp", None)
         self.stamps.append(stamp.sec * 10**9 + stamp.nanosec if _is_time(stamp) else 0)
-        for place, value in _fields(message):
+        for place, value in _numbers(f"/{self.name.strip('/')}", message):
             if isinstance(value, str):
                 self.unread[place] = value
             else:
@@ -82,23 +68,21 @@ class _Topic:
                 values.append(value)
         self.recorded.append(when)
 
-    def header(self, place: str) -> str:
-        """Return what the column of a field is called."""
-        return f"/{self.name.strip('/')}/{place}"
-
-    def column(self, place: str, times: Array) -> Column:
-        """Return the column of a field; the times [s] are those of all messages."""
-        at, values = self.columns[place]
-        last, of_topic = place.rpartition("/")[2], self.name.rpartition("/")[2]
-        unit = _UNITS.get(self.kind, {}).get(place)
-        words = [of_topic if last in _PLAIN else last]
-        if unit == "Pa":
-            words = [of_topic, "pressure"]
-        header = self.header(place)
-        says = next((word for word in words if _is_standard(word)), _indexed(header))
-        held = not isinstance(values[0], float)
-        samples = np.array(values, dtype=np.float64)
-        return Column(header, samples, unit, says=says, times=times[at], held=held)
+    def table(self, began: int, by_stamp: bool) -> Iterator[Column]:
+        """Yield the columns of its fields."""
+        # differences of whole numbers: floats of seconds since 1970 are 0.2 us apart
+        times = (np.array(self.stamps if by_stamp else self.recorded) - began) / 1e9
+        of_topic = self.name.rpartition("/")[2]
+        for header, (at, values) in self.columns.items():
+            place = header.removeprefix(f"/{self.name.strip('/')}/")
+            unit = _UNITS.get(self.kind, {}).get(place)
+            last = place.rpartition("/")[2]
+            words = [of_topic if last in ("data", "value") else last]
+            if unit == "Pa":
+                words = [of_topic, "pressure"]
+            says = next(filter(_is_standard, words), _indexed(header))
+            samples, held = np.array(values, dtype=np.float64), not isinstance(values[0], float)
+            yield Column(header, samples, unit, says=says, times=times[at], held=held)
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -114,7 +98,7 @@ def folder(path: Path) -> list[Table]:
         reader.open()
     except Exception as error:
         raise DataError(
-            f"it is damaged or unfinished, or not a bag ({_reason(error)})",
+            f"it is damaged or unfinished, or not a bag ({reason(error)})",
             file=path,
             remedy="mend it with rosbag reindex, ros2 bag reindex or mcap recover, or record it again",
         ) from None
@@ -122,26 +106,15 @@ def folder(path: Path) -> list[Table]:
         topics, unread = _topics(reader)
     finally:
         reader.close()
-    found = [topic for topic in topics if topic.columns]
-    if not found:
+    if not topics:
         raise DataError(
             f"no topic in it has numbers that can be read; its topics are {listed([*unread], 10)}",
             file=path,
             remedy="record topics of numbers, with the definitions of their messages",
         )
-    return [_table(found, unread)]
-
-
-def _table(topics: list[_Topic], unread: Mapping[str, str]) -> Table:
-    """Return the table of topics that have numbers: their times are all stamps, or all of recording."""
     by_stamp = all(min(topic.stamps) > 0 for topic in topics)
-    clocks = [topic.stamps if by_stamp else topic.recorded for topic in topics]
-    began = min(map(min, clocks))
-    columns: list[Column] = []
-    for topic, instants in zip(topics, clocks, strict=True):
-        # differences of whole numbers: floats of seconds since 1970 are 0.2 us apart
-        times = (np.array(instants, dtype=np.int64) - began) / 1e9
-        columns += [topic.column(place, times) for place in topic.columns]
+    began = min(min(topic.stamps if by_stamp else topic.recorded) for topic in topics)
+    columns = [column for topic in topics for column in topic.table(began, by_stamp)]
     channels = Counter(channel_of(parse(column.label)) for column in columns)
     distinct = (  # the caller has to choose among several of one channel
         column
@@ -150,7 +123,7 @@ def _table(topics: list[_Topic], unread: Mapping[str, str]) -> Table:
         for column in columns
     )
     source = "header stamps" if by_stamp else "recording times"
-    return Table(tuple(distinct), meta={"time_source": source}, unread=unread)
+    return [Table(tuple(distinct), meta={"time_source": source}, unread=unread)]
 
 
 def _reader(path: Path) -> Any:
@@ -162,48 +135,39 @@ def _reader(path: Path) -> Any:
         """Return the reader of a database; for SQLite, # % ? are signs in its address."""
         return Sqlite3Reader(Path(quote(str(at), safe="/\\:")))
 
-    ending = path.suffix.casefold()
     storages = rosbag2.Reader.STORAGE_PLUGINS
     if path.is_dir():
         found: Any = storages["dir"](path)
         found.STORAGE_PLUGINS = {**found.STORAGE_PLUGINS, "sqlite3": database}
         return found
-    if ending == ".bag":
-        return rosbag1.Reader(path)
-    return database(path) if ending == ".db3" else storages[".mcap"](path)
+    readers: dict[str, Any] = {".bag": rosbag1.Reader, ".db3": database, ".mcap": storages[".mcap"]}
+    return readers[path.suffix.casefold()](path)
 
 
 def _topics(reader: Any) -> tuple[list[_Topic], dict[str, str]]:
-    """Return the topics of an open bag in the order of their first messages, and what is not read."""
-    known: dict[tuple[str, ...], _Topic] = {}
+    """Return the topics with numbers in the order of their first messages, and what is not read."""
     topics: dict[tuple[str, ...], _Topic] = {}
     unread: dict[str, str] = {}
-    readable = []
     for connection in reader.connections:
-        name, kind, *_ = key = _key(connection)
         try:
-            known[key] = known.get(key) or _Topic(name, kind, _decoder(connection))
-            readable.append(connection)
+            topic = _Topic(connection.topic, connection.msgtype, _decoder(connection))
+            topics.setdefault(_key(connection), topic)
         except Exception as error:  # the library raises anything at what it cannot read
-            unread[name] = _reason(error)
+            unread[connection.topic] = reason(error)
+    readable = [each for each in reader.connections if _key(each) in topics]
     for connection, when, raw in reader.messages(readable) if readable else ():
-        topic = topics.setdefault(_key(connection), known[_key(connection)])
-        if topic.name in unread:
-            continue
-        try:
-            topic.take(when, raw)
-        except Exception as error:
-            unread[topic.name] = f"message {len(topic.recorded) + 1}: {_reason(error)}"
+        topic = topics[_key(connection)]
+        if topic.name not in unread:
+            try:
+                topic.take(when, raw)
+            except Exception as error:
+                unread[topic.name] = f"message {len(topic.recorded) + 1}: {reason(error)}"
     found = [topic for topic in topics.values() if topic.name not in unread]
     for topic in found:
-        unread |= {topic.header(place): reason for place, reason in topic.unread.items()}
-        if not topic.columns and not topic.unread:
-            unread.setdefault(topic.name, "no numbers in it")
-    for storage in (reader, *getattr(reader, "storages", ())):
-        for connection in storage.connections:  # a folder may describe its files wrongly
-            if _key(connection) not in topics:
-                unread.setdefault(connection.topic, "no messages that belong to it")
-    return found, unread
+        none = "no numbers in it" if topic.recorded else "no messages that belong to it"
+        unread |= topic.unread or ({} if topic.columns else {topic.name: none})
+    numbers = [topic for topic in found if topic.columns]
+    return sorted(numbers, key=lambda topic: topic.recorded[0]), unread
 
 
 def _key(connection: Any) -> tuple[str, ...]:
@@ -223,56 +187,39 @@ def _decoder(connection: Any) -> Callable[[bytes], Any]:
         store.register(get_types_from_msg(text, kind))
     for section in filter(str.strip, _SECTION.split(text) if form.name == "IDL" else ()):
         store.register(get_types_from_idl(section))
-    try:
-        store.get_msgdef(kind)
-    except KeyError as error:
-        raise ValueError(f"the type {error} is not defined in it") from None
+    store.get_msgdef(kind)  # or KeyError
     decode = store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
     return partial(decode, typename=kind)
 
 
-def _fields(message: Any) -> Iterator[tuple[str, float | str]]:
-    """Yield the places of the fields of a message, with their numbers, or why there are none.
+def _numbers(
+    place: str, value: Any, names: Sequence[str] = ()
+) -> Iterator[tuple[str, float | str]]:
+    """Yield the places of the numbers in a message, with their values, or why there are none.
 
     Elements of arrays are called by the names in the message, as those of joints, if they are as many.
     """
-    found = getattr(message, "name", None)
-    names = found if isinstance(found, list) and len(set(found)) == len(found) else []
-    for name, value in _members(message):
-        if name == "header":
-            continue
-        if isinstance(value, np.ndarray) and 0 < len(value) == len(names) <= WIDEST:
-            for element, number in zip(names, value.tolist(), strict=True):
-                yield f"{name}/{element}", number
-        else:
-            yield from _numbers(name, value)
-
-
-def _numbers(place: str, value: Any) -> Iterator[tuple[str, float | str]]:
     if isinstance(value, (bool, int, float)):
         yield place, value
     elif isinstance(value, (list, np.ndarray)):
         if len(value) > WIDEST and not isinstance(value[0], str):
             yield place, f"an array of {len(value)}"
-        else:
-            for k, item in enumerate(value.tolist() if isinstance(value, np.ndarray) else value):
-                yield from _numbers(f"{place}[{k}]", item)
+            return
+        named = len(names) == len(value)
+        for k, item in enumerate(value.tolist() if isinstance(value, np.ndarray) else value):
+            yield from _numbers(f"{place}/{names[k]}" if named else f"{place}[{k}]", item)
     elif _is_time(value):
         yield place, "a time"
     elif not isinstance(value, str):
-        for name, item in _members(value):
-            yield from _numbers(f"{place}/{name}", item)
-
-
-def _members(message: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the fields of a message; constants, and the byte of an empty message, have defaults."""
-    for member in fields(message):
-        if member.default is MISSING:
-            yield member.name, getattr(message, member.name)
+        found = getattr(value, "name", None)
+        names = found if isinstance(found, list) and len(set(found)) == len(found) else []
+        for member in fields(value):  # constants, and the byte of an empty message, have defaults
+            if member.default is MISSING and member.name != "header":
+                yield from _numbers(f"{place}/{member.name}", getattr(value, member.name), names)
 
 
 def _is_time(value: Any) -> bool:
-    return getattr(value, "__msgtype__", None) in _TIMES
+    return getattr(value, "__msgtype__", "").startswith("builtin_interfaces/msg/")
 
 
 def _is_standard(word: str) -> bool:
@@ -283,7 +230,3 @@ def _is_standard(word: str) -> bool:
 def _indexed(header: str) -> str:
     """Return a header without brackets, in which units stand elsewhere."""
     return header.replace("[", "/").replace("]", "")
-
-
-def _reason(error: Exception) -> str:
-    return " ".join(str(error).split())[:200] or type(error).__name__

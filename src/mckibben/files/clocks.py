@@ -24,7 +24,7 @@ def on_one(
 
     Between its samples a column is linear, or holds the last where it is one of counts; where it has a
     gap, or another one needed has not begun or is over, samples are missing. Columns that were sampled
-    together stand as they are.
+    together do not change.
 
     Raises
     ------
@@ -33,24 +33,43 @@ def on_one(
     """
     if all(column.times is None for column in named.values()):
         return dict(named), []
-    clocked = {
-        name: column
-        for name, column in named.items()
-        if column.times is not None and column.times.size > 1
-    }
-    needed = _needed(clocked, request)
+    clocks = {name: column.times for name, column in named.items() if column.times is not None}
+    needed = _needed({name: times for name, times in clocks.items() if times.size > 1}, request)
     if not needed:
         raise DataError(
             "no channel in it has two samples", file=path, remedy="give a longer recording"
         )
-    for name, column in needed.items():
-        _check(name, _times(column), path)
-    steps = {name: float(np.median(np.diff(_times(column)))) for name, column in needed.items()}
+    for name, times in needed.items():
+        wrong = np.flatnonzero(~(np.diff(times) > 0))
+        if wrong.size:
+            at = int(wrong[0])
+            raise DataError(
+                f"its time goes from {times[at]:.10g} s to {times[at + 1]:.10g} s",
+                file=path,
+                channel=name,
+                row=at + 2,
+                remedy="sort its samples by time, and leave one for each instant",
+            )
+    steps = {name: float(np.median(np.diff(times))) for name, times in needed.items()}
     slowest = max(steps, key=lambda name: steps[name])
-    grid = _grid(needed, slowest, request, path)
-    if any(not np.array_equal(_times(column), grid) for column in needed.values()):
+    start = max(times[0] for times in needed.values())
+    stop = min(times[-1] for times in needed.values())
+    if (rate := request.rate) is None:
+        whose, grid = f"times of {slowest!r}", needed[slowest]
+        grid = grid[(grid >= start) & (grid <= stop)]
+    else:
+        whose, count = f"{rate:g} a second", int((stop - start) * rate + 1e-6) + 1
+        grid = start + np.arange(max(0, count)) / rate
+    if grid.size < 2:
+        spans = [f"{name} from {t[0]:.6g} to {t[-1]:.6g} s" for name, t in needed.items()]
+        raise DataError(
+            f"its channels have no time in common: {'; '.join(spans[:10])}",
+            file=path,
+            channel=slowest,
+            remedy="record them together, or name other columns with --column CHANNEL=COLUMN",
+        )
+    if any(not np.array_equal(times, grid) for times in needed.values()):
         rates = ", ".join(f"{name} {1 / step:.4g}" for name, step in list(steps.items())[:10])
-        whose = f"times of {slowest!r}" if request.rate is None else f"{request.rate:g} a second"
         warn(
             path,
             f"channels have times of their own (samples a second: {rates}); they were put on the "
@@ -59,81 +78,39 @@ def on_one(
     columns: dict[str, Column] = {"time": Column("time", grid, "s")}
     left_out: list[str] = []
     for name, column in named.items():
-        if column.times is None and name != "time" and column.values is not None:
+        own = clocks.get(name)
+        if own is None and name != "time" and column.values is not None:
             values = np.full(grid.size, column.values[0])  # a constant that the folder describes
             columns[name] = replace(column, values=values)
-        elif name in clocked and (name in needed or _spans(column, grid)):
-            columns[name] = replace(column, values=_at(column, grid), times=None)
+        elif own is not None and (name in needed or _spans(own, grid)):
+            columns[name] = replace(column, values=_at(column, own, grid), times=None)
         else:
             left_out.append(column.header)
     return columns, left_out
 
 
-def _times(column: Column) -> Array:
-    assert column.times is not None
-    return column.times
-
-
-def _needed(clocked: Mapping[str, Column], request: Request) -> dict[str, Column]:
+def _needed(clocks: dict[str, Array], request: Request) -> dict[str, Array]:
     """Return what the common clock must suit: what is asked for, or else what has a meaning, or all.
 
     A temperature that nobody asks for does not slow the rest down.
     """
-    told = {*request.columns, *request.described.channels}
-    asked = {name: column for name, column in clocked.items() if request.asks_for(name)}
-    known = {
-        name: column
-        for name, column in clocked.items()
-        if name in told or unit_of(name) not in (None, "degC")
+    named = {*request.columns, *request.described.channels}
+    asked = {name: times for name, times in clocks.items() if request.asks_for(name)}
+    meant = {
+        name: times
+        for name, times in clocks.items()
+        if name in named or unit_of(name) not in (None, "degC")
     }
-    return asked or known or dict(clocked)
+    return asked or meant or clocks
 
 
-def _check(name: str, times: Array, path: Path) -> None:
-    wrong = np.flatnonzero(~(np.diff(times) > 0))
-    if wrong.size:
-        at = int(wrong[0])
-        raise DataError(
-            f"its time goes from {times[at]:.10g} s to {times[at + 1]:.10g} s",
-            file=path,
-            channel=name,
-            row=at + 2,
-            remedy="sort its samples by time, and keep one for each instant",
-        )
+def _spans(times: Array, grid: Array) -> bool:
+    within = times.size > 1 and times[0] <= grid[0] and times[-1] >= grid[-1]
+    return bool(within and np.all(np.diff(times) > 0))
 
 
-def _grid(needed: Mapping[str, Column], slowest: str, request: Request, path: Path) -> Array:
-    start = max(float(_times(column)[0]) for column in needed.values())
-    stop = min(float(_times(column)[-1]) for column in needed.values())
-    if request.rate is None:
-        times = _times(needed[slowest])
-        grid = times[(times >= start) & (times <= stop)]
-    else:
-        grid = (
-            start + np.arange(max(0, int((stop - start) * request.rate + 1e-6) + 1)) / request.rate
-        )
-    if grid.size < 2:
-        spans = "; ".join(
-            f"{name} from {_times(column)[0]:.6g} to {_times(column)[-1]:.6g} s"
-            for name, column in list(needed.items())[:10]
-        )
-        raise DataError(
-            f"its channels have no time in common: {spans}",
-            file=path,
-            channel=slowest,
-            remedy="record them together, or name other columns with --column CHANNEL=COLUMN",
-        )
-    return grid
-
-
-def _spans(column: Column, grid: Array) -> bool:
-    times = _times(column)
-    return bool(times[0] <= grid[0] and times[-1] >= grid[-1] and np.all(np.diff(times) > 0))
-
-
-def _at(column: Column, grid: Array) -> Array:
+def _at(column: Column, times: Array, grid: Array) -> Array:
     """Return a column at other times, NaN where it has none."""
-    times = _times(column)
     if column.values is None or column.flaw is not None:
         return np.full(grid.size, np.nan)
     if np.array_equal(times, grid):
@@ -144,6 +121,5 @@ def _at(column: Column, grid: Array) -> Array:
     found: Array = np.interp(grid, times, column.values, left=np.nan, right=np.nan)
     steps = np.append(np.diff(times), 0.0)
     widest = max(GAP * float(np.median(np.diff(times))), float(np.median(np.diff(grid))))
-    inside = (steps[before] > widest) & (grid > times[before])
-    found[inside] = np.nan
+    found[(steps[before] > widest) & (grid > times[before])] = np.nan
     return found

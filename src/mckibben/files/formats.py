@@ -84,9 +84,8 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     module = _module(path, READERS, "read")
     with _refusing(path):
         _refuse_impostor(file, path)
-        if READERS[path.suffix.casefold()] == "text" and file.peek(64).lstrip(BOM).startswith(
-            LABVIEW
-        ):
+        text = READERS[path.suffix.casefold()] == "text"
+        if text and file.peek(64).lstrip(BOM).startswith(LABVIEW):
             module = import_module("mckibben.files.lvm")
         return [printable(table) for table in module.read(file, path)]
 
@@ -112,11 +111,12 @@ def _refusing(path: Path) -> Iterator[None]:
     except Exception as error:
         problem = f"it is damaged, or not {path.suffix[1:] or 'a bag'} ({reason(error)})"
         remedy = "export it again from its source"
-        if isinstance(error, OSError) and error.strerror:  # without, it is about the content
-            problem, remedy = (
-                f"it cannot be read ({error.strerror})",
-                "check the path and its rights",
-            )
+        if isinstance(error, MemoryError):
+            problem = "it needs more memory than there is"
+            remedy = "split it into shorter recordings"
+        elif isinstance(error, OSError) and error.strerror:  # without, it is about the content
+            problem = f"it cannot be read ({error.strerror})"
+            remedy = "check the path and its rights"
         raise DataError(problem, file=path, remedy=remedy) from None
 
 

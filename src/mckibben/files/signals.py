@@ -20,23 +20,18 @@ from mckibben.files.table import Column, Table
 from mckibben.files.units import convert
 
 REMEDY = (
-    "name the files as channels, such as pressure.csv and displacement.csv; or say in "
+    "name the files as channels, such as pressure.csv and displacement.csv; or write in "
     f'{NAME} which belong together, as in join = ["*_pressure.csv", "*_displacement.csv"]; or give '
     "files instead of the folder, where each is a recording"
 )
 
 
 def are_one(paths: Sequence[Path], said: Folder) -> bool:
-    """Tell whether the files of a folder hold one signal each and are one recording together.
+    """Return whether the files of a folder hold one signal each and are one recording together.
 
     They are where each has one column beside the times, and these are of different channels, at least
     one of them a standard one, by its header or the file's name. They are not where one has more
-    columns, or all are of one channel.
-
-    Raises
-    ------
-    DataError
-        If neither can be told.
+    columns, or all are of one channel; otherwise `DataError`.
     """
     if len(paths) < 2:
         return False
@@ -45,7 +40,7 @@ def are_one(paths: Sequence[Path], said: Folder) -> bool:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             tables = formats.tables(path)
-        signals = _signals(tables[0], said.of(path.name).time.column)
+        signals, _ = _split(tables[0], said.of(path.name).time.column)
         if len(tables) > 1 or len(signals) != 1:
             return False
         channels.append(channel_of(parse(_named(signals[0], path.stem).label)))
@@ -78,79 +73,75 @@ def joined(tables: Mapping[Path, Table], names: Sequence[str], request: Request)
         If one holds no or several signals; if some have times and others not, or none has and their
         lengths differ.
     """
-    signals: dict[Path, Column] = {}
     stamp = request.columns.get("time", request.described.time.column)
-    for (path, table), name in zip(tables.items(), names, strict=True):
-        found = _signals(table, stamp)
+    parts = {path: _split(table, stamp) for path, table in tables.items()}
+    for path, (found, clocks) in parts.items():
+        problem = None
         if len(found) != 1:
+            problem = f"{len(found)} columns of numbers, where one signal is expected"
+        elif len(clocks) != 1 and any(times for _, times in parts.values()):
+            problem = f"{len(clocks)} columns of times, where another file has one"
+        if problem:
             raise DataError(
-                f"it has {len(found)} columns of numbers, where one signal is expected",
+                f"it has {problem}",
                 file=path,
-                remedy=f"leave it out of join in {NAME}, or save one column beside the times in it",
+                channel="time" if len(found) == 1 else None,
+                remedy="save one signal in every file, and one column of times in all or in none, "
+                f"and give --rate; or leave the file out of join in {NAME}",
             )
-        signals[path] = _named(found[0], name)
-    clocks = [
-        [column for column in table.columns if _is_time(column, stamp)] for table in tables.values()
+    signals = [
+        _named(found[0], name) for (found, _), name in zip(parts.values(), names, strict=True)
     ]
+    clocks = [each for _, times in parts.values() for each in times]
     first = next(iter(tables.values()))
-    columns = tuple(signals.values())
-    if not any(clocks):
+    if not clocks:
         lengths = {path.name: table.n_samples for path, table in tables.items()}
         if len(set(lengths.values())) > 1:
-            said = ", ".join(f"{name} {n}" for name, n in lengths.items())
             raise DataError(
-                f"its files have no times and differ in length: {said}",
+                "its files have no times and differ in length: "
+                + ", ".join(f"{name} {n}" for name, n in lengths.items()),
                 file=next(iter(tables)).parent,
                 remedy=REMEDY,
             )
-        stated = (first.sample_time, first.rates)
-        same = all((table.sample_time, table.rates) == stated for table in tables.values())
-        step, told = stated if same else (None, {})
-        return Table(columns, first.lines, step, first.start_time, rates=told)
-    for path, clock in zip(tables, clocks, strict=True):
-        if len(clock) != 1:
-            raise DataError(
-                f"it has {len(clock)} columns of times, where another file has one",
-                file=path,
-                channel="time",
-                remedy="save one column of times in every file, or in none and give --rate",
-            )
-    if all(_same(clock[0], clocks[0][0]) for clock in clocks):
-        return Table((clocks[0][0], *columns), first.lines)
+        alike = {(each.sample_time, *each.rates.items()) for each in tables.values()}
+        step, rates = (first.sample_time, first.rates) if len(alike) == 1 else (None, {})
+        return Table(tuple(signals), first.lines, step, first.start_time, rates=rates)
+    if all(_same(each, clocks[0]) for each in clocks):
+        return Table((clocks[0], *signals), first.lines)
     return Table(
         tuple(
-            replace(signals[path], times=_seconds(clock[0], table, request, path))
-            for (path, table), clock in zip(tables.items(), clocks, strict=True)
+            replace(signal, times=_seconds(times, table, request, path))
+            for signal, times, (path, table) in zip(signals, clocks, tables.items(), strict=True)
         )
     )
 
 
-def _is_time(column: Column, stamp: str | None) -> bool:
-    header = parse(column.label)
-    return stamp in (column.header, header.name) or channel_of(header) == "time"
-
-
-def _signals(table: Table, stamp: str | None) -> list[Column]:
-    return [each for each in table.columns if each.values is not None and not _is_time(each, stamp)]
+def _split(table: Table, stamp: str | None) -> tuple[list[Column], list[Column]]:
+    """Return the signals of a table, and its times."""
+    signals: list[Column] = []
+    times: list[Column] = []
+    for column in table.columns:
+        header = parse(column.label)
+        if stamp in (column.header, header.name) or channel_of(header) == "time":
+            times.append(column)
+        elif column.values is not None:
+            signals.append(column)
+    return signals, times
 
 
 def _named(column: Column, name: str) -> Column:
-    """Return a column that is called by a name, which tells the channel; or else its own header does."""
+    """Return a column with the name of its file for the channel, or else with that of its header."""
     header = parse(column.header)
-    if not _is_standard(name) and _is_standard(column.header):
+    if unit_of(channel_of(parse(name))) is None and unit_of(channel_of(header)) is not None:
         return replace(column, header=name, says=column.header)
     return replace(column, header=name, unit=column.unit or header.unit)
 
 
-def _is_standard(header: str) -> bool:
-    return unit_of(channel_of(parse(header))) is not None
-
-
 def _same(one: Column, other: Column) -> bool:
-    if one.header != other.header or one.unit != other.unit:
+    if (one.header, one.unit, list(one.texts)) != (other.header, other.unit, list(other.texts)):
         return False
     if one.values is None or other.values is None:
-        return one.values is other.values and list(one.texts) == list(other.texts)
+        return one.values is other.values
     return np.array_equal(one.values, other.values, equal_nan=True)
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.files.headers import parse
 
 MOST_TEXT = 2**16
 """Most characters of a text about the recording; longer ones are left out."""
@@ -152,22 +151,6 @@ def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column
 def is_matrix(shape: Sequence[int]) -> bool:
     """Tell whether the rows or the columns of a matrix are channels: few, and long."""
     return len(shape) == 2 and 2 <= min(shape) <= WIDEST and max(shape) >= SLENDER * min(shape)
-
-
-def columns_of(
-    place: str, header: str, matrix: NDArray[Any], unit: str | None
-) -> dict[str, Column]:
-    """Return the channels of a matrix by their places: ``data[1]`` is the first column of ``data``."""
-    name = parse(header)
-    channels = matrix if matrix.shape[0] < matrix.shape[1] else matrix.T
-    return {
-        f"{place}[{i}]": replace(
-            column(f"{header}[{i}]", np.ascontiguousarray(values), unit or name.unit),
-            says=f"{name.name}_{i}",
-            matrix=place,
-        )
-        for i, values in enumerate(channels, start=1)
-    }
 
 
 def printable(table: Table) -> Table:

@@ -22,7 +22,7 @@ from mckibben.errors import DataError
 from mckibben.files import timebase
 from mckibben.files.headers import channel_of, parse, unit_of
 from mckibben.files.notices import listed
-from mckibben.files.table import Column, Table, column, columns_of, is_matrix
+from mckibben.files.table import Column, Table, column, is_matrix
 from mckibben.files.units import convert, find
 
 DATA = {"data", "samples", "signal", "value", "values", "y"}
@@ -51,31 +51,25 @@ Group: TypeAlias = Mapping[str, Node]
 
 @dataclass(frozen=True)
 class _Vector:
-    """A vector or matrix without axes of one element, and what is written about it.
+    """A vector or a column of a matrix, and what is written about it.
 
     Its ``home`` are the groups around it: it shares the times in the innermost that has some. Its
-    ``says`` is the name of its struct, where that names the channel; its ``columns`` are the names and
-    units of the columns of a matrix.
+    ``name`` is that of the channel, its ``header`` what a user calls it where that is unique.
     """
 
     place: str
     home: tuple[str, ...]
     name: str
+    header: str
     values: NDArray[Any]
     unit: str | None
-    says: str | None
-    columns: Mapping[str, str | None]
-
-    @property
-    def length(self) -> int:
-        return max(self.values.shape)
+    matrix: str | None = None
 
     @property
     def seconds(self) -> Array | None:
         """The samples [s], if these are times."""
-        label = self.says or self.name
-        unit = find(self.unit or parse(label).unit or "s")
-        if self.values.ndim > 1 or not _is_time(label) or unit is None or unit.target != "s":
+        unit = find(self.unit or parse(self.name).unit or "s")
+        if not _is_time(self.name) or unit is None or unit.target != "s":
             return None
         return convert(np.asarray(self.values, dtype=np.float64), unit.name, "s")
 
@@ -98,12 +92,12 @@ def table(
     walk = _Walk(dot)
     walk.group(tree, ())
     unread, texts = walk.unread, walk.texts
-    vectors, times = _clocks([walk.with_units(each) for each in walk.vectors])
+    vectors, times = _clocks([walk.with_unit(each) for each in walk.vectors])
     if times:
         without = sorted(each.place for each in vectors if each.place not in times)
         unread |= dict.fromkeys(without, "it has no times, and others have their own")
         vectors = [each for each in vectors if each.place in times]
-    lengths = set() if times else {each.length for each in vectors}
+    lengths = set() if times else {each.values.size for each in vectors}
     unread |= {place: "text" for place, lines in texts.items() if len(lines) not in lengths}
     if not vectors:
         raise without_numbers(unread, path)
@@ -166,40 +160,44 @@ class _Walk:
             elif reason := _unreadable(node):
                 self.unread[place] = reason
             elif isinstance(node, np.ndarray) and node.size:
-                values, name, says, above = np.squeeze(node), field, None, home
                 unit = attributes.get(field) or _field(nodes.get(f"{field}Info"), UNITS)
                 if field == signal and unit is None:
                     unit = units
-                if isinstance(unit, list) and values.shape == (len(unit),):
+                if isinstance(unit, list) and len(unit) == node.size:
                     self.unread[place] = "its unit changes"
                     continue
+                name, header, above, values = field, field, home, np.squeeze(node)
                 if field == signal and home and field.casefold() in DATA:
                     if isinstance(names, str) and names.strip():
-                        name = names
+                        name = header = names
                     elif values.ndim == 1:
-                        says = home[-1]
-                    above = home[:-1] if _is_time(says or name) else home
-                unit, columns = unit if isinstance(unit, str) and unit else None, {}
-                if isinstance(names, list) and values.ndim == 2:
-                    columns = {str(each): attributes.get(each) or unit for each in names}
-                    if len(columns) != min(values.shape):
-                        columns = {}
-                self.vectors.append(_Vector(place, above, name, values, unit, says, columns))
+                        name, header = home[-1], place
+                    above = home[:-1] if _is_time(name) else home
+                unit = unit if isinstance(unit, str) and unit else None
+                if values.ndim == 1:
+                    self.vectors.append(_Vector(place, above, name, header, values, unit))
+                    continue
+                rows = values if values.shape[0] < values.shape[1] else values.T
+                named = isinstance(names, list) and len(names) == len(rows)
+                for i, row in enumerate(rows, start=1):
+                    one = str(names[i - 1]) if named else f"{parse(name).name}_{i}"
+                    its = attributes.get(one) or unit or parse(name).unit
+                    called = one if named else f"{header}[{i}]"
+                    self.vectors.append(
+                        _Vector(f"{place}[{i}]", above, one, called, row, its, place)
+                    )
 
-    def with_units(self, vector: _Vector) -> _Vector:
-        """Return a vector with the units that a struct beside it or a group around it has for it."""
-
-        def unit_for(name: str) -> str | None:
-            known = {
-                home: {legend[name] for at, legend in self.legends if at == home and name in legend}
-                for home in (vector.home[:i] for i in range(len(vector.home) + 1))
+    def with_unit(self, vector: _Vector) -> _Vector:
+        """Return a vector with the unit in a struct beside it or beside a group around it."""
+        for i in range(len(vector.home), -1, -1) if vector.unit is None else ():
+            found = {
+                legend[vector.name]
+                for at, legend in self.legends
+                if at == vector.home[:i] and vector.name in legend
             }
-            (*_, nearest) = [set(), *filter(None, known.values())]
-            return nearest.pop() if len(nearest) == 1 else None
-
-        columns = {name: unit or unit_for(name) for name, unit in vector.columns.items()}
-        unit = vector.unit or unit_for(vector.says or vector.name)
-        return replace(vector, unit=unit, columns=columns)
+            if found:
+                return replace(vector, unit=found.pop() if len(found) == 1 else None)
+        return vector
 
 
 def _unreadable(node: Node) -> str | None:
@@ -292,7 +290,7 @@ def _clocks(vectors: Sequence[_Vector]) -> tuple[list[_Vector], dict[str, Array]
             time
             for time in vectors
             if time.place in seconds
-            and time.length == each.length
+            and time.values.size == each.values.size
             and each.home[: len(time.home)] == time.home
         ]
         depth = max((len(time.home) for time in shared), default=0)
@@ -308,25 +306,15 @@ def _clocks(vectors: Sequence[_Vector]) -> tuple[list[_Vector], dict[str, Array]
 
 def _columns(vectors: Sequence[_Vector], times: Mapping[str, Array]) -> list[Column]:
     """Return the columns of vectors; where a name is not unique, the place is the header."""
-    names = Counter(name for each in vectors for name in each.columns or [each.name])
+    names = Counter(each.name for each in vectors)
     columns: list[Column] = []
     for each in vectors:
-        unique = names[each.name] == 1
-        if each.values.ndim == 1:
-            header = each.name if unique and each.says is None else each.place
-            says = each.says or (None if unique else _label(each.name, each.place))
-            found = {each.place: replace(column(header, each.values, each.unit), says=says)}
-        else:
-            header = each.says or (each.name if unique else each.place)
-            found = columns_of(each.place, header, each.values, each.unit)
-        for (place, one), (name, unit) in zip(found.items(), each.columns.items(), strict=False):
-            header, says = (name, None) if names[name] == 1 else (place, _label(name, place))
-            found[place] = replace(one, unit=unit, header=header, says=says)
-        columns += [replace(one, times=times.get(each.place)) for one in found.values()]
+        name, header = each.name, each.header
+        if names[name] > 1:
+            header = each.place
+            if unit_of(channel_of(parse(name))) is None:  # no standard channel
+                name = re.sub(r"\W+", "_", each.place).strip("_")
+        own = column(header, np.ascontiguousarray(each.values), each.unit)
+        says = None if name == header else name
+        columns.append(replace(own, says=says, times=times.get(each.place), matrix=each.matrix))
     return columns
-
-
-def _label(name: str, place: str) -> str:
-    """Return what names the channel where several have a name: that, if it is a standard one."""
-    standard = unit_of(channel_of(parse(name))) is not None
-    return name if standard else re.sub(r"\W+", "_", place)

@@ -255,7 +255,7 @@ CASES: list[Case] = [
     Case("short_line.csv", line(12, "1.0,2.0"), row=12, names="2 cells"),
     Case("short_header.csv", headers("time_s,pressure_bar"), row=2, names="3 cells"),
     Case("quote.csv", line(6, '"0.4,2.9,9.0'), row=6),
-    Case("long.csv", line(3, "1" * 20_000_000), row=3, names="20000000"),
+    Case("long.csv", line(3, "1" * 20_000_000), row=3, names="1 cells"),
     # Columns
     Case("no_names.csv", good().partition(b"\n")[2], P, names="column_1"),
     Case("no_displacement.csv", csv(time_s=TIME, pressure_bar=PRESSURE), X),

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files import formats
-from mckibben.files.text import sidecar
+from mckibben.files.own import sidecar
 
 N = 40
 T = [k / 100 for k in range(N)]

@@ -1,47 +1,159 @@
-"""Which recordings this package wrote, and nobody has changed since."""
+"""Recordings as this package writes them: reading one gives the same recording to the last bit."""
 
 from __future__ import annotations
 
+import json
 import warnings
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from mckibben.errors import MckibbenError
-from mckibben.files import stored
-from mckibben.files.formats import READERS, tables
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from mckibben.arrays import Array
+from mckibben.errors import DataError, MckibbenError
+from mckibben.files.formats import READERS, tables, writer
+from mckibben.files.table import Column, Table
+from mckibben.recording import Recording
 from mckibben.system import manifest, ordinary
 
 
-def description(path: Path) -> Path | None:
-    """Return where the description of a text file lies; None for other formats."""
-    if READERS.get(path.suffix.casefold()) != "text":
-        return None
-    from mckibben.files.text import sidecar
+class Stored(BaseModel):
+    """The description of a recording in a CSV's sidecar or in the schema of a Parquet file.
 
-    return sidecar(path)
+    Parameters
+    ----------
+    sha256 : str
+        Of the samples as they are on disk, to see whether they were changed since.
+    sample_time, start_time : float or None, float
+        The time grid [s]; with a sample time, the first column is the time.
+    units : dict of str to str
+        Unit of every channel, in the order of the columns.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+    format: Literal["mckibben-recording"] = "mckibben-recording"
+    version: Literal[1] = 1
+    sha256: str
+    sample_time: Annotated[float, Field(ge=1e-12, lt=1e11)] | None
+    start_time: float
+    units: dict[str, str]
+    meta: dict[str, Any]
+
+    def table(self, values: dict[str, Array]) -> Table:
+        """Return the table of the samples described, by channel."""
+        return Table(
+            tuple(Column(name, values[name], unit) for name, unit in self.units.items()),
+            sample_time=self.sample_time,
+            start_time=self.start_time,
+            meta=self.meta,
+            own=True,
+        )
+
+
+def write(recording: Recording, path: str | Path) -> None:
+    """Write a recording to a file, which `read` turns into an equal one; a file there is replaced.
+
+    Parameters
+    ----------
+    recording : Recording
+    path : path
+        Ends in ``.csv``, ``.tsv`` or ``.parquet``. Text files have a plain header of channel
+        names, ``time`` [s] first where the recording has time, and a sidecar
+        ``NAME.csv-metadata.json`` with units, time grid and meta beside them.
+
+    Raises
+    ------
+    DataError
+        If the ending is another, the folder cannot be written to, a channel is named ``time``, or
+        ``meta`` holds what JSON cannot. What was in the file before is then still there.
+    """
+    path = Path(path)
+    writer(path).write(recording, path)
+
+
+def describe(recording: Recording, samples: bytes, path: Path) -> str:
+    """Return the description, in JSON, of a recording whose samples are these bytes on disk.
+
+    Raises
+    ------
+    DataError
+        If a channel is named ``time``, which the grid is, or in a way no header can hold; or if
+        ``meta`` holds what JSON cannot.
+    """
+    for name, unit in recording.units.items():
+        if name == "time" or not name.strip() or not (name + unit).isprintable():
+            raise DataError(
+                f"no column can be named {name!r} with the unit {unit[:40]!r}",
+                file=path,
+                channel=name,
+                remedy="rename the channel and give its unit in plain letters; the time is written "
+                "from the sample time",
+            )
+    step = recording.sample_time
+    stored = Stored.model_construct(
+        sha256=manifest.digest(samples),
+        sample_time=None if step is None else float(step),
+        start_time=float(recording.start_time),
+        units=dict(recording.units),
+        meta=dict(recording.meta),
+    )
+    try:
+        return json.dumps(stored.model_dump(), indent=2, allow_nan=False, ensure_ascii=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        problem = f"the recording's meta cannot be written as JSON ({error})"
+        remedy = "use only text, finite numbers, lists and dicts in meta"
+        raise DataError(problem, file=path, remedy=remedy) from None
+
+
+def parse(text: str | bytes) -> Stored | str:
+    """Return what the JSON describes, or in words why it does not."""
+    try:
+        found = Stored.model_validate_json(text)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        return f"{where[:60]}: {first['msg'][:200]}".removeprefix(": ")
+    words = (*found.units, *found.units.values())
+    return found if all(map(str.isprintable, words)) else "its names cannot be printed"
+
+
+def sidecar(path: Path) -> Path:
+    """Return where the description of a text file is, named as in W3C's "CSV on the Web".
+
+    >>> sidecar(Path("run.csv")).name
+    'run.csv-metadata.json'
+    """
+    return path.with_name(f"{path.name}-metadata.json")
+
+
+def description(path: Path) -> Path | None:
+    """Return where the description of a text file is; None for other formats."""
+    return sidecar(path) if READERS.get(path.suffix.casefold()) == "text" else None
 
 
 def describes(path: Path) -> bool:
-    """Tell whether a file is a description by this package."""
+    """Return whether a file is a description by this package."""
     return _described(path) is not None
 
 
 def is_own(path: Path) -> bool:
-    """Tell whether a file is a recording by this package, as it was written."""
+    """Return whether a file is a recording by this package, as it was written."""
     beside = description(path)
+    if beside is not None:
+        found = _described(beside)
+        return found is not None and manifest.holds(path, {found.sha256})
     try:
-        if beside is None:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                return all(table.own for table in tables(path))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return all(table.own for table in tables(path))
     except MckibbenError:
         return False
-    found = _described(beside)
-    return found is not None and manifest.holds(path, {found.sha256})
 
 
-def _described(path: Path) -> stored.Stored | None:
+def _described(path: Path) -> Stored | None:
     try:
-        found = stored.parse(ordinary.read_bytes(path, most=ordinary.DESCRIPTION))
+        found = parse(ordinary.read_bytes(path, most=ordinary.DESCRIPTION))
     except MckibbenError:
         return None
     return None if isinstance(found, str) else found

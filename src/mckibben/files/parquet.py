@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.files import stored
+from mckibben.files import own
 from mckibben.files.notices import warn
-from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table, column
 from mckibben.files.tree import without_numbers
 from mckibben.recording import Recording
@@ -29,9 +28,9 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
     frame = pq.ParquetFile(file).read()
     text = (frame.schema.metadata or {}).get(_KEY)
-    own = None if text is None else _own(frame, text, path)
-    if own is not None:
-        return [own]
+    described = None if text is None else _own(frame, text, path)
+    if described is not None:
+        return [described]
     columns: list[Column] = []
     unread: dict[str, str] = {}
     for field, cells in zip(frame.schema, frame.columns, strict=True):
@@ -50,16 +49,16 @@ def write(recording: Recording, path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    description = Stored.describe(recording, _samples(recording.channels), path)
+    description = own.describe(recording, _samples(recording.channels), path)
     time = {} if recording.sample_time is None else {"time": recording.time}
     frame = pa.table({**time, **recording.channels})
-    frame = frame.replace_schema_metadata({_KEY: description.to_json(path)})
+    frame = frame.replace_schema_metadata({_KEY: description})
     with replacing(path) as new:
         pq.write_table(frame, new)
 
 
 def _own(frame: Any, text: bytes, path: Path) -> Table | None:
-    description = stored.parse(text)
+    description = own.parse(text)
     if isinstance(description, str):
         problem = f"the description in it is not by this package ({description})"
     else:

@@ -19,19 +19,7 @@ SEPARATORS = ("\t", ";", "|", ",", None)
 """In the order in which they are preferred where a file can be read in two ways; None is blanks."""
 
 MISSING = (
-    "-",
-    "--",
-    "---",
-    "NaN",
-    "nan",
-    "NAN",
-    "NA",
-    "N/A",
-    "n/a",
-    "#N/A",
-    "null",
-    "NULL",
-    "None",
+    *("-", "--", "---", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None"),
 )
 """Cells of samples that were not taken."""
 
@@ -44,6 +32,13 @@ NUMBER = {
 COMMENT = re.compile(r"\s*(?:#(?!N/?A\b|DIV/0|VALUE!|REF!|NUM!|NAME\?|NULL!)|%|//|;)[\s#%/;]*")
 """What begins a comment; not the errors of spreadsheets, and a semicolon not where it separates."""
 
+GROUPED = re.compile(
+    r"[+-]?\d{1,3}(?P<mark>[.,'’`_ \xa0\u2009\u202f])(?:\d{2,3}(?P=mark))*\d{3}(?:[.,]\d*)?"
+    r"|[+-]?\d*[.,]\d+",  # a number with the other decimal mark
+    re.ASCII,
+)
+"""A number that may mean several: with marks between thousands, or another decimal mark."""
+
 _ENCODINGS = ("cp1252", "cp932", "gb18030", "cp949", "latin-1")
 _UNIT = r"(?:\s*[A-Za-z°%µμΩ][^\s\d,;:]{0,7})?"
 _SPACED = r"[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d*)?"  # refused later, but one cell where it can be
@@ -51,7 +46,6 @@ _LIKE = {
     mark: re.compile(rf"{form}{_UNIT}|{_SPACED}|0[xX][0-9a-fA-F]+", re.ASCII)
     for mark, form in NUMBER.items()
 }
-_GROUPED = re.compile(r"[+-]?\d{1,3}(?:[ .,'’_\xa0\u2009\u202f]\d{3})+(?:[.,]\d*)?", re.ASCII)
 _WITH_BRACKETS = re.compile(r"\S+(?:\s*[\[(][^\])]*[\])]+)?")
 _CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])
 _LOOKED_AT = 2**16
@@ -87,7 +81,7 @@ class Dialect:
 
     def is_value(self, cell: str) -> bool:
         """Return whether a cell holds a number in any form, or an instant."""
-        return self.is_number(cell) or bool(_GROUPED.fullmatch(cell)) or may_be_instant(cell)
+        return self.is_number(cell) or bool(GROUPED.fullmatch(cell)) or may_be_instant(cell)
 
 
 @dataclass(frozen=True)

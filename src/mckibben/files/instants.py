@@ -39,16 +39,14 @@ def seconds(texts: Sequence[str], table: Table, path: Path) -> Array:
     Parameters
     ----------
     texts : sequence of str
-        All in one form: ISO 8601, with a zone or without; ``31.12.2026 12:00:00.5`` or
-        ``31-Dec-2026 12:00:00.5`` (the day first); ``2026/12/31 12:00:00,5``;
-        ``12/31/2026 12:00:00.5`` (with the day first or the month, as the numbers show); or
-        ``12:00:00.5`` alone.
+        All in one form: ISO 8601, ``31.12.2026 12:00:00.5``, ``31-Dec-2026 12:00``,
+        ``2026/12/31 12:00:00,5``, ``12/31/2026 12:00`` (with the day first or the month, as the
+        numbers show), or ``12:00:00.5`` alone; with a zone or without.
 
     Raises
     ------
     DataError
-        On a text that is none, naming the row; or where day and month cannot be distinguished and
-        the result depends on it.
+        On a text that is none, or where the result depends on whether the day is first.
     """
     import pandas as pd
 
@@ -78,8 +76,8 @@ def seconds(texts: Sequence[str], table: Table, path: Path) -> Array:
 
 def _in_one_form(parts: Any, form: re.Match[str], table: Table, path: Path) -> tuple[Any, str]:
     """Return instants written alike from their parts, and their format for `pandas.to_datetime`."""
-    cells = parts["clock"] if form["clock"] else parts["clock"].fillna("00:00")
-    cells = cells + ":" + parts["whole"].fillna("00") + "." + parts["part"].fillna("0")
+    clock = parts["clock"] if form["clock"] else parts["clock"].fillna("00:00")
+    cells = clock + ":" + parts["whole"].fillna("00") + "." + parts["part"].fillna("0")
     pattern = "%H:%M:%S.%f"
     if form["half"]:
         cells, pattern = cells + " " + parts["half"] + "M", "%I:%M:%S.%f %p"
@@ -88,31 +86,26 @@ def _in_one_form(parts: Any, form: re.Match[str], table: Table, path: Path) -> t
         pattern += "%z"
     if form["first"] is None:  # the time of day alone
         return cells.where(parts["first"].isna()), pattern
-    year, month = "%Y" if len(form["third"]) == 4 else "%y", "%m"
-    if form["second"].isalpha():
-        month = "%b"
+    year = "%Y" if len(form["third"]) == 4 else "%y"
+    month = "%b" if form["second"].isalpha() else "%m"
     if len(form["first"]) == 4:
-        days = f"%Y/{month}/%d"
-    elif _day_first(parts, form, table, path):
-        days = f"%d/{month}/{year}"
+        days = ("%Y", month, "%d")
     else:
-        days = f"{month}/%d/{year}"
+        days = ("%d", month, year) if _day_first(parts, form, table, path) else (month, "%d", year)
     dates = parts["first"] + "/" + parts["second"] + "/" + parts["third"]
-    return dates + " " + cells, f"{days} {pattern}"
+    return dates + " " + cells, f"{'/'.join(days)} {pattern}"
 
 
 def _day_first(parts: Any, form: re.Match[str], table: Table, path: Path) -> bool:
     """Return whether the day is before the month: where no number shows it, after dots it is."""
+    import pandas as pd
+
     if form["mark"] == "." or form["second"].isalpha():
         return True
-    days = parts[["first", "second", "third"]].dropna().drop_duplicates()
-    firsts, seconds_ = (
-        days[part].astype(str).where(days[part].str.isdigit(), "0").astype(int)
-        for part in ("first", "second")
-    )
-    if firsts.max() > 12 or seconds_.max() > 12:
-        return bool(firsts.max() > 12)
-    if len(days) > 1 and (firsts != seconds_).any():
+    days = parts[["first", "second"]].apply(pd.to_numeric, errors="coerce").dropna()
+    if days.max().max() > 12:
+        return bool(days["first"].max() > 12)
+    if days.nunique().max() > 1 and (days["first"] != days["second"]).any():
         raise DataError(
             f"{form.group()[:40]!r} may have the day first or the month",
             file=path,

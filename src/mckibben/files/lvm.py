@@ -21,7 +21,6 @@ from mckibben.files.sniffing import Dialect, Layout, decoded
 from mckibben.files.table import Column, Table
 from mckibben.files.text import block
 
-BEGINNING = b"LabVIEW Measurement"
 _WORDS = re.compile(rb"^[A-Za-z*][^\n]*", re.MULTILINE)  # no line of samples begins so
 _END = "***End_of_Header***"
 _X = "X_Value"
@@ -31,11 +30,7 @@ About = Mapping[str, Sequence[str]]
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the segments of a file, each a table."""
-    return tables(decoded(file.read(), path), path)
-
-
-def tables(data: bytes, path: Path) -> list[Table]:
-    """Return the segments of a text in UTF-8, each a table."""
+    data = decoded(file.read(), path)
     separator = re.search(rb"^Separator([\t,;])", data, re.MULTILINE)
     mark = re.search(rb"^Decimal_Separator[\t,;]([.,])", data, re.MULTILINE)
     dialect = Dialect(
@@ -45,17 +40,14 @@ def tables(data: bytes, path: Path) -> list[Table]:
     about: dict[str, Sequence[str]] = {}
     found: list[Table] = []
     n_headers = 0
-    for (line, text), following in zip_longest(heads, heads[1:]):
+    for (line, text), stop in zip_longest(heads, [line for line, _ in heads[1:]]):
         key, *values = dialect.split(text)
         if key == _X and n_headers > 1:
             names = [key, *(value or f"Untitled {i}" for i, value in enumerate(values, start=1))]
             names[-1] = names[-1].replace("Comment", "")  # lines may end before what has no name
             layout = Layout(dialect, len(names), names, _units(names, about), line + 1)
-            table = block(data, layout, path, None if following is None else following[0])
-            columns = tuple(column for column in table.columns if column.header in names)
-            unread = {place: why for place, why in table.unread.items() if place in names}
-            table = replace(table, columns=columns, unread=unread)
-            found.append(_timed(table, about, dialect.decimal))
+            table = block(data, layout, path, stop)
+            found.append(_timed(table, names, about, dialect.decimal))
         n_headers += key == _END
         about[key] = values
     if not found:
@@ -73,11 +65,12 @@ def _units(names: Sequence[str], about: About) -> list[str | None]:
     return [time if name == _X else next(labels, "") or None for name in names]
 
 
-def _timed(table: Table, about: About, decimal: str) -> Table:
+def _timed(table: Table, names: Sequence[str], about: About, decimal: str) -> Table:
     """Return a segment with its times: in one column, in one for each channel, or stated."""
     clocks = [column for column in table.columns if column.header == _X]
-    channels = [column for column in table.columns if column.header != _X]
-    unread = {place: why for place, why in table.unread.items() if place != _X}
+    names = [name for name in names if name != _X]  # not of comments
+    channels = [column for column in table.columns if column.header in names]
+    unread = {place: why for place, why in table.unread.items() if place in names}
     table = replace(table, columns=tuple(channels), unread=unread)
     if clocks[0].unit != "s":
         return table

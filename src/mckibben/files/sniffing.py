@@ -143,33 +143,29 @@ def sniff(lines: Sequence[str], separators: Sequence[str | None] = SEPARATORS) -
     if not rows:
         return None
     block = [row for _, row in rows[len(rows) // 2 :] if len(row) == width]
-    held = [[row[i] for row in block if row[i] and row[i] not in MISSING] for i in range(width)]
-    solid = [
-        i for i, cells in enumerate(held) if 2 * sum(map(dialect.is_value, cells)) > len(cells)
+    solid = [i for i in range(width) if _balance([row[i] for row in block], dialect) > 0]
+    samples = [
+        len(row) == width and _balance([row[i] for i in solid], dialect) > 0 for _, row in rows
     ]
-    first = next(
-        (k for k, (_, row) in enumerate(rows) if _is_sample(row, width, solid, dialect)), 0
-    )
-    heads = [_fitted(row, width, spare=not held[-1]) for _, row in rows[:first]]
-    words = [k for k, row in enumerate(heads) if len(row) == width and _is_words(row, dialect)]
-    units: list[str] = []
+    first = samples.index(True) if True in samples else 0
+    spare = not any(row[-1] for row in block)
+    heads = [_fitted(row, width, spare) for _, row in rows[:first]]
+    words = [k for k, row in enumerate(heads) if len(row) == width and _balance(row, dialect) < 0]
     if words:
-        first, header = words[-1] + 1, heads[words[-1]]
-        above = heads[first - 2] if first > 1 else []
-        if len(above) == width and _are_units(header, above):
-            header, units = above, header
+        first = words[-1] + 1
+        names = heads[max(first - 2, 0) : first]
     elif not solid:  # nothing but words
-        first, header = 1, rows[0][1]
+        first, names = 1, [rows[0][1]]
     else:
         while first and len(heads[first - 1]) == width:  # no words: damaged samples
             first -= 1
         notes = [line for at, line in texts if at < rows[first][0] and dialect.is_comment(line)]
-        said = [dialect.split(COMMENT.sub("", line, count=1), width) for line in notes[-2:]]
-        header = said[-1] if said else []
-        if len(said) == 2 and len(said[0]) == len(header) == width and _are_units(header, said[0]):
-            header, units = said[0], header
-        if len(header) != width:  # what has several cells is a header, if not of these rows
-            header = heads[first - 1] if first and len(heads[first - 1]) > 1 else []
+        names = [dialect.split(COMMENT.sub("", line, count=1), width) for line in notes[-2:]]
+        if not names or len(names[-1]) != width:
+            names = [row for row in heads[:first][-1:] if len(row) > 1]  # a header of other rows
+    header, units = names[-1] if names else [], []
+    if len(names) == 2 and len(names[0]) == width and _are_units(header, names[0]):
+        header, units = names
     stated = [cell.strip("[]() ") or None for cell in units] or [None] * len(header)
     return Layout(dialect, width, header, stated, (*(at for at, _ in rows), len(lines))[first])
 
@@ -199,18 +195,13 @@ def _fitness(dialect: Dialect, lines: Sequence[str]) -> tuple[float, float, bool
     return score, fits, width > 1, width, dialect
 
 
-def _is_sample(row: Sequence[str], width: int, solid: Sequence[int], dialect: Dialect) -> bool:
-    """Return whether most columns of numbers have one in a row."""
-    held = [row[i] for i in solid if row[i] and row[i] not in MISSING] if len(row) == width else []
-    return 2 * sum(map(dialect.is_value, held)) > len(held)
+def _balance(cells: Sequence[str], dialect: Dialect) -> int:
+    """Return how many more values than words there are in cells."""
+    filled = [cell for cell in cells if cell and cell not in MISSING]
+    return 2 * sum(map(dialect.is_value, filled)) - len(filled)
 
 
-def _is_words(row: Sequence[str], dialect: Dialect) -> bool:
-    filled = [cell for cell in row if cell and (cell == "-" or cell not in MISSING)]
-    return 2 * sum(map(dialect.is_value, filled)) < len(filled)
-
-
-def _fitted(row: list[str], width: int, *, spare: bool) -> list[str]:
+def _fitted(row: list[str], width: int, spare: bool) -> list[str]:
     """Return a row with the separator at its end that the samples have, or without the one they lack."""
     if len(row) == width + 1 and not row[-1]:
         return row[:-1]

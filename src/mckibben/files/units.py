@@ -53,10 +53,9 @@ RARE: dict[str, dict[str, str]] = {
 """The same for units that are understood and never proposed."""
 
 MASSES = {
-    "gf": ("g", "gram", "grams"),
-    "kgf": ("kg", "kilogram", "kilograms"),
+    "gf": ("g", "gram", "grams"), "kgf": ("kg", "kilogram", "kilograms"),
     "lbf": ("lb", "lbs", "pound", "pounds"),
-}
+}  # fmt: skip
 """Unit of force -> those of the mass that hangs with it."""
 
 COUNTS = frozenset(
@@ -72,23 +71,13 @@ _READABLE = re.compile(rf"{_WORD}(?:[*/· ]\(?{_WORD}\)?)*")
 _POWER = re.compile(r"(?<=[A-Za-z])(?=-?[1-3](?![\d.]))")
 _LOOK_ALIKES = str.maketrans({"º": "°", "µ": "u", "μ": "u", "⋅": "·", "∙": "·", "−": "-"})
 
-LONGEST = 40
-"""Characters of a unit; what is longer is none."""
-
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit: its name for pint, and the package's unit of the same dimension.
+    """A unit by its name for pint, and the package's of that dimension, None where there is none.
 
-    Parameters
-    ----------
-    name : str
-        As pint reads it.
-    target : str or None
-        The package's unit of that dimension; None where the package has none, so that the samples
-        are not converted.
-    reference : {"gauge", "absolute"} or None
-        What a pressure is measured from, where the unit states it; no offset is ever removed.
+    ``reference`` is what a pressure is measured from, where the unit states it; no offset is ever
+    removed.
     """
 
     name: str
@@ -102,14 +91,10 @@ def find_listed(text: str) -> Unit | None:
     Not where that would make a thousandth of a million: MN are no mN. Nor where two would be meant:
     NM may be newton metres or nanometres.
     """
-    text = text.strip()
-    if len(text) > LONGEST:
-        return None
     text = _plain(text)
     exact, folded = _lookup()
-    found = exact.get(text)
-    if found is not None or len(text) == 1 or (text.startswith("M") and text[1:] in exact):
-        return found
+    if text in exact or len(text) == 1 or (text.startswith("M") and text[1:] in exact):
+        return exact.get(text)
     return folded.get(text.casefold())
 
 
@@ -119,24 +104,18 @@ def find(text: str) -> Unit | None:
     >>> find("kPa"), find("psig").reference, find("nonsense")
     (Unit(name='kPa', target='bar', reference=None), 'gauge', None)
     """
-    text = text.strip()
-    if len(text) > LONGEST:
-        return None
     text = _plain(text)
     if not text:
         return Unit("", "")
     if text.casefold() in COUNTS:
         return Unit("count", None)
-    listed = find_listed(text)
-    if listed is not None:
-        return listed
     gauge = GAUGE.fullmatch(text)
-    unit = None if gauge is None else find_listed(gauge["unit"])
-    if gauge is not None and unit is not None:
+    unit = find_listed(text)
+    if unit is None and gauge and (unit := find_listed(gauge["unit"])):
         kind = gauge["kind"].casefold()
         return Unit(unit.name, unit.target, "gauge" if kind.startswith("g") else "absolute")
     # pint evaluates numbers, so only products of words with small exponents are handed to it.
-    return _ask_pint(_POWER.sub("^", text)) if _READABLE.fullmatch(text) else None
+    return unit or (_ask_pint(_POWER.sub("^", text)) if _READABLE.fullmatch(text) else None)
 
 
 def weight(text: str) -> str:
@@ -158,8 +137,7 @@ def convert(samples: Array, unit: str, target: str) -> Array:
     if unit == target:
         return samples
     quantity = _registry().Quantity(samples, unit or "dimensionless")
-    converted: Array = quantity.to(target or "dimensionless").magnitude
-    return converted
+    return quantity.to(target or "dimensionless").magnitude
 
 
 @cache
@@ -170,12 +148,11 @@ def _lookup() -> tuple[dict[str, Unit], dict[str, Unit]]:
         for name, spellings in names.items()
         for spelling in spellings.split(" ")
     }
-    folded: dict[str, Unit | None] = {}
+    folded: dict[str, set[Unit]] = {}
     for spelling, unit in exact.items():
         if spelling != "mPa":  # "mpa" in a lower-case header is never the millipascal
-            same = folded.get(spelling.casefold(), unit)
-            folded[spelling.casefold()] = unit if same == unit else None
-    return exact, {spelling: unit for spelling, unit in folded.items() if unit is not None}
+            folded.setdefault(spelling.casefold(), set()).add(unit)
+    return exact, {word: units.pop() for word, units in folded.items() if len(units) == 1}
 
 
 @cache
@@ -196,9 +173,9 @@ def _ask_pint(text: str) -> Unit | None:
     if any(registry.Unit(name).dimensionless for name in parts):  # mm/deg is no length
         return Unit(text, None)
     for target in SPELLINGS:
-        if target == "Hz" and "hertz" not in str(unit):  # turns in a minute are no frequency
-            continue
-        if target in ("", "rad", "rad/s", "N*m"):  # angles are pure numbers to pint, joules torques
+        # angles are pure numbers to pint, joules torques, and turns in a minute a frequency
+        pure = target in ("", "rad", "rad/s", "N*m")
+        if pure or (target == "Hz" and "hertz" not in str(unit)):
             continue
         if unit.dimensionality == registry.Unit(target).dimensionality:
             return Unit(str(unit), target)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,6 +17,7 @@ import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files import formats
 from mckibben.files.own import sidecar
+from mckibben.files.sniffing import MISSING
 
 N = 40
 T = [k / 100 for k in range(N)]
@@ -98,20 +98,11 @@ def test_a_table_in_any_form_is_read_to_the_last_bit(
         assert each.values.tobytes() == np.array(samples).tobytes()
 
 
-def test_numbers_that_pandas_writes_are_the_same(tmp_path: Path) -> None:
-    frame = pd.DataFrame(np.random.default_rng(1).standard_normal((5000, 4)), columns=list("abcd"))
-    frame.to_csv(tmp_path / "run.csv", index=False)
-    (recording,) = mckibben.read(tmp_path / "run.csv")
-    assert all(np.array_equal(recording[name], frame[name]) for name in "abcd")
-
-
 GERMAN = "Zeit [s];Druck [bar];Länge [mm]\n" + lines(separator=";", mark=",")
 BLANKS = lines(separator="  ")
 VARIANTS: dict[str, bytes | str] = {
-    "a line that names the separator": "sep=;\r\n" + PLAIN.replace(",", ";"),
-    "the same after a mark of bytes": "\ufeff\ufeffsep=;\n" + PLAIN.replace(",", ";"),
-    "comments": f"# rig 3\n% date\n\n{PLAIN}# end\n",
-    "other comments": f"; rig, 3, muscles\n// date\n{PLAIN}",
+    "a line that names the separator": "\ufeff\ufeffsep=;\r\n" + PLAIN.replace(",", ";"),
+    "comments": f"# rig 3\n% date\n; rig, 3, muscles\n// day\n\n{PLAIN}# end\n",
     "a comment inside": PLAIN.replace("0.02,", "# pause\n0.02,"),
     "blank lines": PLAIN.replace("\n", "\n\n"),
     "no end of line": PLAIN.rstrip("\n"),
@@ -132,11 +123,9 @@ VARIANTS: dict[str, bytes | str] = {
     "rows that begin with blanks": "  t(s) p(bar) disp(mm)\n" + "  " + BLANKS.replace("\n", "\n  "),
     "a header in a comment": f"# bench\n# t_s p_bar disp_mm\n{BLANKS}",
     "a header and units in comments": f"% time pressure disp\n% s bar mm\n{BLANKS}",
-    "a line of units": "time,p,disp\ns,bar,mm\n" + lines(),
     "a line of units in brackets below titles": "a,b,c\nt,p,disp\n[s],(bar),[mm]\n" + lines(),
     "commas for decimals": GERMAN.replace("Länge", "Weg"),
     "Latin-1": GERMAN.encode("latin-1"),
-    "UTF-8": GERMAN,
     "Shift-JIS": ("時間(s),圧力(bar),変位(mm)\n" + lines()).encode("cp932"),
     "GB18030": ("时间/s,压力/bar,变形量/mm\n" + lines()).encode("gb18030"),
     "EUC-KR": ("시간[초],압력[bar],변위[mm]\n" + lines()).encode("cp949"),
@@ -160,14 +149,12 @@ def test_variant(tmp_path: Path, variant: str, recwarn: pytest.WarningsRecorder)
     assert not recwarn.list
 
 
-@pytest.mark.parametrize("name", ["a.csv", "a.tsv", "a.txt", "a.DAT"])
-def test_any_ending_has_any_form(tmp_path: Path, name: str) -> None:
-    assert read(tmp_path, GERMAN, name)["length"].tolist() == X
-
-
-def test_one_column_with_decimal_commas_is_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["a.tsv", "a.txt", "a.DAT"])
+def test_one_column_with_decimal_commas_is_one_in_files_of_any_ending(
+    tmp_path: Path, name: str
+) -> None:
     content = "p_bar\n" + lines(P, mark=",")
-    assert read(tmp_path, content)["pressure"].tolist() == P
+    assert read(tmp_path, content, name)["pressure"].tolist() == P
 
 
 def test_text_of_no_known_word_is_read_with_a_note(tmp_path: Path) -> None:
@@ -214,9 +201,6 @@ def test_a_row_of_other_cells_is_refused(tmp_path: Path, row: str) -> None:
 def test_hexadecimal_columns(tmp_path: Path) -> None:
     cells = [f"0x{k:04X}" for k in range(N)]
     assert read(tmp_path, "x,p_bar\n" + lines(cells, P))["x"].tolist() == list(range(N))
-    cells[9] = "7"
-    error = refused(tmp_path, "x,p_bar\n" + lines(cells, P), channels=["x"])
-    assert (error.channel, error.row) == ("x", 11)
 
 
 @pytest.mark.parametrize("cell", ["OVER", "ERR", "0x1F", "1.2.3", "2.5 kPa", "#DIV/0!", "n.d."])
@@ -232,9 +216,7 @@ def test_a_cell_that_is_no_number_is_refused_by_its_row(
         assert cell in error.problem
 
 
-@pytest.mark.parametrize(
-    "cell", ["", "-", "---", "NaN", "nan", "NA", "N/A", "#N/A", "null", "None"]
-)
+@pytest.mark.parametrize("cell", ["", *MISSING])
 def test_a_missing_sample_is_one(tmp_path: Path, cell: str) -> None:
     cells: list[object] = [*P]
     cells[7] = cell
@@ -243,8 +225,9 @@ def test_a_missing_sample_is_one(tmp_path: Path, cell: str) -> None:
 
 
 @pytest.mark.parametrize("other", ["2.5 kPa", "2.5", "OVER"])
-def test_cells_of_several_units_are_refused(tmp_path: Path, other: str) -> None:
-    cells = [f"{p} bar" for p in P]
+@pytest.mark.parametrize("usual", ["{} bar", "0x{:04X}"])
+def test_cells_of_several_forms_are_refused(tmp_path: Path, usual: str, other: str) -> None:
+    cells = [usual.format(k) for k in range(N)]
     cells[5] = other
     error = refused(tmp_path, "time_s,p\n" + lines(T, cells))
     assert (error.channel, error.row) == ("pressure", 7)
@@ -300,10 +283,8 @@ def test_a_channel_beside_those_needed_is_left_out_and_noted(tmp_path: Path) -> 
 DECIMALS = {
     "%.3f from zero": [f"{k / 100:.3f}" for k in range(N)],
     "%.3f to thousands": [f"{995 + k:.3f}" for k in range(N)],
-    "%.3f below zero": [f"{k / 100 - 0.2:.3f}" for k in range(N)],
     "%g of eighths": [f"{k / 8:g}" for k in range(8, 8 + N)],
     "%.2f": [f"{k / 7 + 1:.2f}" for k in range(N)],
-    "repr": [repr(1 + k / 3) for k in range(N)],
     "integers": [str(k) for k in range(980, 980 + N)],
     "one zero": [f"{k}.0" for k in range(N)],
     "blanks around": [f"  {k / 100:.3f} " for k in range(N)],

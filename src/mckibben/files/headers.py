@@ -24,7 +24,7 @@ _ATTACHED = re.compile("|".join(w for w in sorted(_ROLES, key=len, reverse=True)
 """Words for the ends of a loop that languages without blanks put before the channel: 目標圧力."""
 _EXTENSOR = {"extensor", "ext"}
 _ABOUT = {"variance", "var", "covariance", "std", "stddev", "status", "valid", "flag", "count"}
-"""Words for properties of a channel that are not in its unit: ``pressure_variance``."""
+"""Words for properties of a channel that do not have its unit: ``pressure_variance``."""
 _DOUBTFUL = {"in", "min", "rev", "turn"}
 """Endings that are units only where the channel suits: ``pressure_in`` is that of an inlet."""
 _LETTERS = {"m", "s", "N", "V"}
@@ -86,20 +86,18 @@ def parse(text: str) -> Header:
             return Header(f"{inner.name} {unit}", inner.unit)
         return Header(name, unit)
     over = _OVER.fullmatch(text)
-    named = over is not None and _names(_last(over["name"]), over["unit"])
-    for form in (_IN, *(() if named else (_COMPOSITE,))):
+    named = over and _names(_last(over["name"]), over["unit"])
+    for form in (_IN, _OVER if named else _COMPOSITE, _OVER):
         match = form.fullmatch(text)
         if match and find(match["unit"]) is not None:
+            if form is _OVER and _is_part(match["name"], match["unit"], stroke=True):
+                return Header(text, None)
             return Header(match["name"], match["unit"].strip())
-    if over and find(over["unit"]) is not None:
-        part = not named and _is_part(over["name"], over["unit"])
-        return Header(text, None) if part else Header(over["name"], over["unit"].strip())
     for form in _ENDINGS:
         match = form.fullmatch(text)
         if match and _is_unit(match["unit"], match["name"]):
-            if _goes_on(match["name"], match["unit"]):
-                return Header(text, None)
-            return Header(match["name"], match["unit"])
+            part = _is_part(match["name"], match["unit"], stroke=False)
+            return Header(text, None) if part else Header(match["name"], match["unit"])
     return Header(text, None)
 
 
@@ -111,16 +109,13 @@ def channel_of(header: Header) -> str:
     """
     name = snake_case(header.name)
     standard = _standard(name)
-    if standard is None and (of_loop := _of_loop(name, header)) is not None:
-        return of_loop
-    if standard is None and unit_of(name) is not None and name.rpartition("_")[2] in _ABOUT:
+    if standard is None:
         rest, _, about = name.rpartition("_")
-        return f"{about}_of_{rest}"
-    if standard is None or header.unit is None:
-        return standard or name
-    unit = find(header.unit)
+        plain = f"{about}_of_{rest}" if unit_of(name) is not None and about in _ABOUT else name
+        return _of_loop(name, header) or plain
+    unit = None if header.unit is None else find(header.unit)
     base = standard.partition("_")[0]
-    if unit is None or unit.target == _TARGETS.get(base, unit_of(base)):
+    if unit is None or unit.target == _expected(base):
         return standard
     if base == "contraction" and unit.target == "mm":
         return standard.replace("contraction", "displacement")
@@ -143,19 +138,16 @@ def _of_loop(name: str, header: Header) -> str | None:
     if len(roles) != 1:
         return None
     role, rest = roles[0], "_".join(word for word in words if word not in _ROLES)
-    unit = None if header.unit is None else find(header.unit)
-    usual = "pressure" if role == "command" else "displacement"
-    number = rest if rest.isdigit() else ""
-    if not rest or number:
-        target = "" if unit is None else unit.target or ""
-        channel = usual if unit is None else QUANTITIES.get(target)
-        channel = f"{channel}_{number}" if channel and number else channel
+    if rest and not rest.isdigit():
+        channel = channel_of(Header(rest, header.unit)) if _standard(rest) else ""
     else:
-        channel = channel_of(Header(rest, header.unit)) if _standard(rest) else None
-    if channel is None or unit_of(channel) is None:
+        unit = None if header.unit is None else find(header.unit)
+        usual = "pressure" if role == "command" else "displacement"
+        channel = usual if unit is None else QUANTITIES.get(unit.target or "", "")
+        channel = f"{channel}_{rest}" if channel and rest else channel
+    if unit_of(channel) is None:
         return None
-    sent = channel.startswith(("pressure", "voltage"))
-    return f"{'command' if sent else role}_{channel}"
+    return f"{'command' if channel.startswith(('pressure', 'voltage')) else role}_{channel}"
 
 
 def by_units(units: Mapping[str, str]) -> dict[str, str]:
@@ -168,10 +160,9 @@ def by_units(units: Mapping[str, str]) -> dict[str, str]:
     """
     found = {}
     for name, unit in units.items():
-        untelling = re.fullmatch(r"(?:[a-z]|input|output)(?:_?(\d+))?", name)
-        quantity = QUANTITIES.get(unit)
-        if untelling and quantity:
-            found[name] = quantity + (f"_{untelling[1]}" if untelling[1] else "")
+        unnamed = re.fullmatch(r"(?:[a-z]|input|output)(?:_?(\d+))?", name)
+        if unnamed and unit in QUANTITIES:
+            found[name] = QUANTITIES[unit] + (f"_{unnamed[1]}" if unnamed[1] else "")
     names = Counter(found.get(name, name) for name in units)
     return {name: new for name, new in found.items() if names[new] == 1}
 
@@ -216,14 +207,13 @@ def _standard(name: str) -> str | None:
         others = "_".join(word for word in words if word not in _EXTENSOR)
         if _CHANNELS.get(others.rstrip("0123456789").rstrip("_")) == "pressure":
             return "pressure_extensor"
-    if name in _CHANNELS:
-        return _CHANNELS[name]
-    without = name.rstrip("0123456789")
-    alias, number = without.removesuffix("_"), name[len(without) :]
-    if number and alias in _CHANNELS and (len(alias) > 1 or alias == "p" or not alias.isascii()):
-        channel = _CHANNELS[alias]
-        return None if channel == "time" else f"{channel}_{number}"
-    return None
+    alias = name.rstrip("0123456789")
+    number, alias = name[len(alias) :], alias.removesuffix("_")
+    if name in _CHANNELS or not number:
+        return _CHANNELS.get(name)
+    channel = _CHANNELS.get(alias, "time")
+    several = len(alias) > 1 or alias == "p" or not alias.isascii()
+    return f"{channel}_{number}" if several and channel != "time" else None
 
 
 def _expected(name: str) -> str | None:
@@ -246,9 +236,8 @@ def _is_unit(text: str, name: str) -> bool:
         return fits or (expected == "N" and text in _MASSES)
     if unit.target == expected or (expected == "" and unit.target == "mm"):
         return True
-    if text.casefold() in _DOUBTFUL or (len(text) == 1 and text.isalpha()):
-        return expected is None and text in _LETTERS
-    return True
+    doubtful = text.casefold() in _DOUBTFUL or (len(text) == 1 and text.isalpha())
+    return not doubtful or (expected is None and text in _LETTERS)
 
 
 def _last(name: str) -> str:
@@ -263,17 +252,14 @@ def _names(word: str, unit: str) -> bool:
     return channel is not None and found is not None and unit_of(channel) == found.target
 
 
-def _is_part(name: str, unit: str) -> bool:
-    """Return whether what is before a stroke is of the unit, as in ``flow_Nl/min``, ``rate_1/s``."""
-    word, found = _last(name), find(unit)
-    timed = found is not None and found.target == "s"
-    return word != name and (word in _SYMBOLS or (timed and (len(word) <= 4 or word.isdigit())))
+def _is_part(name: str, unit: str, *, stroke: bool) -> bool:
+    """Return whether the last word of a name is of the unit after it, or after a stroke.
 
-
-def _goes_on(name: str, unit: str) -> bool:
-    """Return whether a unit is the last part of one, as in ``stiffness_N_mm`` and ``q_deg_per_s``."""
+    As in ``flow_Nl/min``, ``rate_1/s``, ``stiffness_N_mm`` and ``q_deg_per_s``.
+    """
     word, found = _last(name), find(unit)
     if word == name or _names(word, unit):
         return False
+    amount = len(word) <= 4 or word.isdigit() if stroke else word in _AMOUNTS
     timed = found is not None and found.target == "s"
-    return word == "per" or word in _SYMBOLS or (timed and word in _AMOUNTS)
+    return word == "per" or word in _SYMBOLS or (timed and amount)

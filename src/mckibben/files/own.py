@@ -20,14 +20,8 @@ from mckibben.system import manifest, ordinary
 class Stored(BaseModel):
     """The description of a recording in a CSV's sidecar or in the schema of a Parquet file.
 
-    Parameters
-    ----------
-    sha256 : str
-        Of the samples as they are on disk, to see whether they were changed since.
-    sample_time, start_time : float or None, float
-        The time grid [s]; with a sample time, the first column is the time.
-    units : dict of str to str
-        Unit of every channel, in the order of the columns.
+    ``sha256`` is of the samples as they are on disk, to see whether they were changed since; ``units``
+    are in the order of the columns. With a sample time, the first column is the time.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
@@ -58,9 +52,9 @@ def write(recording: Recording, path: str | Path) -> None:
     ----------
     recording : Recording
     path : path
-        Ends in ``.csv``, ``.tsv`` or ``.parquet``. Text files have a plain header of channel
-        names, ``time`` [s] first where the recording has time, and a sidecar
-        ``NAME.csv-metadata.json`` with units, time grid and meta beside them.
+        Ends in ``.csv``, ``.tsv`` or ``.parquet``. Text files have a plain header of channel names,
+        ``time`` [s] first where the recording has time, and beside them a sidecar
+        ``NAME.csv-metadata.json`` with units, time grid and meta.
 
     Raises
     ------
@@ -75,11 +69,8 @@ def write(recording: Recording, path: str | Path) -> None:
 def describe(recording: Recording, samples: bytes, path: Path) -> str:
     """Return the description, in JSON, of a recording whose samples are these bytes on disk.
 
-    Raises
-    ------
-    DataError
-        If a channel is named ``time``, which the grid is, or in a way no header can hold; or if
-        ``meta`` holds what JSON cannot.
+    `DataError` if a channel is named ``time``, which the grid is, or in a way no header can hold; or if
+    ``meta`` holds what JSON cannot.
     """
     for name, unit in recording.units.items():
         if name == "time" or not name.strip() or not (name + unit).isprintable():

@@ -1,7 +1,6 @@
 """Text tables: CSV, TSV and their kin, with any common separator and decimal mark.
 
-What this package writes is a plain header of channel names and, beside the file, a sidecar with units,
-time grid and meta (see `own`).
+This package writes a plain header of channel names, and all else in a sidecar (see `own`).
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from mckibben.errors import DataError
 from mckibben.files import own
 from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import PLAIN, listed, warn
-from mckibben.files.own import sidecar
 from mckibben.files.sniffing import (
     GROUPED,
     MISSING,
@@ -61,10 +59,8 @@ _CELL = "correct that cell, or leave it blank and use --gaps split or interpolat
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the table of a text file."""
     data = file.read()
-    table = _own(data, path) if os.path.lexists(sidecar(path)) else None
-    if table is not None:
-        return [table]
-    return [parsed(decoded(data, path), path)]
+    table = _own(data, path) if os.path.lexists(own.sidecar(path)) else None
+    return [table or parsed(decoded(data, path), path)]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -83,7 +79,7 @@ def write(recording: Recording, path: Path) -> None:
     description = own.describe(recording, data, path) + "\n"
     with replacing(path) as new:
         new.write_bytes(data)
-    with replacing(sidecar(path)) as new:
+    with replacing(own.sidecar(path)) as new:
         new.write_text(description, encoding="utf-8")
 
 
@@ -91,7 +87,7 @@ def _own(data: bytes, path: Path) -> Table | None:
     """Return the table that the description beside a file is of, or None with a note."""
     header = data.partition(b"\n")[0].decode("utf-8", "replace")
     try:
-        description = own.parse(read_bytes(sidecar(path), most=DESCRIPTION))
+        description = own.parse(read_bytes(own.sidecar(path), most=DESCRIPTION))
     except DataError as error:
         description = error.problem
     if isinstance(description, str):
@@ -105,7 +101,7 @@ def _own(data: bytes, path: Path) -> Table | None:
                 frame = _frame(data, Dialect(separator, "."), names, skiprows=1, dtype=np.float64)
                 return description.table({name: frame[name].to_numpy() for name in names})
         problem = "names other columns than the file"
-    warn(sidecar(path), f"it {problem}; it is ignored, and units are taken from the header")
+    warn(own.sidecar(path), f"it {problem}; it is ignored, and units are taken from the header")
     return None
 
 
@@ -113,8 +109,7 @@ def _frame(data: bytes, dialect: Dialect, names: Sequence[Any], **options: Any) 
     """Return a frame of cells, all decimals read to the last bit."""
     import pandas as pd
 
-    major, minor = pd.__version__.split(".")[:2]
-    if (int(major), int(minor)) < (3, 1):  # later ones do so by default
+    if [int(part) for part in pd.__version__.split(".")[:2]] < [3, 1]:  # later ones do by default
         options["float_precision"] = "round_trip"
     return pd.read_csv(
         io.BytesIO(data),
@@ -129,15 +124,7 @@ def _frame(data: bytes, dialect: Dialect, names: Sequence[Any], **options: Any) 
 
 
 def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATORS) -> Table:
-    """Return the table in a text in UTF-8, whose lines line feeds end.
-
-    Parameters
-    ----------
-    data : bytes
-    path : Path
-    separators : sequence of str or None
-        What may be between its cells; None is blanks.
-    """
+    """Return the table in a text in UTF-8, whose lines line feeds end; None in separators is blanks."""
     named = _NAMED.match(data)
     if named:
         separators = (named[1].decode(),)
@@ -274,11 +261,7 @@ def _doubts(frame: Any, data: bytes, dialect: Dialect) -> dict[int, tuple[int, b
 
     "1,000" is a thousand to some and one to others. A mark is for decimals where a number shows it: by
     another count of digits after it than three, more than three before it, or a zero there.
-
-    Returns
-    -------
-    dict of int to (int, bool)
-        Column -> the first such sample, counted from 0, and whether all are: then they are decimals.
+    Returned are the first such sample, counted from 0, and whether all are: then they are decimals.
     """
     import pandas as pd
 

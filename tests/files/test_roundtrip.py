@@ -89,41 +89,29 @@ def test_csv_is_plain_to_other_programs(recording: Recording, tmp_path: Path) ->
     assert described["units"] == {"pressure": "bar", "displacement_model": "mm"}
 
 
-def test_the_description_of_a_file_that_was_changed_is_ignored(
-    recording: Recording, tmp_path: Path
+OTHERS = [
+    *("", "{", "[]", "null", "[" * 100_000, "9" * 5000),
+    *({"format": "other"}, {"sha256": "0" * 64}, {"units": {"pressure": "bar"}}),
+    {"units": {"pressure": "bar", "displacement_model": "mm", "force": "N"}},
+    {"units": {"displacement_model": "mm", "pressure": "bar"}},
+    {"units": {"pressure\x1b[31m": "bar", "displacement_model": "mm"}},
+    *({"sample_time": None}, {"sample_time": 1e-320}, {"sample_time": 0.0}),
+]
+
+
+@pytest.mark.parametrize("other", OTHERS, ids=lambda other: str(other)[:40])
+def test_a_description_that_is_broken_or_of_another_file_is_ignored_with_a_note(
+    recording: Recording, tmp_path: Path, other: Any
 ) -> None:
-    path = tmp_path / "a.csv"
+    path, beside = tmp_path / "a.csv", tmp_path / "a.csv-metadata.json"
     mckibben.write(recording, path)
-    path.write_text(path.read_text().replace("0.1,", "0.10,", 1))
+    about = json.loads(beside.read_text(encoding="utf-8"))
+    beside.write_text(other if isinstance(other, str) else json.dumps(about | other))
     with pytest.warns(DataWarning, match=r"a\.csv"):
-        (back,) = mckibben.read(path)
-    assert back.meta["file"] == str(path)
-    assert "rig" not in back.meta
+        (back,) = mckibben.read(path, units=UNITS)
+    assert back.sample_time == pytest.approx(1 / 30)
+    assert (back.meta["file"], "rig" in back.meta) == (str(path), False)
     assert np.array_equal(back["pressure"], recording["pressure"])
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        *(
-            "",
-            "{",
-            "[]",
-            "null",
-            '{"format": "other"}',
-            '{"@context": "http://www.w3.org/ns/csvw"}',
-        ),
-        *("[" * 100_000, "9" * 5000),
-    ],
-)
-def test_broken_sidecar_is_ignored_with_a_warning(
-    recording: Recording, tmp_path: Path, text: str
-) -> None:
-    path = tmp_path / "a.csv"
-    mckibben.write(recording, path)
-    (tmp_path / "a.csv-metadata.json").write_text(text)
-    with pytest.warns(DataWarning, match="a.csv"):
-        assert mckibben.read(path, units=UNITS)[0].n_samples == 50
 
 
 def test_columns_of_no_telling_name_are_taken_by_their_units(tmp_path: Path) -> None:

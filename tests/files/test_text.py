@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +15,6 @@ from hypothesis import strategies as st
 import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files import formats
-from mckibben.files.own import sidecar
 from mckibben.files.sniffing import MISSING
 
 N = 40
@@ -316,31 +314,7 @@ def test_one_number_anywhere_shows_that_a_mark_is_for_decimals(
         assert (error.row, "'1.125'" in error.problem) == (2, True)
 
 
-# Own files and LabVIEW's ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"units": {"pressure": "bar"}},
-        {"units": {"pressure": "bar", "displacement": "mm", "force": "N"}},
-        {"units": {"displacement": "mm", "pressure": "bar"}},
-        {"units": {"pressure\x1b[31m": "bar", "displacement": "mm"}},
-        {"sample_time": None},
-        {"sample_time": 1e-320},
-        {"sample_time": 0.0},
-    ],
-)
-def test_descriptions_of_other_columns_are_ignored(change: dict[str, Any], tmp_path: Path) -> None:
-    run, n = tmp_path / "run.csv", np.arange(20, dtype=np.float64)
-    units = {"pressure": "bar", "displacement": "mm"}
-    mckibben.write(Recording({"pressure": n, "displacement": n}, 0.1, units=units), run)
-    about = json.loads(sidecar(run).read_text(encoding="utf-8"))
-    sidecar(run).write_text(json.dumps(about | change), encoding="utf-8")
-    with pytest.warns(DataWarning):
-        (recording,) = mckibben.read(run, units=units | {"time": "s"})
-    assert recording.sample_time == pytest.approx(0.1)
-    assert np.array_equal(recording["pressure"], n)
+# LabVIEW's files ------------------------------------------------------------------------------
 
 
 def labview(clocks: str, mark: str, separator: str, shift: float = 0.0) -> str:

@@ -359,3 +359,17 @@ def test_segments_of_labview_are_recordings(tmp_path: Path) -> None:
     assert first["pressure"].tolist() == second["pressure"].tolist() == P
     assert (first.name, second.name) == ("run[1]", "run[2]")
     assert refused(tmp_path, content[: content.index("Channels")], "cut.lvm").remedy
+
+
+def test_the_header_is_the_row_of_known_names(tmp_path: Path) -> None:
+    above = '"TOA5","rig","CR1000X"\n"TIMESTAMP","Press","Disp"\n"TS","kPa","mm"\n"","Avg","Smp"\n'
+    content = above + "".join(f'"2026-01-31 12:00:{k / 50:05.2f}",{k},{k}\n' for k in range(40))
+    recording = read(tmp_path, content, "run.dat")
+    assert list(recording.channels) == ["pressure", "displacement"]
+    assert recording["pressure"].max() == pytest.approx(0.39)
+
+
+def test_numbers_may_be_names(tmp_path: Path) -> None:
+    recording = read(tmp_path, "x,1,2\nsecond,Volt,Volt\n" + lines())
+    assert (list(recording.channels), recording.units["1"]) == (["1", "2"], "V")
+    assert recording.sample_time == pytest.approx(0.02)

@@ -21,6 +21,7 @@ READERS: dict[str, str] = {
     ".tsv": "text",
     ".txt": "text",
     ".dat": "text",
+    ".log": "text",
     ".lvm": "lvm",
     ".parquet": "parquet",
     ".mat": "matlab",
@@ -36,8 +37,10 @@ READERS: dict[str, str] = {
 }
 """Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
 
-SOUGHT: tuple[str, ...] = tuple(ending for ending in READERS if READERS[ending] != "columns_json")
-"""Endings that a folder is searched for; descriptions, models and logs are JSON too."""
+SOUGHT: tuple[str, ...] = tuple(
+    ending for ending in READERS if ending not in (".log", ".json", ".jsonl")
+)
+"""Endings that a folder is searched for; programs write their own logs and settings in the others."""
 
 BOM, LABVIEW = b"\xef\xbb\xbf", b"LabVIEW Measurement"
 """Beginnings of a text: the mark of UTF-8, and the name that LabVIEW writes, whatever the ending."""

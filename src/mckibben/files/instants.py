@@ -16,7 +16,7 @@ from mckibben.files.table import Table
 _FORM = (
     r"(?:(?P<first>\d{4}|\d{1,2})(?P<mark>[./-])(?P<second>\d{1,2}|[A-Za-z]{3})(?P=mark)"
     r"(?P<third>\d{4}|\d{1,2})(?:[ T,]\s*(?=\d)|$))?"
-    r"(?P<clock>\d{1,2}:\d{2})?(?::(?P<whole>\d{2})(?:[.,](?P<part>\d{1,9}))?)?"
+    r"(?P<clock>\d{1,2}:\d{2})?(?::(?P<whole>\d{2})(?:[.,:](?P<part>\d{1,9}))?)?"
     r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)? ?(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?$"
 )
 _BEGINNING = re.compile(

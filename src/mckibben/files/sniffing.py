@@ -20,8 +20,9 @@ SEPARATORS = ("\t", ";", "|", ",", None)
 
 MISSING = (
     *("-", "--", "---", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None"),
+    *("∞", "+∞", "-∞", "OL", "OVLD"),
 )
-"""Cells of samples that were not taken."""
+"""Cells of samples that were not taken, or are beyond the instrument's range."""
 
 NUMBER = {
     mark: rf"[+-]?(?:\d+(?:{re.escape(mark)}\d*)?|{re.escape(mark)}\d+)(?:[eE][+-]?\d+)?"
@@ -147,13 +148,18 @@ def sniff(lines: Sequence[str], separators: Sequence[str | None] = SEPARATORS) -
     samples = [
         len(row) == width and _balance([row[i] for i in solid], dialect) > 0 for _, row in rows
     ]
-    first = samples.index(True) if True in samples else 0
+    # one row of numbers between words is a part of the header
+    pairs = [here and after for here, after in zip(samples, [*samples[1:], True], strict=True)]
+    first = pairs.index(True) if True in pairs else 0
     spare = not any(row[-1] for row in block)
     heads = [_fitted(row, width, spare) for _, row in rows[:first]]
     words = [k for k, row in enumerate(heads) if len(row) == width and _balance(row, dialect) < 0]
     if words:
+        # names are in the row with the most known ones, or else the last
+        best = max(words, key=lambda k: (_known(heads[k]), k))
+        best -= best == words[-1] and best > 0
+        names = heads[best : best + 2]
         first = words[-1] + 1
-        names = heads[max(first - 2, 0) : first]
     elif not solid:  # nothing but words
         first, names = 1, [rows[0][1]]
     else:
@@ -164,8 +170,11 @@ def sniff(lines: Sequence[str], separators: Sequence[str | None] = SEPARATORS) -
         if not names or len(names[-1]) != width:
             names = [row for row in heads[:first][-1:] if len(row) > 1]  # a header of other rows
     header, units = names[-1] if names else [], []
-    if len(names) == 2 and len(names[0]) == width and _are_units(header, names[0]):
-        header, units = names
+    if len(names) == 2 and len(names[0]) == width:
+        if _are_units(header, names[0]):
+            header, units = names
+        elif _known(names[0]) > _known(header):
+            header = names[0]
     stated = [cell.strip("[]() ") or None for cell in units] or [None] * len(header)
     return Layout(dialect, width, header, stated, (*(at for at, _ in rows), len(lines))[first])
 
@@ -210,9 +219,11 @@ def _fitted(row: list[str], width: int, spare: bool) -> list[str]:
 
 def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
     """Return whether a row of words has the units of those above it: units that are no better names."""
-    names = [
-        sum(unit_of(channel_of(parse(cell))) is not None for cell in each) for each in (row, above)
-    ]
     cells = [cell.strip("[]() ") for cell in row if cell]
     found = [find_listed(cell) or (re.search(r"[/*·^]", cell) and find(cell)) for cell in cells]
-    return names[0] <= names[1] and 2 * sum(map(bool, found)) >= len(cells)
+    return _known(row) <= _known(above) and 2 * sum(map(bool, found)) >= len(cells)
+
+
+def _known(row: Sequence[str]) -> int:
+    """Return how many cells of a row name a standard channel."""
+    return sum(unit_of(channel_of(parse(cell))) is not None for cell in row)

@@ -49,19 +49,12 @@ def check(recording: Recording) -> None:
     assert recording["displacement"] == pytest.approx(X, rel=1e-12)
 
 
-def test_numbers_are_read_to_the_last_bit(tmp_path: Path) -> None:
-    recording = one(book(tmp_path / "a.xlsx", Data=SOUND))
-    assert recording["pressure"].tolist() == P
-    check(recording)
-
-
 @pytest.mark.parametrize(
     "instant",
     [
         lambda k: datetime.datetime(2026, 1, 31, 12) + datetime.timedelta(milliseconds=20 * k),
         lambda k: (datetime.datetime(2026, 1, 31, 12) + datetime.timedelta(seconds=k / 50)).time(),
         lambda k: datetime.timedelta(milliseconds=20 * k),
-        lambda k: f"2026-01-31T12:00:{k / 50:06.3f}",
         lambda k: f"31.01.2026 12:00:{k / 50:06.3f}",
     ],
 )
@@ -74,13 +67,12 @@ def test_dates_are_times(tmp_path: Path, instant: Any) -> None:
 @pytest.mark.parametrize(
     "above",
     [
-        [["operator", "A"]],
         [["operator", "A", "run", 3]],
         [["Load (kg)", 5], ["Date", datetime.datetime(2026, 1, 31)], []],
         [["a bench", None, "of nobody"], ["pressure", "in", "steps"]],
     ],
 )
-@pytest.mark.parametrize("units", [None, ["s", "bar", "mm"], ["[s]", "(bar)", None], [None, "bar"]])
+@pytest.mark.parametrize("units", [None, ["[s]", "(bar)", None], [None, "bar"]])
 @pytest.mark.filterwarnings("ignore:.*no unit is given:mckibben.DataWarning")
 def test_titles_are_passed_over_and_units_are_read(
     tmp_path: Path, above: Rows, units: list[Any] | None
@@ -106,4 +98,6 @@ def test_text_that_may_be_several_numbers_is_refused(tmp_path: Path, cell: str, 
         one(book(tmp_path / "a.xlsx", Data=rows))
     assert (caught.value.channel, caught.value.row) == ("pressure", row + 1)
     rows[row][1] = P[row - 1]
-    check(one(book(tmp_path / "a.xlsx", Data=rows)))
+    sound = one(book(tmp_path / "a.xlsx", Data=rows))
+    check(sound)
+    assert sound["pressure"].tolist() == P  # to the last bit

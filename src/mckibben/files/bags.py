@@ -75,11 +75,9 @@ class _Topic:
         of_topic = self.name.rpartition("/")[2]
         for header, (at, values) in self.columns.items():
             place = header.removeprefix(f"/{self.name.strip('/')}/")
-            unit = _UNITS.get(self.kind, {}).get(place)
-            last = place.rpartition("/")[2]
-            words = [of_topic if last in ("data", "value") else last]
-            if unit == "Pa":
-                words = [of_topic, "pressure"]
+            unit, last = _UNITS.get(self.kind, {}).get(place), place.rpartition("/")[2]
+            words = [of_topic] if last in ("data", "value") or unit == "Pa" else [last]
+            words += ["pressure"] if unit == "Pa" else []
             says = next(filter(_is_standard, words), _indexed(header))
             samples, held = np.array(values, dtype=np.float64), not isinstance(values[0], float)
             yield Column(header, samples, unit, says=says, times=times[at], held=held)

@@ -46,7 +46,18 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
                 file=path,
                 remedy="give units by the names of columns",
             )
-    return [tree.table(found, path, meta=_meta(found))]
+    scalars = {
+        name: one.item() if isinstance(one, np.ndarray) else one
+        for name, one in found.items()
+        if isinstance(one, str) or (isinstance(one, np.ndarray) and one.ndim == 0)
+    }
+    meta = {
+        name: one
+        for name, one in scalars.items()
+        if (len(one) <= MOST_TEXT if isinstance(one, str) else np.isfinite(one))
+        and not timebase.is_rate(name)
+    }
+    return [tree.table(found, path, meta=meta)]
 
 
 def _node(value: Any) -> Node:
@@ -83,19 +94,6 @@ def _records(records: Sequence[Mapping[str, Any]]) -> Node:
     return columns | (
         {"other records": Unread(f"{others} without {', '.join(usual)}")} if others else {}
     )
-
-
-def _meta(found: Mapping[str, Node]) -> dict[str, Any]:
-    """Return texts and numbers beside the columns."""
-    texts = {name: one for name, one in found.items() if isinstance(one, str)}
-    numbers = {
-        name: one.item()
-        for name, one in found.items()
-        if isinstance(one, np.ndarray) and one.ndim == 0 and not timebase.is_rate(name)
-    }
-    return {name: one for name, one in texts.items() if len(one) <= MOST_TEXT} | {
-        name: one for name, one in numbers.items() if np.isfinite(one)
-    }
 
 
 def _distinct(pairs: Sequence[tuple[str, Any]]) -> Mapping[str, Any]:

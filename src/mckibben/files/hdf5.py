@@ -20,15 +20,6 @@ from mckibben.files.table import MOST_TEXT, Table
 from mckibben.files.tree import ATTRIBUTES, Node, Unread
 from mckibben.system.extras import demand
 
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-
-
-def is_hdf5(file: BufferedReader) -> bool:
-    """Return whether a file is HDF5, also behind the 512 bytes that MATLAB puts in front."""
-    start = file.read(520)
-    file.seek(0)
-    return SIGNATURE in (start[:8], start[512:])
-
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the vectors of an HDF5 file, or of a MAT file of version 7.3."""

@@ -26,7 +26,7 @@ _MATRIX, _COMPRESSED = 14, 15
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the vectors of a MAT file, of version 4 to 7.3."""
-    if hdf5.is_hdf5(file):
+    if file.peek(10).startswith((b"MATLAB 7.3", b"\x89HDF")):
         return hdf5.read(file, path)
     _refuse_unknown_types(file.read())
     file.seek(0)

@@ -110,10 +110,9 @@ def table(
 
 def without_numbers(unread: Mapping[str, str], path: Path) -> DataError:
     """Return the error for a file that has no vectors, only what is not read."""
-    reasons = [f"{place} ({reason})" for place, reason in unread.items()]
+    reasons = listed([f"{place} ({reason})" for place, reason in unread.items()])
     return DataError(
-        "there are no vectors of numbers in it"
-        + (f"; not read: {listed(reasons)}" if reasons else ""),
+        "there are no vectors of numbers in it" + (f"; not read: {reasons}" if unread else ""),
         file=path,
         remedy="save each channel as one vector, all of one length, or as a column of one matrix",
     )
@@ -202,16 +201,13 @@ class _Walk:
 
 def _unreadable(node: Node) -> str | None:
     """Return why what is no scalar is no vector or matrix of channels, or None if it is."""
-    if isinstance(node, Unread):
-        return node.reason
     if not isinstance(node, np.ndarray) or node.size == 0:
-        return None
+        return node.reason if isinstance(node, Unread) else None
     if node.dtype.kind not in "biuf":
         return "complex numbers" if node.dtype.kind == "c" else f"values of type {node.dtype}"
     shape = np.squeeze(node).shape
-    if len(shape) > 1 and not is_matrix(shape):
-        return f"an array of {' x '.join(map(str, node.shape))}"
-    return None
+    fits = len(shape) == 1 or is_matrix(shape)
+    return None if fits else f"an array of {' x '.join(map(str, node.shape))}"
 
 
 def _spread(name: str, node: Node) -> dict[str, Node]:
@@ -249,12 +245,12 @@ def _together(nodes: Sequence[Any]) -> Node | None:
 
 def _signal(nodes: Group) -> str | None:
     """Return the longest vector or matrix beside times, or None if several are as long."""
-    lengths = {
-        name: max(node.shape)
+    lengths = [
+        (max(node.shape), name)
         for name, node in nodes.items()
         if isinstance(node, np.ndarray) and node.size > 1 and not _is_time(name)
-    }
-    longest = [name for name, length in lengths.items() if length == max(lengths.values())]
+    ]
+    longest = [name for length, name in lengths if length == max(lengths)[0]]
     return longest[0] if len(longest) == 1 else None
 
 
@@ -266,12 +262,14 @@ def _field(nodes: Node | None, names: set[str]) -> Any:
 def _legend(group: Group, *, named: bool) -> dict[str, str]:
     """Return units by name from a struct of texts, or of structs with a field for the unit.
 
-    Unless its name is that of units, it has to hold one that is known.
+    Unless its name is that of units, it has to hold one that is known. Structs with ten samples or more
+    are signals themselves, other arrays in them are ranges and the like.
     """
     units = {
         name: node if isinstance(node, str) else _field(node, UNITS)
         for name, node in group.items()
-        if not (isinstance(node, Mapping) and _signal(node))
+        if not isinstance(node, Mapping)
+        or not any(isinstance(each, np.ndarray) and each.size > 9 for each in node.values())
     }
     found = {name: unit for name, unit in units.items() if isinstance(unit, str) and unit}
     return found if named or any(map(find, found.values())) else {}

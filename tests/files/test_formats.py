@@ -127,22 +127,6 @@ def test_scalars_that_cannot_be_are_refused_where_they_count(
     check(mckibben.read(tmp_path / name)[0])
 
 
-@pytest.mark.parametrize("timed", [True, False])
-def test_a_tdms_file_without_times_begins_at_nothing(tmp_path: Path, timed: bool) -> None:
-    shared = {"wf_increment": 0.02, "wf_start_offset": 1.0} if timed else {}
-    with TdmsWriter(tmp_path / "a.tdms") as writer:
-        writer.write_segment(
-            [
-                ChannelObject("run", "Druck", P, {"unit_string": "kPa", **shared}),
-                ChannelObject("run", "Weg", X, {"unit_string": "cm", **shared}),
-            ]
-        )
-    (recording,) = mckibben.read(tmp_path / "a.tdms", rate=50)
-    check(recording)
-    assert recording.start_time == (1.0 if timed else 0.0)
-    assert mckibben.read(tmp_path / "a.tdms")[0].sample_time == (0.02 if timed else None)
-
-
 @pytest.mark.parametrize(
     ("step", "late_us"), [(0.02, 0), (0.05, 0), (0.02, 30_000)], ids=["alike", "slower", "later"]
 )

@@ -217,7 +217,6 @@ P, X, T = CHANNELS[0], CHANNELS[1], "time"
 CASES: list[Case] = [
     # No file, or none that is known
     Case("missing.csv", lambda path: None),
-    Case("folder.csv", Path.mkdir),
     Case("pipe.csv", os.mkfifo),
     Case("device.mat", lambda path: path.symlink_to("/dev/zero")),
     Case("book.xls", b"\xd0\xcf\x11\xe0", names="'.xls'"),
@@ -227,37 +226,24 @@ CASES: list[Case] = [
     Case("mcap.bag", MCAP, names="MCAP"),
     Case("garbage.csv", GARBAGE),
     # Empty, or without samples
-    Case("empty.csv", b""),
     Case("header_only.csv", b"time_s,pressure_bar,displacement_mm\n"),
-    Case("prose.txt", b"This is no table.\nIt only says so.\n", P),
-    Case("nine_samples.csv", b"\n".join(good().splitlines()[:10]), names="9 sample"),
     # Lines
     Case("short_line.csv", line(12, "1.0,2.0"), row=12, names="2 cells"),
     Case("short_header.csv", line(1, "time_s,pressure_bar"), row=2, names="3 cells"),
     Case("quote.csv", line(6, '"0.4,2.9,9.0'), row=6),
     Case("long.csv", line(3, "1" * 20_000_000), row=3, names="1 cells"),
     # Columns
-    Case("no_names.csv", good().partition(b"\n")[2], P, names="column_1"),
     Case("no_displacement.csv", csv(time_s=TIME, pressure_bar=PRESSURE), X),
     Case("text_cell.csv", good(pressure_bar=put(PRESSURE, 8, "n.d.")), P, 10, "'n.d.'"),
-    Case("two_pressures.csv", good(p_kPa=PRESSURE), P, names="'pressure_bar' and 'p_kPa'"),
     Case("two_times.csv", good(t_ms=TIME), T, names="'time_s' and 't_ms'"),
     Case("no_such_column.csv", good(), P, names="'P9'", options={"columns": {"pressure": "P9"}}),
     # Units
-    Case("unknown_unit.csv", line(1, "time_s,pressure [foo],displacement_mm"), P, names="'foo'"),
-    Case("pressure_in_mm.csv", line(1, "time_s,pressure_mm,displacement_mm"), P, names="'mm'"),
     Case("given_unit.csv", good(), P, names="'blub'", options={"units": {"pressure": "blub"}}),
     # Samples
-    Case("nan.csv", good(pressure_bar=put(PRESSURE, 4, "NaN")), P, 6, "1 of 30"),
     Case("blank_cell.csv", good(displacement_mm=put(DISPLACEMENT, 9, "")), X, 11, "1 of 30"),
     Case("constant.csv", good(pressure_bar=[2.5] * N), P, names="2.5"),
     # Time
-    Case("no_instant.csv", good(time_s=put(TIME, 5, "")), T, 7),
-    Case("repeated.csv", good(time_s=put(TIME, 5, 0.4)), T, 7, "0.4"),
-    Case("backwards.csv", good(time_s=put(TIME, 5, 0.05)), T, 7, "from 0.4 to 0.05"),
     Case("text_instant.csv", good(time_s=put(TIME, 7, "late")), T, 9, "'late'"),
-    Case("gap.csv", gapped((12, 18), 60.0), T, 14, "58.9 s"),
-    Case("gaps_only.csv", gapped((6,) * 5, 9.0), options={"gaps": "split"}),
     Case("long_gap.csv", gapped((15, 15), 1e6), T, options={"gaps": "interpolate"}),
     Case("zero_rate.csv", good(), options={"rate": 0}),
     Case("other_rate.csv", good(), T, names="50", options={"rate": 50}),
@@ -278,7 +264,6 @@ CASES: list[Case] = [
     ),
     Case("no_units.mat", mat(pressure=np.multiply(PRESSURE, 200)), X),
     # HDF5
-    Case("empty.h5", hdf5()),
     Case("huge.h5", hdf5(pressure_bar=(10**14,)), names="memory"),
     Case("unequal.h5", hdf5(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT[:20]), X),
     Case("wrong_sum.h5", wrong_sum),

@@ -13,7 +13,7 @@ import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files import timebase, tree
-from mckibben.files.table import MOST_TEXT, Table
+from mckibben.files.table import Table, plain_meta
 from mckibben.files.tree import Node, Unread
 
 
@@ -46,17 +46,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
                 file=path,
                 remedy="give units by the names of columns",
             )
-    scalars = {
-        name: one.item() if isinstance(one, np.ndarray) else one
-        for name, one in found.items()
-        if isinstance(one, str) or (isinstance(one, np.ndarray) and one.ndim == 0)
-    }
-    meta = {
-        name: one
-        for name, one in scalars.items()
-        if (len(one) <= MOST_TEXT if isinstance(one, str) else np.isfinite(one))
-        and not timebase.is_rate(name)
-    }
+    meta = {name: one for name, one in plain_meta(found).items() if not timebase.is_rate(name)}
     return [tree.table(found, path, meta=meta)]
 
 

@@ -6,7 +6,7 @@ and the second not followed: whoever sends a file must not choose what else is r
 
 from __future__ import annotations
 
-import math
+from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 
 from mckibben.errors import DataError
 from mckibben.files import tree
-from mckibben.files.table import MOST_TEXT, Table
+from mckibben.files.table import Table, plain_meta
 from mckibben.files.tree import ATTRIBUTES, Node, Unread
 from mckibben.system.extras import demand
+
+_PACKING = {"scale_factor": 1.0, "add_offset": 0.0}
+"""Attributes of packed numbers, by "NetCDF Climate and Forecast Metadata Conventions", 8.1."""
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -29,8 +32,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     matlab = path.suffix.casefold() == ".mat"
     with h5py.File(file, "r") as root:
         found = _Tree(path, matlab).group(root)
-        meta = {name: _attribute(root, name) for name in root.attrs}
-    meta = {name: value for name, value in meta.items() if value is not None}
+        meta = _attributes(root)
     return [tree.table(found, path, dot="." if matlab else "/", meta=meta)]
 
 
@@ -63,7 +65,8 @@ class _Tree:
             if at not in self._seen:
                 self._seen.add(at)
                 found[name] = self._node(item)
-                unit = _attribute(item, "unit") or _attribute(item, "units")
+                about = _attributes(item)
+                unit = about.get("unit") or about.get("units")
                 units |= {name: unit} if isinstance(unit, str) else {}
         return found | {ATTRIBUTES: units}
 
@@ -98,7 +101,8 @@ class _Tree:
                 file=self._path,
                 remedy="save all samples in this file",
             )
-        kind = _attribute(data, "MATLAB_class") if self._matlab else None
+        about = _attributes(data)
+        kind = about.get("MATLAB_class") if self._matlab else None
         if data.shape is None or "MATLAB_empty" in data.attrs:
             return ""
         if "MATLAB_object_decode" in data.attrs:
@@ -115,13 +119,14 @@ class _Tree:
             texts = [line.decode("utf-16-le", "replace") for line in lines]
             return texts[0] if len(texts) == 1 else texts
         samples = _fields(np.asarray(data[()]))
-        gain, offset = _attribute(data, "scale_factor"), _attribute(data, "add_offset")
-        if (gain, offset) == (None, None) or not isinstance(samples, np.ndarray):
+        packed = {name: about.get(name, "") for name in _PACKING if name in data.attrs}
+        if not packed or isinstance(samples, list):
             return samples
-        if isinstance(gain, str) or isinstance(offset, str) or samples.dtype.kind not in "iuf":
+        words = any(isinstance(number, str) for number in packed.values())
+        if words or not isinstance(samples, np.ndarray) or samples.dtype.kind not in "iuf":
             return Unread("packed by a scale_factor or add_offset that is no number")
-        # packed by "NetCDF Climate and Forecast Metadata Conventions", 8.1
-        return np.asarray(samples * float(1.0 if gain is None else gain) + float(offset or 0.0))
+        gain, offset = (float(packed.get(name, one)) for name, one in _PACKING.items())
+        return np.asarray(samples * gain + offset)
 
 
 def _fields(samples: NDArray[Any]) -> Node:
@@ -136,17 +141,10 @@ def _fields(samples: NDArray[Any]) -> Node:
     return Unread("objects, or lists of several lengths") if samples.dtype.hasobject else samples
 
 
-def _attribute(item: Any, name: str) -> str | float | None:
-    """Return an attribute as JSON holds it, or None where it does not or there is none."""
-    try:
-        value = item.attrs.get(name)
-    except TypeError:  # NumPy has no such type
-        return None
-    if isinstance(value, (np.ndarray, np.generic)) and value.size == 1:
-        value = value.item()
-    if isinstance(value, bytes):
-        value = value.decode("utf-8", "replace")
-    fits = (isinstance(value, str) and len(value) <= MOST_TEXT) or (
-        isinstance(value, (int, float)) and math.isfinite(value)
-    )
-    return value if fits else None
+def _attributes(item: Any) -> dict[str, Any]:
+    """Return the attributes that JSON holds."""
+    found: dict[str, Any] = {}
+    for name in item.attrs:
+        with suppress(TypeError):  # NumPy has no such type
+            found[name] = item.attrs[name]
+    return plain_meta(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -146,6 +147,21 @@ def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column
     if values.dtype.kind in "biuf":
         return Column(header, np.asarray(values, dtype=np.float64), unit)
     return Column(header, None, unit, texts=[str(value) for value in values])
+
+
+def plain_meta(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the finite numbers and the texts of a mapping, as JSON holds them."""
+    meta: dict[str, Any] = {}
+    for name, value in found.items():
+        if isinstance(value, (np.ndarray, np.generic)) and value.size == 1:
+            value = value.item()
+        if isinstance(value, bytes):
+            value = value.decode("utf-8", "replace")
+        if (isinstance(value, str) and len(value) <= MOST_TEXT) or (
+            isinstance(value, (int, float)) and math.isfinite(value)
+        ):
+            meta[name] = value
+    return meta
 
 
 def is_matrix(shape: Sequence[int]) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files.headers import channel_of, parse
-from mckibben.files.table import MOST_TEXT, Column, Table, column
+from mckibben.files.table import Column, Table, column, plain_meta
 from mckibben.system.extras import demand
 
 
@@ -32,7 +32,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
                 file=path,
                 remedy="record or export it again",
             )
-        meta = _plain(tree.properties)
+        meta = plain_meta(tree.properties)
         groups = [group for group in tree.groups() if any(len(c) for c in group.channels())]
         if not groups:
             raise DataError("no channel in it has samples", file=path, remedy="record it again")
@@ -60,7 +60,7 @@ def _table(group: Any, meta: Mapping[str, Any], name: str | None) -> Table:
                     float(channel.properties.get("wf_start_offset", 0.0)),
                     channel.properties.get("wf_start_time"),
                 )
-    meta = {**meta, **_plain(group.properties)}
+    meta = {**meta, **plain_meta(group.properties)}
     if len(set(clocks.values())) <= 1:
         step, offset, _ = next(iter(clocks.values()), (None, 0.0, None))
         found = tuple(columns.values())
@@ -80,13 +80,3 @@ def _table(group: Any, meta: Mapping[str, Any], name: str | None) -> Table:
 
 def _is_time(header: str) -> bool:
     return channel_of(parse(header)) == "time"
-
-
-def _plain(properties: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the properties that JSON holds."""
-    return {
-        name: value
-        for name, value in properties.items()
-        if (isinstance(value, str) and len(value) <= MOST_TEXT)
-        or (isinstance(value, (int, float)) and math.isfinite(value))
-    }

@@ -9,7 +9,7 @@ from io import BufferedReader
 from pathlib import Path
 from types import ModuleType
 
-from mckibben.errors import DataError, MckibbenError
+from mckibben.errors import DataError, MckibbenError, TooLargeError
 from mckibben.files.table import Table, printable
 from mckibben.system.ordinary import opened
 
@@ -115,9 +115,12 @@ def _refusing(path: Path) -> Iterator[None]:
         problem = f"it is damaged, or not {path.suffix[1:] or 'a bag'} ({reason(error)})"
         remedy = "export it again from its source"
         if isinstance(error, MemoryError):
-            problem = "it needs more memory than there is"
-            remedy = "split it into shorter recordings"
-        elif isinstance(error, OSError) and error.strerror:  # without, it is about the content
+            raise TooLargeError(
+                "it needs more memory than there is",
+                file=path,
+                remedy="split it into shorter recordings",
+            ) from None
+        if isinstance(error, OSError) and error.strerror:  # without, it is about the content
             problem = f"it cannot be read ({error.strerror})"
             remedy = "check the path and its rights"
         raise DataError(problem, file=path, remedy=remedy) from None

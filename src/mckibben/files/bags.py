@@ -68,10 +68,11 @@ class _Topic:
                 values.append(value)
         self.recorded.append(when)
 
-    def table(self, began: int, by_stamp: bool) -> Iterator[Column]:
+    def timed(self, began: int, by_stamp: bool) -> Iterator[Column]:
         """Yield the columns of its fields."""
         # differences of whole numbers: floats of seconds since 1970 are 0.2 us apart
-        times = (np.array(self.stamps if by_stamp else self.recorded) - began) / 1e9
+        instants = np.array(self.stamps if by_stamp else self.recorded, dtype=np.int64)
+        times = (instants - began) / 1e9
         of_topic = self.name.rpartition("/")[2]
         for header, (at, values) in self.columns.items():
             place = header.removeprefix(f"/{self.name.strip('/')}/")
@@ -112,7 +113,7 @@ def folder(path: Path) -> list[Table]:
         )
     by_stamp = all(min(topic.stamps) > 0 for topic in topics)
     began = min(min(topic.stamps if by_stamp else topic.recorded) for topic in topics)
-    columns = [column for topic in topics for column in topic.table(began, by_stamp)]
+    columns = [column for topic in topics for column in topic.timed(began, by_stamp)]
     channels = Counter(channel_of(parse(column.label)) for column in columns)
     distinct = (  # the caller has to choose among several of one channel
         column

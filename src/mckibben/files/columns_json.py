@@ -38,16 +38,18 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         if isinstance(inner := found.get(wrapper), dict):
             del found[wrapper]
             found = inner | found if wrapper == "meta" else found | inner
+    meta = {name: one for name, one in plain_meta(found).items() if not timebase.is_rate(name)}
+    table = tree.table(found, path, meta=meta)
     units = found.get("units")
+    columns = {word for column in table.columns for word in (column.header, column.label)}
     for name in units if isinstance(units, dict) else {}:
-        if name not in found:
+        if name not in columns and name not in found:
             raise DataError(
                 f"its units have {name!r:.40}, which is no column",
                 file=path,
                 remedy="give units by the names of columns",
             )
-    meta = {name: one for name, one in plain_meta(found).items() if not timebase.is_rate(name)}
-    return [tree.table(found, path, meta=meta)]
+    return [table]
 
 
 def _node(value: Any) -> Node:

@@ -372,4 +372,3 @@ def test_the_header_is_the_row_of_known_names(tmp_path: Path) -> None:
 def test_numbers_may_be_names(tmp_path: Path) -> None:
     recording = read(tmp_path, "x,1,2\nsecond,Volt,Volt\n" + lines())
     assert (list(recording.channels), recording.units["1"]) == (["1", "2"], "V")
-    assert recording.sample_time == pytest.approx(0.02)

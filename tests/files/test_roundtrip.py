@@ -163,18 +163,14 @@ def test_other_endings_and_missing_folders_are_refused(
     assert not list(tmp_path.iterdir())
 
 
+ONES = np.ones(10)
+BAD = [Recording({name: ONES}) for name in ("time", "a\nb", " ")]
+BAD += [Recording({"x": ONES}, meta={"a": value}) for value in ({1, 2}, float("nan"))]
+BAD += [Recording({"x": ONES}, units={"x": "\x1b[2J"})]
+
+
 @pytest.mark.parametrize("ending", ENDINGS)
-@pytest.mark.parametrize(
-    "bad",
-    [
-        Recording({"time": np.arange(10, dtype=float)}),
-        Recording({"a\nb": np.arange(10, dtype=float)}),
-        Recording({" ": np.arange(10, dtype=float)}),
-        Recording({"x": np.arange(10, dtype=float)}, units={"x": "\x1b[2J"}),
-        Recording({"x": np.arange(10, dtype=float)}, meta={"a": {1, 2}}),
-        Recording({"x": np.arange(10, dtype=float)}, meta={"a": float("nan")}),
-    ],
-)
+@pytest.mark.parametrize("bad", BAD, ids=str)
 def test_what_cannot_be_read_back_is_not_written_and_nothing_is_lost(
     recording: Recording, tmp_path: Path, bad: Recording, ending: str
 ) -> None:

@@ -28,6 +28,8 @@ FORMS = {
     "pression [bar]": ("pressure", "bar"), "forza N": ("force", "N"),
     "spostamento_mm": ("displacement", "mm"), "tiempo (s)": ("time", "s"),
     "posição_cm": ("displacement", "cm"), "consigne pression (bar)": ("command_pressure", "bar"),
+    "ref_mm": ("reference_displacement", "mm"), "p_cmd_kPa": ("command_pressure", "kPa"),
+    "setpoint": ("reference_displacement", None), "目標圧力": ("command_pressure", None),
     # references of pressures
     "pressure_barg": ("pressure", "barg"), "Pressure (bar(g))": ("pressure", "bar(g)"),
     "p [psia]": ("pressure", "psia"), "pressure kPa abs": ("pressure", "kPa abs"),

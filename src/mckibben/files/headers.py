@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from mckibben.files.names import CHANNELS, ROLES, words_of
-from mckibben.files.units import COUNTS, GAUGE, MASSES, find, find_listed
+from mckibben.files.units import COUNTS, GAUGE, find, find_listed, weight
 from mckibben.recording import standard_unit
 
 QUANTITIES = {"mm": "displacement", "N": "force", "bar": "pressure", "V": "voltage", "rad": "angle"}
@@ -36,8 +36,6 @@ _SYMBOLS = {
 """Words that are a part of a unit where another one follows: ``stiffness_N_mm``, ``rate_bar_s``."""
 _AMOUNTS = {"l", "L", "ml", "g", "kg"}
 """What flows in a time, where it is no name: ``flow_l_s``, but ``muscle_l_mm``."""
-_MASSES = {spelling for spellings in MASSES.values() for spelling in spellings}
-_TARGETS = {"torque": "N*m"}
 
 _BRACKETED = re.compile(r"(?P<name>.*?)[\s_,/]*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]")
 _IN = re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)")  # Kraft in N
@@ -125,13 +123,7 @@ def channel_of(header: Header) -> str:
 
 
 def _of_loop(name: str, header: Header) -> str | None:
-    """Return the channel of a loop's reference or command, or None: a desired pressure is sent.
-
-    >>> channel_of(parse("desired position [mm]")), channel_of(parse("ref_mm"))
-    ('reference_displacement', 'reference_displacement')
-    >>> channel_of(parse("p_cmd_kPa")), channel_of(parse("setpoint")), channel_of(parse("目標圧力"))
-    ('command_pressure', 'reference_displacement', 'command_pressure')
-    """
+    """Return the channel of a loop's reference or command, or None: a desired pressure is sent."""
     name = _ATTACHED.sub(r"_\g<0>_", name.replace("set_point", "setpoint"))
     words = [word for word in name.split("_") if word]
     roles = [_ROLES[word] for word in words if word in _ROLES]
@@ -151,13 +143,7 @@ def _of_loop(name: str, header: Header) -> str | None:
 
 
 def by_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return the channels of what has no telling name, such as u1 or output, by its unit and number.
-
-    Parameters
-    ----------
-    units : mapping
-        Of all channels of a recording, by name.
-    """
+    """Return channels by units for what is named u1, output or the like in a recording."""
     found = {}
     for name, unit in units.items():
         unnamed = re.fullmatch(r"(?:[a-z]|input|output)(?:_?(\d+))?", name)
@@ -219,7 +205,7 @@ def _standard(name: str) -> str | None:
 def _expected(name: str) -> str | None:
     """Return the unit of the package for what a header names, None where there is none."""
     channel = _standard(snake_case(name)) or snake_case(name)
-    return _TARGETS.get(channel.partition("_")[0], unit_of(channel))
+    return "N*m" if channel.startswith("torque") else unit_of(channel)
 
 
 def _is_unit(text: str, name: str) -> bool:
@@ -233,7 +219,7 @@ def _is_unit(text: str, name: str) -> bool:
     if unit is None:  # load_kg, force_n, valve_voltage_v
         capital = find_listed(text.upper()) if len(text) == 1 else None
         fits = capital is not None and capital.target == expected
-        return fits or (expected == "N" and text in _MASSES)
+        return fits or (expected == "N" and weight(text) != text)
     if unit.target == expected or (expected == "" and unit.target == "mm"):
         return True
     doubtful = text.casefold() in _DOUBTFUL or (len(text) == 1 and text.isalpha())

@@ -6,6 +6,7 @@ import csv
 import re
 from collections import defaultdict
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -121,12 +122,10 @@ def _foreign(data: bytes, path: Path) -> bytes:
     """Decode text in no encoding of Unicode's: by that in which its header has words of `names`."""
     texts = {}
     for encoding in _ENCODINGS:
-        try:
+        with suppress(UnicodeDecodeError):
             texts[encoding] = data.decode(encoding)
-        except UnicodeDecodeError:
-            continue
     words = {encoding: foreign_words(text[:_LOOKED_AT]) for encoding, text in texts.items()}
-    best = max(words, key=lambda encoding: words[encoding])
+    best = max(words, key=words.__getitem__)
     if not words[best]:
         warn(path, f"its encoding shows by no word; it was read as {best}, so names may be garbled")
     return texts[best].encode()

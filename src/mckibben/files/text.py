@@ -53,8 +53,6 @@ _KINDS = {
 }
 """Kinds of cells that are no plain numbers, and have no unit."""
 
-_CELL = "correct that cell, or leave it blank and use --gaps split or interpolate"
-
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the table of a text file."""
@@ -65,17 +63,13 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
 def write(recording: Recording, path: Path) -> None:
     """Write a recording as text, and its description beside it."""
+    import pandas as pd
+
     # 1.38, not 1.3800000000000001: the description has the exact step
     time = {} if recording.sample_time is None else {"time": recording.time.round(12)}
     columns = {**time, **recording.channels}
     separator = "\t" if path.suffix.casefold() == ".tsv" else ","
-    text = io.StringIO()
-    csv.writer(text, delimiter=separator, lineterminator="\n").writerow(columns)
-    row = separator.join(["%r"] * len(columns)) + "\n"
-    text.writelines(
-        row % cells for cells in zip(*map(np.ndarray.tolist, columns.values()), strict=True)
-    )
-    data = text.getvalue().encode()
+    data = pd.DataFrame(columns).to_csv(index=False, sep=separator, lineterminator="\n").encode()
     description = own.describe(recording, data, path) + "\n"
     with replacing(path) as new:
         new.write_bytes(data)
@@ -261,6 +255,7 @@ def _doubts(frame: Any, data: bytes, dialect: Dialect) -> dict[int, tuple[int, b
 
     "1,000" is a thousand to some and one to others. A mark is for decimals where a number shows it: by
     another count of digits after it than three, more than three before it, or a zero there.
+
     Returned are the first such sample, counted from 0, and whether all are: then they are decimals.
     """
     import pandas as pd
@@ -320,11 +315,11 @@ def _irregular(name: str, unit: str | None, cells: Any, dialect: Dialect) -> Col
     usual = str(numbers.index[0])
     if usual[:1] not in ("", "("):
         usual = unit = unit or usual
-    wrong, problem, remedy = filled & (kinds != usual), "is not written as others are", _CELL
-    if "(grouped)" in counts:
-        wrong, problem, remedy = kinds == "(grouped)", "may mean several numbers", _MARKS
-    elif not usual:
-        problem = "is not a number"
+    wrong, remedy = kinds == "(grouped)", _MARKS
+    problem = "may mean several numbers"
+    if not wrong.any():
+        wrong, problem = filled & (kinds != usual), "is not a number like the others"
+        remedy = "correct that cell, or leave it blank and use --gaps split or interpolate"
     if wrong.any():
         at = int(np.argmax(wrong))
         flaw = Flaw(at, f"{words[codes[at]][:40]!r} {problem}", remedy)

@@ -197,7 +197,7 @@ def test_a_row_of_other_cells_is_refused(tmp_path: Path, row: str) -> None:
 
 
 def test_hexadecimal_columns(tmp_path: Path) -> None:
-    cells = [f"0x{k:04X}" for k in range(N)]
+    cells = [f"0x{k:04X}" if k % 2 else f"{k:#x}" for k in range(N)]
     assert read(tmp_path, "x,p_bar\n" + lines(cells, P))["x"].tolist() == list(range(N))
 
 
@@ -212,6 +212,11 @@ def test_a_cell_that_is_no_number_is_refused_by_its_row(
         error = refused(tmp_path, content)
         assert (error.channel, error.row) == ("pressure", place + 2)
         assert cell in error.problem
+
+
+def test_a_number_of_four_digits_is_no_instant(tmp_path: Path) -> None:
+    error = refused(tmp_path, HEADER + lines(T, ["1013.25", "OVER", *P[2:]], X))
+    assert (error.channel, error.row) == ("pressure", 3)
 
 
 @pytest.mark.parametrize("cell", ["", *MISSING])

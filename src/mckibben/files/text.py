@@ -297,7 +297,8 @@ def _irregular(name: str, unit: str | None, cells: Any, dialect: Dialect) -> Col
 
     codes, found = pd.factorize(cells)  # -1 is for cells that are missing
     words = [*(str(word).strip() for word in found), ""]
-    number = re.compile(rf"({NUMBER[dialect.decimal]})\s*([A-Za-z°%µμΩ]\D*\d?)?", re.ASCII)
+    form = rf"(?![+-]?0[xX])({NUMBER[dialect.decimal]})\s*([A-Za-z°%µμΩ]\D*\d?)?"
+    number = re.compile(form, re.ASCII)  # with a unit or without
     parts = [number.fullmatch(word) for word in words]
     if may_be_instant(words[0]) and not parts[0]:
         return Column(name, None, unit, texts=[words[code] for code in codes])
@@ -313,8 +314,8 @@ def _irregular(name: str, unit: str | None, cells: Any, dialect: Dialect) -> Col
     if 2 * numbers.sum() <= counts.sum():
         return Column(name, None, unit, texts=[words[code] for code in codes[:5]])
     usual = str(numbers.index[0])
-    if usual[:1] not in ("", "("):
-        usual = unit = unit or usual
+    united = usual[:1] not in ("", "(")
+    usual = unit or usual if united else usual
     wrong, remedy = kinds == "(grouped)", _MARKS
     problem = "may mean several numbers"
     if not wrong.any():
@@ -328,4 +329,4 @@ def _irregular(name: str, unit: str | None, cells: Any, dialect: Dialect) -> Col
         float(part[1].replace(dialect.decimal, ".")) if part else int(word, 16) if word else np.nan
         for word, part in zip(words, parts, strict=True)
     ]
-    return Column(name, np.array(values, dtype=np.float64)[codes], unit)
+    return Column(name, np.array(values, dtype=np.float64)[codes], usual if united else unit)

@@ -628,7 +628,8 @@ def _time(
             "use --unit time=UNIT where that is wrong",
         )
     quality.refuse_impossible("time", convert(values, unit, "s"), "s", unit, table, path)
-    return values, unit, "time" in request.units or (bool(stated) and unit != "s")
+    asked = "time" in request.units or request.described.time.unit is not None
+    return values, unit, asked or (bool(stated) and unit != "s")
 
 
 def _by_place(table: Table, request: Request, path: Path) -> dict[int, str]:

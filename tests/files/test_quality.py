@@ -101,7 +101,8 @@ def test_zeros_are_codes_only_where_other_samples_exclude_them(put: Put) -> None
     dropped[[50, 51, 200, 201, 202]] = 0.0
     assert refused(put("t_s,p_bar,length_mm", T, P, dropped)).row == 52
     steps = 2.0 * ((np.arange(N) // 50) % 2) + (np.arange(N) // 100)
-    for legitimate in (steps, np.maximum(P - 2.0, 0.0), np.where(T < 1, 0.0, Y)):
+    switched = np.where(T % 2 < 1, 0.0, 9999.0)
+    for legitimate in (steps, np.maximum(P - 2.0, 0.0), np.where(T < 1, 0.0, Y), switched):
         assert len(one(put("t_s,p_bar,displacement_mm", T, P, legitimate))) == N
 
 

@@ -246,9 +246,8 @@ def _codes(known: Array) -> Iterator[float]:
         if not at.any() or others.size < FEWEST:
             continue
         low, high = float(others.min()), float(others.max())
-        if (code and max(code - high, low - code) > high - low) or (
-            not code and _excluded(at, known)
-        ):
+        far = max(code - high, low - code) > high - low > 0  # of two levels, neither is a code
+        if far if code else _excluded(at, known):
             yield code
 
 

@@ -12,6 +12,7 @@ import typer
 from mckibben.cli.main import app
 from tests.cli.calls import CALLS, files
 from tests.cli.conftest import Cli
+from tests.golden.commands import answered
 
 WHOLE = ["-1", "99999999999999999999", "-99999999999999999999", "1e3", "nan", ""]
 NUMBERS = ["nan", "inf", "-inf", "1e999", "-1", "1e300", ""]
@@ -132,3 +133,20 @@ def test_names_do_not_reach_the_terminal_raw(
         assert said.strip(), words
         assert "Internal error" not in said, words
         assert not set(ESCAPE) & set(said) - set("]0;owned[2J31m"), (words, said)
+
+
+def test_raw_volts_are_calibrated(cli: Cli, tmp_path: Path) -> None:
+    rows = "".join(f"{k / 50},{1 + k % 9},{k % 7}\n" for k in range(40))
+    path = tmp_path / "raw.csv"
+    path.write_text("t_s,A0,x_mm\n" + rows)
+    found = answered("info", path, "--calibrate", "pressure=A0:2.5:-0.5:psi")
+    pressure = found["recordings"][0]["channels"]["pressure"]
+    assert (pressure["unit"], pressure["max"]) == ("bar", pytest.approx(22.0 * 0.0689475729))
+    for option in (
+        "--calibrate=pressure=A0:2.5",
+        "--calibrate=A0:1:2:bar",
+        "--most=1kB",
+        "--most=x",
+    ):
+        path.write_text("t_s,A0,x_mm\n" + 9 * rows)
+        assert cli("info", path, option).code == 2

@@ -68,7 +68,6 @@ def training_data(
         raise DataError(
             "rows do not match the recordings", remedy="give one mask a recording, one value a row"
         )
-    masks = [mask & ~r.bridged for mask, r in zip(masks, every, strict=True)]
     first = every[0]
     for recording in every:
         _check(recording, first, (*driven, *given, *scheduling), one_rate)

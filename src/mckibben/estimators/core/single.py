@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
+import numpy as np
+
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
@@ -15,7 +17,7 @@ from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 
 MADE_OF_DISPLACEMENT = {
     "length": ", and a length is the rest length less the displacement: read that column as length, "
@@ -94,7 +96,10 @@ class SingleEstimator(Estimator):
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
-        return training_data(recordings, self.input, self.output, rows, self.scheduling)
+        # models of several muscles begin anew after rows left out, and so are fitted to bridges too
+        measured = [~one.bridged for one in listed(recordings)]
+        counted = measured if rows is None else map(np.logical_and, rows, measured)
+        return training_data(recordings, self.input, self.output, list(counted), self.scheduling)
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found on data that rise, turned over where they fall."""

@@ -1,23 +1,18 @@
-"""What is wrong with samples, in numbers: codes for missing ones, wraps, impossible values, holes."""
+"""What is wrong with samples: codes for missing ones, wraps, outliers, impossible values."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
-from mckibben.files.notices import warn
-from mckibben.files.request import Request
-from mckibben.files.table import Table
-from mckibben.files.timebase import Span
+from mckibben.files.headers import unit_of
+from mckibben.files.request import Source
 from mckibben.files.units import SPELLINGS, convert
 
-Channels = dict[str, Array]
 Mask = NDArray[np.bool_]
 
 POSSIBLE: dict[str, tuple[float, float]] = {
@@ -61,7 +56,12 @@ LONE, FAR = 3, 1.0
 """Longest run of samples that is an outlier, and its distance from the others over their range."""
 
 
-def without_codes(channel: str, values: Array, recorded: Array, table: Table, path: Path) -> Array:
+def runs(mask: Mask) -> NDArray[np.intp]:
+    """Return the first of each run of true values and the first after it, shape (m, 2)."""
+    return np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+
+
+def without_codes(channel: str, values: Array, recorded: Array, source: Source) -> Array:
     """Return the samples of a channel, NaN where the file has a code for a missing one.
 
     Parameters
@@ -70,8 +70,7 @@ def without_codes(channel: str, values: Array, recorded: Array, table: Table, pa
     values : numpy.ndarray, shape (n,)
     recorded : numpy.ndarray, shape (n,)
         The same as in the file, where codes are round numbers.
-    table, path
-        For rows in errors and notes.
+    source : Source
 
     Raises
     ------
@@ -87,43 +86,35 @@ def without_codes(channel: str, values: Array, recorded: Array, table: Table, pa
     wrap = _wrap(recorded[finite])
     if wrap is not None:
         at, size = wrap
-        raise DataError(
+        raise source.error(
             f"it jumps by almost {size:.0f} there: an integer counter that wraps",
-            file=path,
-            channel=channel,
-            row=table.row(int(np.flatnonzero(finite)[at])),
-            remedy=f"add {size:.0f} after each wrap, or name another column with --column "
-            f"{channel}=COLUMN",
+            f"add {size:.0f} after each wrap, or name another column with --column {channel}=COLUMN",
+            channel,
+            int(np.flatnonzero(finite)[at]),
         )
-    coded = np.zeros(recorded.size, dtype=np.bool_)
-    for code in _codes(recorded[finite]):
-        coded |= recorded == code
-    if coded.any():
-        found = ", ".join(f"{value:g}" for value in np.unique(recorded[coded]))
-        warn(
-            path,
-            f"channel {channel!r}: {coded.sum()} sample(s) are {found}, a code for missing ones "
-            f"(first in row {table.row(int(np.argmax(coded)))})",
-        )
-        return np.where(coded, np.nan, values)
-    return values
+    coded = np.isin(recorded, list(_codes(recorded[finite])))
+    if not coded.any():
+        return values
+    found = ", ".join(f"{value:g}" for value in np.unique(recorded[coded]))
+    source.warn(
+        f"channel {channel!r}: {coded.sum()} sample(s) are {found}, a code for missing ones "
+        f"(first in row {source.table.row(int(np.argmax(coded)))})"
+    )
+    return np.where(coded, np.nan, values)
 
 
-def note_outliers(channel: str, values: Array, table: Table, path: Path) -> None:
+def note_outliers(channel: str, values: Array, source: Source) -> None:
     """Note samples in short runs far from all others, which may be measured."""
     outliers = _outliers(values)
     if outliers.size:
         first = int(outliers[0])
-        warn(
-            path,
+        source.warn(
             f"channel {channel!r}: {outliers.size} outlier(s), the first of {values[first]:.6g} in row "
-            f"{table.row(first)}; correct or blank cells that were not measured",
+            f"{source.table.row(first)}; correct or blank cells that were not measured"
         )
 
 
-def refuse_impossible(
-    channel: str, values: Array, target: str | None, read_in: str, table: Table, path: Path
-) -> None:
+def refuse_impossible(channel: str, values: Array, read_in: str, source: Source) -> None:
     """Refuse values of a standard channel or of time that no rig has.
 
     Parameters
@@ -131,16 +122,16 @@ def refuse_impossible(
     channel : str
     values : numpy.ndarray, shape (n,)
         In the package's unit; those that are not finite are passed over.
-    target : str or None
-        The package's unit; None for channels that have none.
     read_in : str
         The unit that they were read in.
+    source : Source
 
     Raises
     ------
     DataError
         With the value and the row, and the unit that fits in the remedy.
     """
+    target = unit_of(channel)
     if target not in POSSIBLE or not values.size:
         return
     low, high = POSSIBLE[target]
@@ -154,13 +145,10 @@ def refuse_impossible(
     if outside[at] <= 0 and not (target == "bar" and ZERO_BAR < abs(sizes[at]) < SMALLEST_BAR):
         return
     fitting = fitting_units(values[at], read_in, target)
-    raise DataError(
-        f"{values[at]:.6g} {target} is impossible: is it in {fitting[0]}?",
-        file=path,
-        channel=channel,
-        row=table.row(at),
-        remedy=f"name its unit, as in {' or '.join(f'--unit {channel}={u}' for u in fitting[:2])}, or "
-        "correct that cell",
+    options = " or ".join(f"--unit {channel}={unit}" for unit in fitting[:2])
+    problem = f"{values[at]:.6g} {target} is impossible: is it in {fitting[0]}?"
+    raise source.error(
+        problem, f"name its unit, as in {options}, or correct that cell", channel, at
     )
 
 
@@ -172,68 +160,6 @@ def fitting_units(value: float, read_in: str, target: str) -> list[str]:
     off = {unit: abs(math.log(max(size, 1e-300)) - typical) for unit, size in sizes.items()}
     nearest, *others = sorted(off, key=lambda unit: off[unit])
     return [nearest, *(unit for unit in others if off[unit] < math.log(10.0))]
-
-
-def fill(
-    channels: Channels, time: Array, table: Table, request: Request, path: Path
-) -> tuple[Channels, list[Span], Mask]:
-    """Return channels, the spans of them that are whole, and which samples were interpolated.
-
-    Raises
-    ------
-    DataError
-        If a sample is missing that is needed, and the policy is to refuse; or none is left.
-    """
-    holes = {name: ~np.isfinite(samples) for name, samples in channels.items()}
-    bridged = np.zeros(time.size, dtype=np.bool_)
-    for name, missing in holes.items():
-        if not missing.any():
-            continue
-        if not request.needs(name):
-            warn(path, f"channel {name!r} is left out: {missing.sum()} of its samples are missing")
-        elif missing.all():
-            raise DataError(
-                "all of its samples are missing",
-                file=path,
-                channel=name,
-                row=table.row(0),
-                remedy=f"name a column that holds numbers with --column {name}=COLUMN",
-            )
-        elif request.gaps == "error":
-            raise DataError(
-                f"{missing.sum()} of {missing.size} samples are missing or not finite",
-                file=path,
-                channel=name,
-                row=table.row(int(np.argmax(missing))),
-                remedy="use --gaps interpolate to bridge them or --gaps split to cut them out",
-            )
-    whole = {name: channels[name] for name in channels if not holes[name].any()}
-    mended = {name: holes[name] for name in channels if holes[name].any() and request.needs(name)}
-    kept = {name: samples for name, samples in channels.items() if name in whole or name in mended}
-    if not kept:
-        raise DataError(
-            "every column has samples missing", file=path, remedy="use --gaps interpolate or split"
-        )
-    if not mended:
-        return kept, [(0, time.size)], bridged
-    bridged = np.logical_or.reduce(list(mended.values()))
-    if request.gaps == "split":
-        edges = np.flatnonzero(np.diff((~bridged).astype(np.int8), prepend=0, append=0))
-        spans = [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
-        return kept, spans, np.zeros_like(bridged)
-    start = max(int(np.argmin(missing)) for missing in mended.values())
-    stop = min(missing.size - int(np.argmin(missing[::-1])) for missing in mended.values())
-    for name, missing in mended.items():
-        inside = int(missing[start:stop].sum())
-        kept[name] = np.interp(time, time[~missing], channels[name][~missing])
-        warn(path, f"channel {name!r}: {inside} missing sample(s) were interpolated")
-    if start > 0 or stop < time.size:
-        warn(
-            path,
-            f"{start} row(s) at the start and {time.size - stop} at the end were cut off, "
-            "where samples are missing and there is nothing to interpolate from",
-        )
-    return kept, [(start, stop)], bridged
 
 
 def _codes(known: Array) -> Iterator[float]:
@@ -296,6 +222,6 @@ def _outliers(values: Array) -> NDArray[np.intp]:
     beyond = np.maximum(known - high, low - known) > FAR * (high - low)
     if high == low or not beyond.any():
         return finite[:0]
-    edges = np.flatnonzero(np.diff(beyond.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    edges = runs(beyond)
     alone = (edges[:, 1] - edges[:, 0] <= LONE) & (edges[:, 0] > 0) & (edges[:, 1] < known.size)
     return finite[[k for start, stop in edges[alone] for k in range(start, stop)]]

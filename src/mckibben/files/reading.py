@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
-from mckibben.files import quality, sources, timebase
+from mckibben.files import gaps as gaps_in
+from mckibben.files import sources, timebase
 from mckibben.files.channels import about
-from mckibben.files.choosing import ASSUMED, Choice, Seen, choose, matrix_hint, seen
+from mckibben.files.choosing import Seen, matrix_hint, seen
+from mckibben.files.converting import ASSUMED, Samples, in_package_units
 from mckibben.files.fingerprint import fingerprint
-from mckibben.files.notices import listed, noted, warn
-from mckibben.files.quality import Channels, Mask
-from mckibben.files.request import FEWEST, Gaps, Request
-from mckibben.files.table import Table
-from mckibben.files.timebase import Span
+from mckibben.files.notices import noted
+from mckibben.files.request import Gaps, Request, Source
 from mckibben.files.units import convert
 from mckibben.recording import AT, ROWS, Recording
 
@@ -28,22 +25,6 @@ MAY_BE_HELD = frozenset(
     {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
 )
 """Channels that an experiment can hold constant."""
-
-LONGEST_BRIDGE = 100
-"""Most samples to which gaps are interpolated, over those there are."""
-
-LONGEST_STEP = 5.0
-"""Longest sample time [s] that is believed of times without a certain unit."""
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Samples on a uniform grid: the step [s], None without time, and the start [s]."""
-
-    samples: Channels
-    step: float | None
-    start: float
-    bridged: Mask
 
 
 def read(
@@ -122,14 +103,14 @@ def read(
     """
     path = Path(path)
     request = Request(
-        dict(columns or {}),
-        dict(units or {}),
+        columns or {},
+        units or {},
         rate,
         gaps,
         channels,
         informative,
-        dict(calibration or {}),
-        dict(constants or {}),
+        calibration or {},
+        constants or {},
         most,
     )
     request.check(path)
@@ -158,225 +139,90 @@ def columns_of(path: str | Path, **options: Any) -> list[Seen]:
     path = Path(path)
     request = replace(Request(**options), described=about(path))
     (table, *_), _ = sources.tables(path, request)
-    return seen(table, request.describing(table), path)
+    return seen(request.of(table, path))
 
 
 def _read(path: Path, request: Request) -> list[Recording]:
+    """Return the recordings of a file, with the notes of this reading after earlier ones."""
     request = replace(request, described=about(path))
     with noted() as notes:
         tables, digest = sources.tables(path, request)
-        found = [each for table in tables for each in _recordings(table, request, path, digest)]
-    said = bool(request.columns or request.units)
-    return [_with_notes(recording, notes, said) for recording in found]
+        found = [each for table in tables for each in _recordings(request.of(table, path), digest)]
+    stated = bool(request.columns or request.units)  # then units that were assumed before are not
+    recordings = []
+    for recording in found:
+        earlier = [note for note in recording.notes if not (stated and note.startswith(ASSUMED))]
+        both = [*dict.fromkeys([*earlier, *notes])]
+        same = both == list(recording.notes)
+        recordings.append(recording if same else recording.with_meta(notes=both))
+    return recordings
 
 
-def _with_notes(recording: Recording, notes: list[str], said: bool) -> Recording:
-    """Return a recording with the notes of this reading after earlier ones.
-
-    Units that were assumed before are not, where it is stated now what the columns are.
-    """
-    known = [note for note in recording.notes if not (said and note.startswith(ASSUMED))]
-    told = known + [note for note in notes if note not in known]
-    return recording if told == list(recording.notes) else recording.with_meta(notes=told)
-
-
-def _recordings(table: Table, request: Request, path: Path, digest: str) -> list[Recording]:
-    choice = choose(table, request, path)
-    n = next(iter(choice.channels.values())).size
+def _recordings(source: Source, digest: str) -> list[Recording]:
+    table, request, path = source.table, source.request, source.path
+    found = in_package_units(source)
+    channels = {name: signal.samples for name, signal in found.signals.items()}
+    n = next(iter(channels.values())).size
     if n < request.fewest:
-        raise DataError(
-            f"{n} sample(s) are too few, at least {request.fewest} are needed",
-            file=path,
-            remedy="give a longer recording",
-        )
-    step = _stated_step(choice, table, request, path)
-    time = choice.time if step is None else None
-    if step is None and time is None and (columns := matrix_hint(table, time=True)):
-        warn(path, f"no column of times is named; use --column time=COLUMN{columns}")
-    if time is not None:
-        time = timebase.checked(time, table, path)
-    order = np.arange(n, dtype=float) if time is None else time
-    begin = table.start_time if choice.time is None else _seconds(choice.time[0], choice)
-    channels, spans, bridged = quality.fill(choice.channels, order, table, request, path)
+        problem = f"{n} sample(s) are too few, at least {request.fewest} are needed"
+        raise source.error(problem, "give a longer recording")
+    step = _stated_step(found, source)
+    start = table.start_time if found.times is None else found.times.seconds(found.times.values[0])
+    when: Array = start + (step or 1.0) * np.arange(n)
+    times = found.times if step is None else None
+    if times is not None:
+        times = replace(times, values=timebase.checked(times.values, table, path))
+        when = convert(times.values, times.unit, "s")
+    elif step is None and (columns := matrix_hint(table, time=True)):
+        source.warn(f"no column of times is named; use --column time=COLUMN{columns}")
+    pieces = gaps_in.pieces(channels, times, step, start, source)
     if request.informative:
-        _refuse_constant(channels, spans, request, path)
-    if time is None:
-        pieces = [
-            Piece(
-                _cut(channels, span), step, begin + (step or 1.0) * span[0], bridged[slice(*span)]
-            )
-            for span in _long_enough(spans, table, request, path)
-        ]
-    else:
-        pieces = _on_grid(channels, time, spans, bridged, choice, table, request, path)
-    units = {name: choice.units[name] for name in channels}
-    when = begin + (step or 1.0) * order if time is None else convert(order, choice.time_unit, "s")
-    rows = fingerprint({name: choice.recorded[name] for name in channels}, when)
-    meta = _meta(choice, table, path, digest)
-    found = [
+        _refuse_constant(pieces, source)
+    signals = {name: found.signals[name] for name in pieces[0].samples}
+    units = {name: signal.unit for name, signal in signals.items()}
+    rows = fingerprint({name: signal.recorded for name, signal in signals.items()}, when)
+    name = {} if table.name is None else {"name": f"{path.stem}[{table.name}]"}
+    meta = {**table.meta, **found.meta, **name, "file": str(path), "sha256": digest}
+    recordings = [
         Recording(
             piece.samples,
             piece.step,
             units,
             piece.start,
-            ({ROWS: rows | {AT: piece.start}} if rows else {}) | meta | _bridged(piece),
+            ({ROWS: rows | {AT: piece.start}} if rows else {}) | meta | piece.meta,
         )
         for piece in pieces
     ]
-    if len(found) == 1:
-        return found
-    return [each.with_meta(name=f"{each.name}[{i}]") for i, each in enumerate(found, start=1)]
+    if len(recordings) == 1:
+        return recordings
+    return [each.with_meta(name=f"{each.name}[{i}]") for i, each in enumerate(recordings, start=1)]
 
 
-def _stated_step(choice: Choice, table: Table, request: Request, path: Path) -> float | None:
+def _stated_step(found: Samples, source: Source) -> float | None:
     """Return the sample time that the caller or the file states, which the times must not contradict."""
+    table, request, times = source.table, source.request, found.times
     step = table.sample_time if request.rate is None else 1.0 / request.rate
-    if step is None and choice.time is None and not table.own:
-        said = request.described.time.sample_time
-        return timebase.stated_step(table.rates, path) if said is None else said
+    if step is None and times is None and not table.own:
+        described = request.described.time.sample_time
+        return timebase.stated_step(table.rates, source.path) if described is None else described
     if step is None:
         return None
     if table.sample_time is not None and abs(step - table.sample_time) > 1e-3 * step:
         problem = f"the file states {1 / table.sample_time:g} samples per second"
-    elif choice.time is not None and not timebase.agrees(choice.time, step / _seconds(1.0, choice)):
-        lasting = _seconds(float(choice.time[-1] - choice.time[0]), choice)
-        mean = (choice.time.size - 1) / lasting if lasting else np.nan
+    elif times is not None and not timebase.agrees(times.values, step / times.seconds(1.0)):
+        duration = times.seconds(times.values[-1] - times.values[0])
+        mean = (times.values.size - 1) / duration if duration else np.nan
         problem = f"the column of times has {mean:.6g} samples per second on average"
     else:
         return step if table.sample_time is None else table.sample_time
-    raise DataError(
-        f"{problem}, or not evenly, which is not the {1 / step:g} asked for",
-        file=path,
-        channel="time",
-        remedy="leave --rate out, or delete the column of times",
-    )
+    problem = f"{problem}, or not evenly, which is not the {1 / step:g} asked for"
+    raise source.error(problem, "leave --rate out, or delete the column of times", "time")
 
 
-def _on_grid(
-    channels: Channels,
-    time: Array,
-    spans: list[Span],
-    bridged: Mask,
-    choice: Choice,
-    table: Table,
-    request: Request,
-    path: Path,
-) -> list[Piece]:
-    """Return the spans on one grid: as they are where times are uniform, else resampled."""
-    cuts = [at for at in timebase.gaps(time) for start, stop in spans if start < at < stop]
-    lengths = [_seconds(float(time[at] - time[at - 1]), choice) for at in cuts]
-    if cuts and request.gaps == "error":
-        among = (
-            f" ({len(cuts)} gaps in all, together {sum(lengths):.3g} s)" if len(cuts) > 1 else ""
-        )
-        raise DataError(
-            f"there is a gap of {lengths[0]:.6g} s before this row{among}",
-            file=path,
-            channel="time",
-            row=table.row(int(cuts[0])),
-            remedy="use --gaps split to cut there or --gaps interpolate to bridge them",
-        )
-    over = bool(cuts) and request.gaps == "interpolate"
-    stretches = _split(spans, cuts)
-    if request.gaps == "split":
-        spans = stretches = _long_enough(stretches, table, request, path)
-    step = timebase.common_step(time, stretches)
-    seconds = _seconds(step.size, choice)
-    if seconds > LONGEST_STEP and not choice.stated:
-        raise DataError(
-            f"its steps are {seconds:.6g} s: is time in ms?",
-            file=path,
-            channel="time",
-            row=table.row(0),
-            remedy="name its unit, as in --unit time=ms, or --unit time=s where that is right",
-        )
-    if step.jitter is not None:
-        rms, worst = (_seconds(deviation, choice) for deviation in step.jitter)
-        warn(
-            path,
-            f"the time is not uniform: its steps deviate from {seconds:.6g} s by {rms:.3g} s rms "
-            f"({100 * rms / seconds:.3g} %) and {worst:.3g} s at worst "
-            f"({100 * worst / seconds:.3g} %); the samples were interpolated onto a uniform grid",
-        )
-    if over:
-        if (time[-1] - time[0]) / step.size > LONGEST_BRIDGE * time.size:
-            raise DataError(
-                f"{len(cuts)} gap(s) of {sum(lengths):.6g} s in all are too long to interpolate over",
-                file=path,
-                channel="time",
-                remedy="use --gaps split",
-            )
-        warn(
-            path, f"{len(cuts)} gap(s) in time, {sum(lengths):.6g} s in all, were interpolated over"
-        )
-    pieces = []
-    for start, stop in _long_enough(spans, table, request, path):
-        samples, t, mended = _cut(channels, (start, stop)), time[start:stop], bridged[start:stop]
-        if over or step.jitter is not None:
-            grid = timebase.grid(t, step.size)
-            samples = {name: np.interp(grid, t, values) for name, values in samples.items()}
-            # a sample of the grid is bridged where either neighbour is, or both enclose a gap
-            after = np.clip(np.searchsorted(t, grid - 1e-9 * step.size), 1, t.size - 1)
-            gap = np.isin(after + start, cuts) & (grid < t[after] - 1e-6 * step.size)
-            gap &= grid > t[after - 1] + 1e-6 * step.size
-            mended = (mended[after] & mended[after - 1]) | gap
-        pieces.append(Piece(samples, seconds, _seconds(float(t[0]), choice), mended))
-    return pieces
-
-
-def _refuse_constant(channels: Channels, spans: list[Span], request: Request, path: Path) -> None:
-    for name in request.channels or ():
-        samples = np.concatenate([channels[name][start:stop] for start, stop in spans])
-        held = name.partition("_")[0] in MAY_BE_HELD or name in request.constants
-        if not held and samples.size and np.ptp(samples) == 0:
-            raise DataError(
-                f"it is constant, at {samples[0]:g}",
-                file=path,
-                channel=name,
-                remedy=f"give a recording in which it changes, or --column {name}=COLUMN",
-            )
-
-
-def _long_enough(spans: list[Span], table: Table, request: Request, path: Path) -> list[Span]:
-    """Return the spans that are not too short to be of use: of a split, to any later step."""
-    fewest = FEWEST if len(spans) > 1 else request.fewest
-    kept = [span for span in spans if span[1] - span[0] >= fewest]
-    if not kept:
-        raise DataError(
-            f"no stretch without gaps has {fewest} samples",
-            file=path,
-            remedy="use --gaps interpolate, or give a recording with fewer gaps",
-        )
-    if len(kept) < len(spans):
-        rows = [f"{table.row(start)}" for start, stop in spans if stop - start < fewest]
-        warn(
-            path,
-            f"{len(rows)} of {len(spans)} stretches between gaps have fewer than {fewest} samples and "
-            f"were left out: they begin in row {listed(rows)}",
-        )
-    return kept
-
-
-def _split(spans: list[Span], cuts: Sequence[int]) -> list[Span]:
-    ends = [[start, *(at for at in cuts if start < at < stop), stop] for start, stop in spans]
-    return [pair for edges in ends for pair in pairwise(edges)]
-
-
-def _cut(channels: Channels, span: Span) -> Channels:
-    return {name: samples[span[0] : span[1]] for name, samples in channels.items()}
-
-
-def _seconds(value: float, choice: Choice) -> float:
-    return float(convert(np.array([value]), choice.time_unit, "s")[0])
-
-
-def _bridged(piece: Piece) -> dict[str, Any]:
-    """Return the first and last times of interpolated samples as ``meta`` lists them."""
-    edges = np.flatnonzero(np.diff(piece.bridged.astype(np.int8), prepend=0, append=0))
-    times = piece.start + (piece.step or 1.0) * (edges.reshape(-1, 2) - [0, 1])
-    return {"bridged": times.tolist()} if edges.size else {}
-
-
-def _meta(choice: Choice, table: Table, path: Path, digest: str) -> dict[str, object]:
-    name = {} if table.name is None else {"name": f"{path.stem}[{table.name}]"}
-    return {**table.meta, **choice.meta, **name, "file": str(path), "sha256": digest}
+def _refuse_constant(pieces: Sequence[gaps_in.Piece], source: Source) -> None:
+    for name in source.request.channels or ():
+        samples = np.concatenate([piece.samples[name] for piece in pieces])
+        held = name.partition("_")[0] in MAY_BE_HELD or name in source.request.constants
+        if not held and np.ptp(samples) == 0:
+            remedy = f"give a recording in which it changes, or --column {name}=COLUMN"
+            raise source.error(f"it is constant, at {samples[0]:g}", remedy, name)

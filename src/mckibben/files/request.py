@@ -1,16 +1,18 @@
-"""What the caller of `read` asked for."""
+"""What the caller of `read` asked for, and the table that it is asked of."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files.channels import Channel, Described
+from mckibben.files.channels import Channel, Described, Time
+from mckibben.files.notices import warn
 from mckibben.files.table import Table
 
 FEWEST = 10
@@ -45,71 +47,77 @@ class Request:
         """Fewest samples of a recording."""
         return FEWEST if self.informative else 2
 
-    def asks_for(self, channel: str) -> bool:
-        """Tell whether the caller named a channel."""
-        return channel in (self.channels or ()) or channel in self.columns
-
     @property
     def names_channels(self) -> bool:
         """Whether the caller named the channels to read."""
         return bool(self.columns.keys() - {"time"}) or self.channels is not None
 
+    def asks_for(self, channel: str) -> bool:
+        """Return whether the caller named a channel."""
+        return channel in (self.channels or ()) or channel in self.columns
+
     def needs(self, channel: str) -> bool:
-        """Tell whether a channel with flaws is an error rather than left out.
+        """Return whether a channel with flaws is an error rather than left out.
 
         Those that the caller named are needed, or all where none is named.
         """
         return not self.names_channels or channel == "time" or self.asks_for(channel)
 
-    def describing(self, table: Table) -> Request:
-        """Return the request for a table: constants among what is described, calibrations once.
+    def of(self, table: Table, path: Path) -> Source:
+        """Return a table with this request, in which constants are among what is described.
 
-        What this package wrote was described when it was first read; it stands in its ``meta``.
+        What this package wrote was described when it was first read, and is not calibrated twice.
         """
-        channels = dict(self.described.channels)
+        channels, time = dict(self.described.channels), self.described.time
         if table.own:
             done = table.meta.get("calibration")
-            known = {column.header for column in table.columns}
+            done = done if isinstance(done, Mapping) else {}
+            headers = {column.header for column in table.columns}
             channels = {
                 name: given
                 for name, given in channels.items()
-                if name not in (done if isinstance(done, Mapping) else {})
-                and given.is_calibrated
-                and (given.column or name) in known
+                if name not in done and given.is_calibrated and (given.column or name) in headers
             }
+            time = Time()
         for name, (value, unit) in self.constants.items():
             channels[name] = Channel(value=value, unit=unit.strip() or None)
-        time = Described().time if table.own else self.described.time
-        said = self.described.model_copy(update={"channels": channels, "time": time})
-        return replace(self, described=said)
+        described = self.described.model_copy(update={"channels": channels, "time": time})
+        return Source(table, replace(self, described=described), path)
 
     def check(self, path: Path) -> None:
         """Refuse what cannot be done with any file."""
-
-        def refuse(problem: str, remedy: str, channel: str | None = None) -> DataError:
-            return DataError(problem, file=path, channel=channel, remedy=remedy)
-
-        if self.gaps not in ("error", "split", "interpolate"):
-            raise refuse(
-                f"there is no way {self.gaps!r} to treat gaps",
-                "use one of error, split, interpolate",
-            )
+        error = partial(DataError, file=path)
+        if self.gaps not in get_args(Gaps):
+            problem = f"there is no way {self.gaps!r} to treat gaps"
+            raise error(problem, remedy=f"use one of {', '.join(get_args(Gaps))}")
         if self.rate is not None and not 0 < self.rate < np.inf:
-            raise refuse(
-                f"a rate of {self.rate:g} samples per second is impossible",
-                "give a positive number with --rate",
-            )
+            problem = f"a rate of {self.rate:g} samples per second is impossible"
+            raise error(problem, remedy="give a positive number with --rate")
         for channel, (value, _) in self.constants.items():
             if not np.isfinite(value) or channel in ("", "time", *self.columns):
-                raise refuse(
-                    f"it cannot be the constant {value:g}",
-                    "give a finite number, to a channel that is no column and not time",
-                    channel,
-                )
+                remedy = "give a finite number, to a channel that is no column and not time"
+                raise error(f"it cannot be the constant {value:g}", channel=channel, remedy=remedy)
         for channel, (gain, offset) in self.calibration.items():
             if not (np.isfinite(gain) and np.isfinite(offset) and gain):
-                raise refuse(
-                    f"it cannot be {gain:g} times a column plus {offset:g}",
-                    "give finite numbers, the gain not 0",
-                    channel,
-                )
+                problem = f"it cannot be {gain:g} times a column plus {offset:g}"
+                raise error(problem, channel=channel, remedy="give finite numbers, the gain not 0")
+
+
+@dataclass(frozen=True)
+class Source:
+    """A table, the file it is from, and what is asked of it."""
+
+    table: Table
+    request: Request
+    path: Path
+
+    def error(
+        self, problem: str, remedy: str, channel: str | None = None, sample: int | None = None
+    ) -> DataError:
+        """Return the error for this file; a sample, counted from 0, is named by its row."""
+        row = None if sample is None else self.table.row(sample)
+        return DataError(problem, remedy=remedy, file=self.path, channel=channel, row=row)
+
+    def warn(self, text: str) -> None:
+        """Issue a `DataWarning` about this file, and note it."""
+        warn(self.path, text)

@@ -13,7 +13,7 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import formats, timebase
 from mckibben.files.channels import NAME, Described, Folder, Time
-from mckibben.files.choosing import choose
+from mckibben.files.converting import in_package_units
 from mckibben.files.headers import channel_of, parse, unit_of
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
@@ -152,6 +152,6 @@ def _seconds(clock: Column, table: Table, request: Request, path: Path) -> Array
     alone = Request({}, units, None, request.gaps, None, informative=False, described=said)
     time = replace(clock, header="time", says=None, unit=clock.unit or parse(clock.label).unit)
     rest = Column("signal", np.zeros(table.n_samples), "1")
-    choice = choose(replace(table, columns=(time, rest)), alone, path)
-    assert choice.time is not None
-    return convert(timebase.checked(choice.time, table, path), choice.time_unit, "s")
+    times = in_package_units(alone.of(replace(table, columns=(time, rest)), path)).times
+    assert times is not None
+    return convert(timebase.checked(times.values, table, path), times.unit, "s")

@@ -1,0 +1,299 @@
+"""The columns of a table in the package's units: calibrated, converted and plausible."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.errors import DataError
+from mckibben.files import clocks, instants, quality, timebase
+from mckibben.files.channels import NAME, Channel
+from mckibben.files.choosing import assign
+from mckibben.files.headers import LONGEST, parse, unit_of
+from mckibben.files.notices import listed
+from mckibben.files.request import Source
+from mckibben.files.table import Column
+from mckibben.files.units import Unit, convert, find
+
+ASSUMED = "no unit is given, so these are assumed: "
+"""Beginning of a note on assumed units."""
+
+EXAMPLES = {"bar": "kPa", "N": "kN", "s": "ms", "rad": "deg", "mm": "um"}
+"""Package unit -> another unit of that dimension, for remedies."""
+
+UNIT_OF_TIME = "name its unit, as in --unit time=ms, or --unit time=s where that is right"
+"""Remedy of times whose unit is in doubt."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One channel.
+
+    Parameters
+    ----------
+    samples : numpy.ndarray, shape (n,)
+    recorded : numpy.ndarray, shape (n,)
+        Without gain and offset: by these, rows that two recordings share are found.
+    unit, read_in : str, Unit
+        Of the samples, and of the column.
+    assumed : str
+        The unit that was assumed, for a note; empty where it is stated.
+    calibration : mapping
+        Gain and offset, or the constant that the folder describes.
+    """
+
+    samples: Array
+    recorded: Array
+    unit: str
+    read_in: Unit
+    assumed: str
+    calibration: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Times:
+    """Times in their own unit, so that the digits recorded can still be seen.
+
+    Parameters
+    ----------
+    values : numpy.ndarray, shape (n,)
+    unit : str
+    certain : bool
+        Whether the unit is certain: stated, or they are dates.
+    assumed : str
+        As in `Signal`.
+    """
+
+    values: Array
+    unit: str = "s"
+    certain: bool = True
+    assumed: str = ""
+
+    def seconds(self, duration: float) -> float:
+        """Return a time or duration in this unit in seconds."""
+        return float(convert(np.array([duration]), self.unit, "s")[0])
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The channels of a table in the package's units, its times, and what else is recorded."""
+
+    signals: dict[str, Signal]
+    times: Times | None
+    meta: dict[str, Any] = field(default_factory=dict)
+
+
+def in_package_units(source: Source) -> Samples:
+    """Choose and convert the channels of a table.
+
+    Raises
+    ------
+    DataError
+        If a channel asked for is missing, two columns are one channel, a cell is no number, a unit is
+        unknown, contradicted or of the wrong dimension, or a value is impossible.
+    """
+    request = source.request
+    columns, left_out = assign(source)
+    columns, dropped = clocks.on_one(columns, request, source.path)
+    left_out |= dict.fromkeys(dropped, "no samples at the others' times")
+    clock = columns.pop("time", None)
+    if clock is not None and clock.values is None and request.rate is not None:
+        left_out[clock.header], clock = "the rate is given", None
+    times = None if clock is None else _times(clock, source)
+    signals: dict[str, Signal] = {}
+    for name, column in columns.items():
+        try:
+            signals[name] = _signal(name, column, source)
+        except DataError as error:
+            standard = unit_of(name) is not None
+            if request.needs(name) and (standard or request.asks_for(name)):
+                raise
+            left_out[column.header] = error.problem
+    if not signals:
+        problem = "there is no column of numbers"
+        raise source.error(problem, "give a file with samples in columns")
+    converted = {name: signal.read_in.name for name, signal in signals.items()}
+    references = {name: signal.read_in.reference for name, signal in signals.items()}
+    meta = {
+        "ignored_columns": list(left_out),
+        "converted_units": [
+            f"{name} from {unit} to {signals[name].unit}"
+            for name, unit in converted.items()
+            if unit != signals[name].unit
+        ],
+        "pressure_reference": {name: kind for name, kind in references.items() if kind},
+        "calibration": {name: one.calibration for name, one in signals.items() if one.calibration},
+    }
+    assumed = [one.assumed for one in (times, *signals.values()) if one and one.assumed]
+    if assumed:
+        source.warn(f"{ASSUMED}{listed(assumed)}; use --unit CHANNEL=UNIT where that is wrong")
+    absolute = [name for name, kind in references.items() if kind == "absolute"]
+    if absolute:
+        source.warn(f"absolute pressure, not gauge: {listed(absolute)}; no offset was removed")
+    if left_out and not (source.table.own or request.names_channels):
+        reasons = [f"{header} ({why})" for header, why in left_out.items()]
+        source.warn(f"not read: {listed(reasons)}")
+    return Samples(signals, times, {name: found for name, found in meta.items() if found})
+
+
+def _signal(channel: str, column: Column, source: Source) -> Signal:
+    """Return a channel in the package's unit, NaN where samples are missing."""
+    raw = _numbers(channel, column, source)
+    calibration = _calibration(channel, column, source)
+    calibrated = "gain" in calibration
+    values = raw
+    if calibrated:
+        with np.errstate(over="ignore"):
+            values = calibration["gain"] * raw + calibration["offset"]
+    read_in, assumed = _unit(channel, column, values, source)
+    own, standard = source.table.own, unit_of(channel)
+    target = standard if own or standard is not None else read_in.target
+    unit = read_in.name if target is None else target
+    samples = convert(values, read_in.name, unit)
+    recorded = convert(raw, read_in.name, unit) if calibrated else samples
+    if not own:
+        samples = quality.without_codes(channel, samples, raw, source)
+    if not own or channel in source.request.units or calibrated:
+        quality.refuse_impossible(channel, samples, read_in.name, source)
+    if not own and standard is not None:
+        quality.note_outliers(channel, samples, source)
+    return Signal(samples, recorded, unit, read_in, assumed, calibration)
+
+
+def _numbers(channel: str, column: Column, source: Source) -> Array:
+    """Return the samples of a column; `DataError` if it is text or has a flaw."""
+    if column.values is None:
+        remedy = f"name a column of numbers with --column {channel}=COLUMN"
+        raise source.error(f"column {column.header!r} holds text", remedy, channel, 0)
+    if column.flaw is not None:
+        flaw = column.flaw
+        raise source.error(flaw.problem, flaw.remedy, channel, flaw.sample)
+    return column.values
+
+
+def _calibration(channel: str, column: Column, source: Source) -> dict[str, Any]:
+    """Return gain and offset as asked for or else described, the constant described, or nothing."""
+    given = source.request.described.channels.get(channel)
+    if given is not None and given.value is not None and column.header == channel:
+        return {"value": given.value, "unit": given.unit}
+    if channel in source.request.calibration:
+        gain, offset = source.request.calibration[channel]
+    elif given is not None and given.is_calibrated:
+        gain, offset = 1.0 if given.gain is None else given.gain, given.offset or 0.0
+    else:
+        return {}
+    return {"column": column.header, "gain": gain, "offset": offset}
+
+
+def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[Unit, str]:
+    """Return the unit of a column, asked for, stated or assumed, and the note of an assumption.
+
+    Raises
+    ------
+    DataError
+        If the file and the folder state different ones, and none is asked for; or if it is unknown or
+        of another dimension.
+    """
+    expected = unit_of(channel)
+    text = source.request.units.get(channel)
+    asked = text is not None
+    if text is None:
+        text = _stated(channel, column, source)
+    if text is None:
+        return _assumed(channel, values, source)
+    if source.table.own and not asked and expected in (None, text):
+        return Unit(text, expected), ""
+    unit = find(text)
+    if unit is None:
+        if expected is None and not asked and len(text) <= LONGEST:
+            return Unit(text, None), ""
+        remedy = f"name it, as in --unit {channel}={EXAMPLES.get(expected or '', 'UNIT')}"
+        raise source.error(f"the unit {text[:40]!r} is unknown", remedy, channel)
+    if expected is not None and unit.target != expected:
+        problem = f"in {text!r}, which does not convert to" if text else "without a unit: it is in"
+        remedy = (
+            f"correct the unit with --unit {channel}={expected or '%'}, or name another column with "
+            f"--column {channel}=COLUMN"
+        )
+        if unit.target == "V" or text.casefold() in ("count", "counts", "lsb", "adc"):
+            option = f"--calibrate {channel}={column.header}:GAIN:OFFSET:{expected}"
+            remedy = f"calibrate it, as in {option}, {remedy}"
+        problem = f"it cannot be {problem} {expected or 'a pure number'}"
+        raise source.error(problem, remedy, channel)
+    return unit, ""
+
+
+def _stated(channel: str, column: Column, source: Source) -> str | None:
+    """Return the unit that the file and the folder state; `DataError` if they state different ones."""
+    described = source.request.described
+    given = described.time if channel == "time" else described.channels.get(channel)
+    in_header = None if source.table.own else parse(column.label).unit
+    stated = {"its header": in_header, "the file": column.unit}
+    if given is not None and given.unit is not None:
+        if isinstance(given, Channel) and given.value is not None:
+            stated = {NAME: column.unit}
+        elif isinstance(given, Channel) and given.is_calibrated:
+            stated = {NAME: given.unit}  # the unit that the calibration results in
+        else:
+            stated[NAME] = given.unit
+    texts = {place: text for place, text in stated.items() if text is not None}
+    units = {place: unit for place, text in texts.items() if (unit := find(text))}
+    if units:
+        texts = {place: texts[place] for place in units}
+    last = next(reversed(texts.values()), None)
+    if len({(unit.name, unit.reference) for unit in units.values()}) > 1:
+        differing = ", ".join(f"{text!r} in {place}" for place, text in texts.items())
+        remedy = f"name the right one, as in --unit {channel}={last}"
+        raise source.error(f"its unit is contradicted: {differing}", remedy, channel)
+    return last
+
+
+def _assumed(channel: str, values: Array, source: Source) -> tuple[Unit, str]:
+    """Return the package's unit; `DataError` of a size that is a common one in another unit."""
+    expected = unit_of(channel)
+    if expected is None:
+        return Unit("", ""), ""
+    finite = np.abs(values[np.isfinite(values)])
+    largest = float(finite.max()) if finite.size else 0.0
+    if 0 < largest < quality.DOUBTFUL.get(expected, 0.0):
+        fitting = quality.fitting_units(largest, expected, expected)[0]
+        raise source.error(
+            f"it has no unit, and reaches {largest:.3g}: is it in {fitting}?",
+            f"name its unit, as in --unit {channel}={fitting}, or --unit {channel}={expected} where "
+            "that is right",
+            channel,
+        )
+    note = f"{channel} in {expected}" if expected else ""
+    if not expected and largest > 1.5:
+        note = f"{channel} in parts of one (up to {largest:.3g}: is it in %?)"
+    return Unit(expected, expected), note
+
+
+def _times(column: Column, source: Source) -> Times:
+    """Return the times in a column of numbers or dates, in the unit stated, shown by size or assumed."""
+    request, table, path = source.request, source.table, source.path
+    if column.values is None:
+        return Times(instants.seconds(column.texts, table, path))
+    values = _numbers("time", column, source)
+    stated = request.units.get("time") or _stated("time", column, source)
+    unit, assumed = None if stated else timebase.unit_by_size(values, table, path), ""
+    certain = "time" in request.units or request.described.time.unit is not None
+    if unit is not None:
+        certain = True
+        source.warn(
+            f"the times have no unit; by their size they are counted in {unit} since 1970; "
+            "use --unit time=UNIT where that is wrong"
+        )
+    elif not stated and timebase.counts(values):
+        problem = "it has no unit and counts in whole numbers: is it in ms?"
+        raise source.error(problem, UNIT_OF_TIME, "time", 0)
+    else:
+        found, assumed = _unit("time", column, values, source)
+        unit = found.name
+        certain |= bool(stated) and unit != "s"
+    quality.refuse_impossible("time", convert(values, unit, "s"), unit, source)
+    return Times(values, unit, certain, assumed)

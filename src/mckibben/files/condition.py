@@ -56,12 +56,6 @@ def condition(samples: Array) -> Condition:
 def lag(recording: Recording, input_: str, output: str) -> int | None:
     """Return by how many samples the output follows the input, by their cross-correlation.
 
-    Parameters
-    ----------
-    recording : Recording
-    input_, output : str
-        Channels.
-
     Returns
     -------
     int or None
@@ -70,11 +64,9 @@ def lag(recording: Recording, input_: str, output: str) -> int | None:
         hysteresis and creep 0 or more.
     """
     u, y = (recording[name] - recording[name].mean() for name in (input_, output))
-    n = u.size
-    size = 2 ** int(np.ceil(np.log2(2 * n)))
-    spectrum = np.conj(np.fft.rfft(u, size)) * np.fft.rfft(y, size)
-    found = np.fft.irfft(spectrum, size)
-    most = max(1, int(LONGEST_LAG * n))
+    size = 2 ** int(np.ceil(np.log2(2 * u.size)))
+    found = np.fft.irfft(np.conj(np.fft.rfft(u, size)) * np.fft.rfft(y, size), size)
+    most = max(1, int(LONGEST_LAG * u.size))
     lags = np.arange(-most, most + 1)
     values = np.copysign(1.0, found[0]) * found[lags]
     best = int(lags[np.argmax(values)])
@@ -85,16 +77,13 @@ def lag(recording: Recording, input_: str, output: str) -> int | None:
 def early(recordings: Sequence[Recording], input_: str, output: str) -> int | None:
     """Return the lag [samples] of an output that moves before its input, or None where it does not.
 
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    input_, output : str
-        Channels; only motion by pressure or voltage is judged.
+    Only motion by pressure or voltage is judged.
     """
-    kinds = input_.partition("_")[0], output.partition("_")[0]
-    if kinds[0] not in ("pressure", "voltage") or kinds[1] not in DRIVEN:
+    if not (
+        input_.partition("_")[0] in ("pressure", "voltage") and output.partition("_")[0] in DRIVEN
+    ):
         return None
-    found = [lag(recording, input_, output) for recording in recordings]
-    known = sorted(one for one in found if one is not None)
-    middle = known[len(known) // 2] if known else 0
-    return middle if middle <= EARLY else None
+    lags = [lag(recording, input_, output) for recording in recordings]
+    known = sorted(found for found in lags if found is not None)
+    median = known[len(known) // 2] if known else 0
+    return median if median <= EARLY else None

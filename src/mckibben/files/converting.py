@@ -156,6 +156,7 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
     samples = convert(values, read_in.name, unit)
     recorded = convert(raw, read_in.name, unit) if calibrated else samples
     if not own:
+        quality.refuse_wraps(channel, raw, source)
         samples = quality.without_codes(channel, samples, raw, source)
     if not own or channel in source.request.units or calibrated:
         quality.refuse_impossible(channel, samples, read_in.name, source)
@@ -259,7 +260,7 @@ def _assumed(channel: str, values: Array, source: Source) -> tuple[Unit, str]:
         return Unit("", ""), ""
     finite = np.abs(values[np.isfinite(values)])
     largest = float(finite.max()) if finite.size else 0.0
-    if 0 < largest < quality.DOUBTFUL.get(expected, 0.0):
+    if 0 < largest < quality.PLAUSIBLE[expected].doubtful:
         fitting = quality.fitting_units(largest, expected, expected)[0]
         raise source.error(
             f"it has no unit, and reaches {largest:.3g}: is it in {fitting}?",

@@ -23,18 +23,10 @@ ROLES = ("reference_", "command_")
 
 @dataclass(frozen=True)
 class Seen:
-    """A column of a file, as an import shows it.
+    """A column of a file, as an import shows it, with its ``first`` cells.
 
-    Parameters
-    ----------
-    header, unit : str
-        As in the file; the unit is empty where the file states none.
-    first : tuple of str
-        Its first cells.
-    channel : str
-        The channel that it is read as; empty where it is left out.
-    unasked : str
-        The channel that it is read as without options.
+    The unit is empty where the file states none, and ``channel``, which it is read as, where it is left
+    out; ``unasked`` is the channel that it is read as without options.
     """
 
     header: str
@@ -278,14 +270,13 @@ def _require(named: Mapping[str, Column], source: Source) -> None:
             problem = f"there is no such channel; the columns are {_headers(table)}"
             remedy = f"name its column with --column {channel}=COLUMN{hint}"
             raise source.error(problem, remedy, channel)
-    options = {"unit": request.units, "calibration": request.calibration}
-    for word, asked in options.items():
-        for channel in asked:
-            if channel not in named:
-                option = "--unit" if word == "unit" else "--calibrate"
-                names = ", ".join(named)
-                problem = f"a {word} is given for it and it is not there; there are {names}"
-                raise source.error(problem, f"give {option} for one of them", channel)
+    options = dict.fromkeys(request.calibration, ("calibration", "--calibrate"))
+    for channel, (word, option) in (
+        options | dict.fromkeys(request.units, ("unit", "--unit"))
+    ).items():
+        if channel not in named:
+            problem = f"a {word} is given for it and it is not there; there are {', '.join(named)}"
+            raise source.error(problem, f"give {option} for one of them", channel)
 
 
 def _headers(table: Table) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -31,19 +31,11 @@ UNIT_OF_TIME = "name its unit, as in --unit time=ms, or --unit time=s where that
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel.
+    """One channel: its samples, and what was done to its column, in the unit ``read_in``.
 
-    Parameters
-    ----------
-    samples : numpy.ndarray, shape (n,)
-    recorded : numpy.ndarray, shape (n,)
-        Without gain and offset: by these, rows that two recordings share are found.
-    unit, read_in : str, Unit
-        Of the samples, and of the column.
-    assumed : str
-        The unit that was assumed, for a note; empty where it is stated.
-    calibration : mapping
-        Gain and offset, or the constant that the folder describes.
+    ``recorded`` are the samples without gain and offset, by which rows that two recordings share are
+    found; ``assumed`` is the note of a unit that is not stated; ``calibration`` has gain and offset, or
+    the constant that the folder describes.
     """
 
     samples: Array
@@ -58,14 +50,7 @@ class Signal:
 class Times:
     """Times in their own unit, so that the digits recorded can still be seen.
 
-    Parameters
-    ----------
-    values : numpy.ndarray, shape (n,)
-    unit : str
-    certain : bool
-        Whether the unit is certain: stated, or they are dates.
-    assumed : str
-        As in `Signal`.
+    The unit is ``certain`` where it is stated or they are dates; ``assumed`` is as in `Signal`.
     """
 
     values: Array
@@ -84,7 +69,7 @@ class Samples:
 
     signals: dict[str, Signal]
     times: Times | None
-    meta: dict[str, Any] = field(default_factory=dict)
+    meta: dict[str, Any]
 
 
 def in_package_units(source: Source) -> Samples:
@@ -116,17 +101,17 @@ def in_package_units(source: Source) -> Samples:
     if not signals:
         problem = "there is no column of numbers"
         raise source.error(problem, "give a file with samples in columns")
-    converted = {name: signal.read_in.name for name, signal in signals.items()}
-    references = {name: signal.read_in.reference for name, signal in signals.items()}
+    each = signals.items()
+    references = {name: one.read_in.reference for name, one in each if one.read_in.reference}
     meta = {
         "ignored_columns": list(left_out),
         "converted_units": [
-            f"{name} from {unit} to {signals[name].unit}"
-            for name, unit in converted.items()
-            if unit != signals[name].unit
+            f"{name} from {one.read_in.name} to {one.unit}"
+            for name, one in each
+            if one.read_in.name != one.unit
         ],
-        "pressure_reference": {name: kind for name, kind in references.items() if kind},
-        "calibration": {name: one.calibration for name, one in signals.items() if one.calibration},
+        "pressure_reference": references,
+        "calibration": {name: one.calibration for name, one in each if one.calibration},
     }
     assumed = [one.assumed for one in (times, *signals.values()) if one and one.assumed]
     if assumed:
@@ -200,18 +185,16 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
         of another dimension.
     """
     expected = unit_of(channel)
-    text = source.request.units.get(channel)
-    asked = text is not None
-    if text is None:
-        text = _stated(channel, column, source)
+    asked = source.request.units.get(channel)
+    text = _stated(channel, column, source) if asked is None else asked
     if text is None:
         return _assumed(channel, values, source)
-    if source.table.own and not asked and expected in (None, text):
+    if source.table.own and asked is None and expected in (None, text):
         return Unit(text, expected), ""
     unit = find(text)
+    if unit is None and asked is None and expected is None and len(text) <= LONGEST:
+        return Unit(text, None), ""
     if unit is None:
-        if expected is None and not asked and len(text) <= LONGEST:
-            return Unit(text, None), ""
         remedy = f"name it, as in --unit {channel}={EXAMPLES.get(expected or '', 'UNIT')}"
         raise source.error(f"the unit {text[:40]!r} is unknown", remedy, channel)
     if expected is not None and unit.target != expected:

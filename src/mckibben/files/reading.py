@@ -168,7 +168,7 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
         raise source.error(problem, "give a longer recording")
     step = _stated_step(found, source)
     start = table.start_time if found.times is None else found.times.seconds(found.times.values[0])
-    when: Array = start + (step or 1.0) * np.arange(n)
+    when: Array = start + (step or 1.0) * np.arange(n, dtype=float)
     times = found.times if step is None else None
     if times is not None:
         times = replace(times, values=timebase.checked(times.values, table, path))

@@ -13,7 +13,7 @@ from mckibben.files import instants, timebase
 from mckibben.files.channels import NAME
 from mckibben.files.headers import LONGEST, by_units, channel_of, parse, snake_case, unit_of
 from mckibben.files.notices import listed
-from mckibben.files.request import Source
+from mckibben.files.request import Request, Source
 from mckibben.files.table import Column, Table
 from mckibben.files.units import find, weight
 
@@ -105,13 +105,18 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
             named[channel] = column
     places = {id(column): place for place, column in enumerate(source.table.columns)}
     named = dict(sorted(named.items(), key=lambda item: places.get(id(item[1]), len(places))))
-    if not own:
-        if "time" not in named and not clocks and (time := _only_time(named, source)):
-            left_out.pop(time.header, None)
-            others = {name: column for name, column in named.items() if column is not time}
-            named = {"time": time} | others
-        named = _by_units(named, source)
+    if "time" not in named and not own and not clocks and (time := _only_time(named, source)):
+        left_out.pop(time.header, None)
+        named = {"time": time} | {name: c for name, c in named.items() if c is not time}
+    renamed = {} if own else _by_units(named, source.request)
+    notes = [f"{named[name].header!r} as {channel}" for name, channel in renamed.items()]
+    named = {renamed.get(name, name): column for name, column in named.items()}
     _require(named, source)
+    if notes:
+        source.warn(
+            f"no name identifies these columns, so they are read by their units: {listed(notes)}; "
+            "use --column CHANNEL=COLUMN where that is wrong"
+        )
     return named, left_out | dict(source.table.unread)
 
 
@@ -243,22 +248,14 @@ def _target(column: Column) -> str:
     return (unit.target or "") if unit else ""
 
 
-def _by_units(named: dict[str, Column], source: Source) -> dict[str, Column]:
-    """Return columns without a known name, such as u1, as the channels of their units, with a note.
+def _by_units(named: Mapping[str, Column], request: Request) -> dict[str, str]:
+    """Return the channels of columns without a known name, such as u1, by their units.
 
     A name that the caller or the folder uses stays.
     """
-    request = source.request
     used = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
     used |= request.described.channels.keys()
-    renamed = by_units({name: "" if name in used else _target(c) for name, c in named.items()})
-    if renamed:
-        found = [f"{named[name].header!r} as {channel}" for name, channel in renamed.items()]
-        source.warn(
-            f"no name identifies these columns, so they are read by their units: {listed(found)}; "
-            "use --column CHANNEL=COLUMN where that is wrong"
-        )
-    return {renamed.get(name, name): column for name, column in named.items()}
+    return by_units({name: "" if name in used else _target(c) for name, c in named.items()})
 
 
 def _require(named: Mapping[str, Column], source: Source) -> None:

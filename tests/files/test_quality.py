@@ -177,6 +177,45 @@ def test_bridged_samples_are_not_fitted(put: Put) -> None:
     assert block.simulate(recording)["displacement"][-50:] == pytest.approx(Y[-50:], abs=0.1)
 
 
+@pytest.mark.parametrize(
+    "header",
+    [
+        *("displacement_cm_filtered", "displacement cm 1", "displacement_ft_1", "displacement_adc"),
+        *("displacement_raw", "displacement_x_inc"),
+    ],
+)
+def test_a_unit_within_a_header_is_never_replaced_by_the_default(put: Put, header: str) -> None:
+    path = put(f"t_s,pressure_bar,{header}", T, P, Y)
+    columns = {"displacement": header}
+    assert refused(path, columns=columns).channel == "displacement"
+    assert one(path, columns=columns, units={"displacement": "cm"})["displacement"].max() > 300
+
+
+@pytest.mark.parametrize(
+    ("header", "largest"),
+    [("pressure", 40.0), ("angle", 85.0), ("contraction", 22.0), ("displacement", 0.03)],
+)
+def test_sizes_of_another_unit_are_asked_for(put: Put, header: str, largest: float) -> None:
+    path = put(f"t_s,x_mm,{header}", T, Y, largest * P / 5)
+    assert header in refused(path).remedy
+
+
+def test_levels_are_no_codes(put: Put) -> None:
+    force = np.array([200.0, 500.0, 999.0])[np.arange(N) * 3 // N]
+    assert len(one(put("t_s,p_bar,force_gf", T, P, force))) == N
+    assert len(one(put("t_s,p_bar,x_mm,status", T, P, Y, np.where(T < 1, 0, 999)))) == N
+    within = 400 * P + 20
+    within[[70, 150]] = -999.0
+    assert refused(put("t_s,pressure_mbar,x_mm", T, within, Y)).row == 72
+
+
+def test_a_calibration_is_of_the_column_that_is_described(put: Put) -> None:
+    path = put("t_s,pressure_bar,displacement_mm", T, P, Y)
+    toml = '[channels.pressure]\ncolumn="A0"\ngain=2.5\noffset=-0.5\nunit="bar"\n'
+    path.with_name("channels.toml").write_text(toml)
+    assert one(path)["pressure"] == pytest.approx(P)
+
+
 # The condition of signals ------------------------------------------------------------------------
 
 

@@ -89,8 +89,8 @@ def test_what_is_no_unit_of_a_channel(text: str) -> None:
         ("displacement (km)", 1e3, "--unit displacement="),
         ("force (GN)", 1.0, "--unit force="),
         ("temperature (°C)", 1e6, "--unit temperature="),
-        ("displacement_px", 1.0, "--unit displacement="),
-        ("pressure_counts", 1.0, "--unit pressure="),
+        ("displacement_px", 1.0, "--calibrate displacement="),
+        ("pressure_counts", 1.0, "--calibrate pressure="),
         ("FORCE_NM", 1.0, "--unit force="),
     ],
 )

@@ -19,6 +19,9 @@ RUN = 3
 CORRELATED = 0.7
 """Smallest correlation of input and output by which a lag can be found."""
 
+CLEAR = 0.002
+"""Least share by which the correlation at a negative lag exceeds that without a lag."""
+
 EARLY = -2
 """Lag in samples from which on an output moves before its input."""
 
@@ -59,9 +62,9 @@ def lag(recording: Recording, input_: str, output: str) -> int | None:
     Returns
     -------
     int or None
-        Negative where the output moves before the input; None where they hardly correlate. Of an output
-        that follows its input at once by any increasing function it is 0 (rearrangement inequality), of
-        hysteresis and creep 0 or more.
+        Negative where the output clearly moves before the input; None where they hardly correlate. In
+        long recordings, an output that follows its input at once by an increasing function has a lag of
+        0 (rearrangement inequality), one with hysteresis or creep of 0 or more.
     """
     u, y = (recording[name] - recording[name].mean() for name in (input_, output))
     size = 2 ** int(np.ceil(np.log2(2 * u.size)))
@@ -70,6 +73,8 @@ def lag(recording: Recording, input_: str, output: str) -> int | None:
     lags = np.arange(-most, most + 1)
     values = np.copysign(1.0, found[0]) * found[lags]
     best = int(lags[np.argmax(values)])
+    if best < 0 and values[most] > (1 - CLEAR) * values.max():
+        best = 0  # noise, or the ends of a recording, move a flat maximum
     size_of_both = float(np.sqrt(np.sum(u**2) * np.sum(y**2)))
     return best if abs(best) < most and values.max() >= CORRELATED * size_of_both > 0 else None
 

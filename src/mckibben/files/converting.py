@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,13 +12,13 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import clocks, instants, quality, timebase
-from mckibben.files.channels import NAME, Channel
+from mckibben.files.channels import NAME, Channel, Time
 from mckibben.files.choosing import assign
-from mckibben.files.headers import LONGEST, parse, unit_of
+from mckibben.files.headers import LONGEST, parse, snake_case, unit_of
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column
-from mckibben.files.units import Unit, convert, find
+from mckibben.files.units import COUNTS, Unit, convert, find, weight
 
 ASSUMED = "no unit is given, so these are assumed: "
 """Beginning of a note on assumed units."""
@@ -168,11 +169,17 @@ def _calibration(channel: str, column: Column, source: Source) -> dict[str, Any]
         return {"value": given.value, "unit": given.unit}
     if channel in source.request.calibration:
         gain, offset = source.request.calibration[channel]
-    elif given is not None and given.is_calibrated:
+    elif given is not None and given.is_calibrated and _describes(given, column):
         gain, offset = 1.0 if given.gain is None else given.gain, given.offset or 0.0
     else:
         return {}
     return {"column": column.header, "gain": gain, "offset": offset}
+
+
+def _describes(given: Channel | Time, column: Column) -> bool:
+    """Return whether what a folder states of a channel is about this column."""
+    named = snake_case(given.column or column.header)
+    return named in (snake_case(column.header), snake_case(parse(column.header).name))
 
 
 def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[Unit, str]:
@@ -188,7 +195,7 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
     asked = source.request.units.get(channel)
     text = _stated(channel, column, source) if asked is None else asked
     if text is None:
-        return _assumed(channel, values, source)
+        return _assumed(channel, column, values, source)
     if source.table.own and asked is None and expected in (None, text):
         return Unit(text, expected), ""
     unit = find(text)
@@ -203,9 +210,11 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
             f"correct the unit with --unit {channel}={expected or '%'}, or name another column with "
             f"--column {channel}=COLUMN"
         )
-        if unit.target == "V" or text.casefold() in ("count", "counts", "lsb", "adc"):
+        if unit.target in ("V", "A") or text.casefold() in COUNTS:
             option = f"--calibrate {channel}={column.header}:GAIN:OFFSET:{expected}"
-            remedy = f"calibrate it, as in {option}, {remedy}"
+            remedy = f"calibrate it, as in {option}, or in {NAME}"
+        elif weight(text) != text:
+            remedy = f"where it is the weight of that mass, use --unit {channel}={weight(text)}"
         problem = f"it cannot be {problem} {expected or 'a pure number'}"
         raise source.error(problem, remedy, channel)
     return unit, ""
@@ -217,7 +226,7 @@ def _stated(channel: str, column: Column, source: Source) -> str | None:
     given = described.time if channel == "time" else described.channels.get(channel)
     in_header = None if source.table.own else parse(column.label).unit
     stated = {"its header": in_header, "the file": column.unit}
-    if given is not None and given.unit is not None:
+    if given is not None and given.unit is not None and _describes(given, column):
         if isinstance(given, Channel) and given.value is not None:
             stated = {NAME: column.unit}
         elif isinstance(given, Channel) and given.is_calibrated:
@@ -236,25 +245,39 @@ def _stated(channel: str, column: Column, source: Source) -> str | None:
     return last
 
 
-def _assumed(channel: str, values: Array, source: Source) -> tuple[Unit, str]:
-    """Return the package's unit; `DataError` of a size that is a common one in another unit."""
+def _assumed(channel: str, column: Column, values: Array, source: Source) -> tuple[Unit, str]:
+    """Return the package's unit.
+
+    Raises
+    ------
+    DataError
+        If a word of the header is a unit, or a name of raw numbers, or the size is common in another
+        unit.
+    """
     expected = unit_of(channel)
     if expected is None:
         return Unit("", ""), ""
+    for word in re.findall(r"[^\W\d_]+", column.label)[1:] if expected else ():
+        unit = find(word)
+        if word.casefold() in COUNTS or (len(word) > 1 and unit and unit.target == expected):
+            raise source.error(
+                f"its unit is not certain: {column.label!r} has {word!r}",
+                f"name its unit, as in --unit {channel}={expected}, or calibrate it, as in --calibrate "
+                f"{channel}={column.header}:GAIN:OFFSET:{expected}",
+                channel,
+            )
     finite = np.abs(values[np.isfinite(values)])
     largest = float(finite.max()) if finite.size else 0.0
-    if 0 < largest < quality.PLAUSIBLE[expected].doubtful:
+    plausible = quality.PLAUSIBLE[expected]
+    if 0 < largest < plausible.least or largest > plausible.most:
         fitting = quality.fitting_units(largest, expected, expected)[0]
         raise source.error(
             f"it has no unit, and reaches {largest:.3g}: is it in {fitting}?",
-            f"name its unit, as in --unit {channel}={fitting}, or --unit {channel}={expected} where "
-            "that is right",
+            f"name its unit, as in --unit {channel}={fitting}, or --unit {channel}={expected or 1} "
+            "where that is right",
             channel,
         )
-    note = f"{channel} in {expected}" if expected else ""
-    if not expected and largest > 1.5:
-        note = f"{channel} in parts of one (up to {largest:.3g}: is it in %?)"
-    return Unit(expected, expected), note
+    return Unit(expected, expected), f"{channel} in {expected}" if expected else ""
 
 
 def _times(column: Column, source: Source) -> Times:

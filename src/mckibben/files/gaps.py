@@ -175,7 +175,7 @@ def _on_grid(
             after = np.clip(np.searchsorted(t, grid - 1e-9 * step.size), 1, t.size - 1)
             gap = np.isin(after + start, cuts) & (grid < t[after] - 1e-6 * step.size)
             gap &= grid > t[after - 1] + 1e-6 * step.size
-            bridged = (bridged[after] & bridged[after - 1]) | gap
+            bridged = bridged[after] | bridged[after - 1] | gap
         found.append(Piece(samples, seconds, times.seconds(t[0]), bridged))
     return found
 

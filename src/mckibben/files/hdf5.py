@@ -65,7 +65,7 @@ class _Tree:
             if at not in self._seen:
                 self._seen.add(at)
                 found[name] = self._node(item)
-                about = _attributes(item)
+                about = {key.casefold(): each for key, each in _attributes(item).items()}
                 unit = about.get("unit") or about.get("units")
                 units |= {name: unit} if isinstance(unit, str) else {}
         return found | {ATTRIBUTES: units}

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 CHANNELS: dict[str, dict[str, str]] = {
     "time": {
-        "en": "t time timestamp time_stamp datetime elapsed elapsed_time", "de": "zeit zeitstempel",
+        "en": "t time timestamp time_stamp datetime elapsed elapsed_time millis micros",
+        "de": "zeit zeitstempel",
         "fr": "temps horodatage", "it pt": "tempo", "es": "tiempo", "ja": "時間 時刻 経過時間",
         "zh": "时间 时刻 時間", "ko": "시간 시각"},
     "pressure": {

@@ -20,25 +20,26 @@ class Plausible(NamedTuple):
     """Values of a standard channel or of time; others are in another unit.
 
     ``typical`` is a common size, by which another unit is proposed; a channel without a unit that
-    reaches less than ``doubtful`` may well be in another.
+    reaches less than ``least`` or more than ``most`` may well be in another.
     """
 
     low: float
     high: float
     typical: float = 1.0
-    doubtful: float = 0.0
+    least: float = 0.0
+    most: float = math.inf
 
 
 PLAUSIBLE = {
-    "bar": Plausible(-1.1, 60.0, 5.0, 0.6),
-    "mm": Plausible(-2e4, 2e4, 30.0, 0.5),
+    "bar": Plausible(-1.1, 60.0, 5.0, 0.6, 12.0),
+    "mm": Plausible(-2e4, 2e4, 30.0, 0.5, 3e3),
     "N": Plausible(-1e6, 1e6, 300.0),
     "s": Plausible(-1e11, 1e11, 1.7e9),  # since 1970
-    "rad": Plausible(-1e4, 1e4),
+    "rad": Plausible(-1e4, 1e4, 1.0, 0.0, 7.0),
     "V": Plausible(-1e3, 1e3, 5.0),
     "mm/s": Plausible(-1e5, 1e5, 100.0),
     "degC": Plausible(-100.0, 1e3),
-    "": Plausible(-1e4, 1e4),
+    "": Plausible(-1e4, 1e4, 0.2, 0.0, 1.5),
 }
 """By the package's unit."""
 
@@ -55,7 +56,10 @@ JUMP = 5.0
 """Steps to and from a code, over the largest step between other samples."""
 
 SHARE = 0.25
-"""Largest share of zeros that can be codes."""
+"""Largest share of samples that can be zeros, or ends of a range, for missing ones."""
+
+HUGE = 1e30
+"""Size beyond which a number is a code, whatever the channel."""
 
 WRAPS = (2.0**8, 2.0**16)
 """Range of integer counters, which begin anew beyond it."""
@@ -82,8 +86,7 @@ def refuse_wraps(channel: str, recorded: Array, source: Source) -> None:
         others = steps[~jumps]
         unwrapped = steps[jumps] - np.sign(steps[jumps]) * size
         if (
-            others.size > FEWEST
-            and np.count_nonzero(others) > others.size / 2
+            np.count_nonzero(others) > FEWEST
             and np.array_equal(known, np.rint(known))
             and np.abs(unwrapped).max() <= 2 * np.abs(others).max() < 0.2 * size
         ):
@@ -177,17 +180,16 @@ def _is_code(code: float, known: Array) -> bool:
     others = known[~at]
     if not at.any() or others.size < FEWEST:
         return False
-    low, high = float(others.min()), float(others.max())
-    if code:  # of two levels, neither is a code
-        return max(code - high, low - code) > high - low > 0
-    # zeros are codes if they are far from what is measured just before and after each run of them
     steps = np.abs(np.diff(known))
-    edges = at[1:] != at[:-1]
     inside = steps[~at[1:] & ~at[:-1]]
-    return bool(
-        not (at[0] or at[-1] or at.mean() > SHARE)
-        and inside.size
-        # a signal of levels moves by jumps alone; one that is measured, by steps of all sizes
-        and np.count_nonzero(inside) > inside.size / 2
-        and steps[edges].min() / JUMP > inside.max()
-    )
+    jump = float(steps[at[1:] != at[:-1]].min())
+    low, high = float(others.min()), float(others.max())
+    far = max(code - high, low - code) > high - low > 0  # of two levels, neither is a code
+    # a signal of levels moves by jumps alone; one that is measured, by steps of all sizes
+    smooth = bool(inside.size) and np.count_nonzero(inside) > inside.size / 2
+    apart = smooth and at.mean() <= SHARE and jump / JUMP > inside.max()
+    if code > 0:
+        return abs(code) > HUGE or (far and apart)
+    if code < 0:
+        return far or (apart and int(np.diff(runs(at)).max()) <= LONE)
+    return apart and not (at[0] or at[-1])

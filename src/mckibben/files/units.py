@@ -59,7 +59,10 @@ MASSES = {
 """Unit of force -> those of the mass that hangs with it."""
 
 COUNTS = frozenset(
-    {"count", "counts", "cnt", "cts", "lsb", "lsbs", "ticks", "digits", "px", "pixel", "pixels"}
+    (
+        *("count", "counts", "cnt", "cts", "lsb", "lsbs", "tick", "ticks", "digits", "bits"),
+        *("px", "pixel", "pixels", "adc", "raw", "pulse", "pulses", "inc", "steps"),
+    )
 )
 """What converters and cameras count: no unit, and never that of a channel."""
 

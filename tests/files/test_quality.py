@@ -157,6 +157,16 @@ def test_absolute_pressure_is_noted_and_never_mixed(put: Put, unit: str) -> None
     assert caught.value.channel == "pressure"
 
 
+def test_what_is_calibrated_again_is_neither_absolute_nor_calibrated_twice(put: Put) -> None:
+    path = put("t_s,p [bara],displacement_mm", T, P + 1, Y)
+    again = path.with_name("again.csv")
+    mckibben.write(one(path, calibration={"displacement": (2.0, 0.0)}), again)
+    found = one(again, calibration={"pressure": (1.0, -1.0)}, units={"pressure": "bar"})
+    assert found["pressure"] == pytest.approx(P)
+    assert "pressure" not in found.meta["pressure_reference"]
+    assert set(found.meta["calibration"]) == {"pressure", "displacement"}
+
+
 def test_flaws_of_columns_not_asked_for_do_not_matter(put: Put) -> None:
     path = put(
         "t_s,pressure_bar,displacement_mm,force_parsec,force 2_N,force_2_N", T, P, Y, P, P, P

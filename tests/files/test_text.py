@@ -377,3 +377,15 @@ def test_the_header_is_the_row_of_known_names(tmp_path: Path) -> None:
 def test_numbers_may_be_names(tmp_path: Path) -> None:
     recording = read(tmp_path, "x,1,2\nsecond,Volt,Volt\n" + lines())
     assert (list(recording.channels), recording.units["1"]) == (["1", "2"], "V")
+
+
+def test_a_damaged_row_does_not_hide_those_before_it(tmp_path: Path) -> None:
+    rows = lines().splitlines(keepends=True)
+    error = refused(tmp_path, HEADER + rows[0] + "0.01,ERR,ERR\n" + "".join(rows[2:]))
+    assert error.row == 3
+
+
+def test_times_of_day_go_on_after_midnight(tmp_path: Path) -> None:
+    clock = ["23:59:59", *(f"00:00:{k:02d}" for k in range(19))]
+    content = "time,p_bar\n" + "".join(f"{each},{k}\n" for k, each in enumerate(clock))
+    assert read(tmp_path, content).time.tolist() == list(range(20))

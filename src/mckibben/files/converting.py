@@ -142,7 +142,8 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
     samples = convert(values, read_in.name, unit)
     recorded = convert(raw, read_in.name, unit) if calibrated else samples
     if not own:
-        quality.refuse_wraps(channel, raw, source)
+        if not channel.startswith(("voltage", "command_")):  # a sawtooth can be commanded
+            quality.refuse_wraps(channel, raw, source)
         samples = quality.without_codes(channel, samples, raw, source)
     if not own or channel in source.request.units or calibrated:
         quality.refuse_impossible(channel, samples, read_in.name, source)

@@ -71,7 +71,10 @@ def seconds(texts: Sequence[str], table: Table, path: Path) -> Array:
             row=table.row(int(bad[0])),
             remedy="write times in seconds or as 2026-01-31T12:00:00.5, or give --rate",
         )
-    return (instants - instants[0]).astype(np.float64) * 1e-9
+    since: Array = (instants - instants[0]).astype(np.float64) * 1e-9
+    if form is not None and form["first"] is None:  # times of day go on after midnight
+        since[1:] += 86400.0 * np.cumsum(np.diff(since) < -43200.0)
+    return since
 
 
 def _in_one_form(parts: Any, form: re.Match[str], table: Table, path: Path) -> tuple[Any, str]:

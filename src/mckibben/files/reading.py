@@ -182,7 +182,13 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
     units = {name: signal.unit for name, signal in signals.items()}
     rows = fingerprint({name: signal.recorded for name, signal in signals.items()}, when)
     name = {} if table.name is None else {"name": f"{path.stem}[{table.name}]"}
+    calibrated = found.meta.get("calibration", {})
     meta = {**table.meta, **found.meta, **name, "file": str(path), "sha256": digest}
+    for key in ("calibration", "pressure_reference"):  # of channels that are not calibrated now
+        before = table.meta.get(key)
+        if isinstance(before, Mapping):
+            kept = {name: one for name, one in before.items() if name not in calibrated}
+            meta[key] = kept | found.meta.get(key, {})
     recordings = [
         Recording(
             piece.samples,

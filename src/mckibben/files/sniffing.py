@@ -156,9 +156,13 @@ def sniff(lines: Sequence[str], separators: Sequence[str | None] = SEPARATORS) -
     if words:
         # names are in the row with the most known ones, or else the last
         best = max(words, key=lambda k: (_known(heads[k]), k))
-        best -= best == words[-1] and best > 0
-        names = heads[best : best + 2]
         first = words[-1] + 1
+        if _known(heads[best]):  # rows of words alone may follow it, none with numbers
+            first = best + 1
+            while first in words and not any(map(dialect.is_value, heads[first])):
+                first += 1
+        best -= best == first - 1 and best > 0
+        names = heads[best : min(best + 2, first)]
     elif not solid:  # nothing but words
         first, names = 1, [rows[0][1]]
     else:

@@ -79,7 +79,7 @@ def test_steps_of_many_seconds_ask_for_the_unit(put: Put, header: str) -> None:
     assert one(path, units={"time": "s"}).sample_time == 20
 
 
-@pytest.mark.parametrize("code", [-9999.0, 99999.0, 32767.0, 9.91e37])
+@pytest.mark.parametrize("code", [-9999.0, 99999.0, 32767.0, 9.91e37, -9.9e37])
 @pytest.mark.parametrize("length", [1, 3, 40])
 def test_codes_are_missing_samples(put: Put, code: float, length: int) -> None:
     y = Y.copy()

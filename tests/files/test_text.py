@@ -389,3 +389,13 @@ def test_times_of_day_go_on_after_midnight(tmp_path: Path) -> None:
     clock = ["23:59:59", *(f"00:00:{k:02d}" for k in range(19))]
     content = "time,p_bar\n" + "".join(f"{each},{k}\n" for k, each in enumerate(clock))
     assert read(tmp_path, content).time.tolist() == list(range(20))
+
+
+def test_a_footer_among_dates_is_refused_by_its_row(tmp_path: Path) -> None:
+    rows = "".join(f"2026-01-31T12:00:{k:02d},{k}\n" for k in range(40))
+    assert refused(tmp_path, f"stamp,p_bar\n{rows}Maximum,39\n").row == 42
+
+
+def test_a_record_number_is_in_no_unit_of_force(tmp_path: Path) -> None:
+    rows = "".join(f"{k},{k}\n" for k in range(20))
+    assert read(tmp_path, f"RECORD,p\nRN,bar\n{rows}")["record"].max() == 19

@@ -235,6 +235,8 @@ def _are_dates(column: Column, source: Source) -> bool:
         or not instants.may_be_instant(column.texts[0])
     ):
         return False
+    if not all(instants.may_be_instant(text) for text in column.texts if text):
+        return True  # a word among them is refused with its row
     try:
         times = instants.seconds(column.texts, source.table, source.path)
     except DataError:

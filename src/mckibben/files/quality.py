@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.files.headers import unit_of
+from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.units import SPELLINGS, convert
 
@@ -46,7 +47,7 @@ PLAUSIBLE = {
 SMALLEST_BAR, ZERO_BAR = 1e-7, 1e-12
 """A pressure whose largest value lies between these [bar] is in another unit, not the rounding of 0."""
 
-CODES = (0.0, *(10.0**k - 1 for k in range(3, 8)), 2.0**15 - 1, 2.0**16 - 1, 9.91e37)
+CODES = (0.0, *(10.0**k - 1 for k in range(3, 8)), 2.0**15 - 1, 2.0**16 - 1)
 """Sizes that instruments write for a missing sample; 0 only where the other samples exclude it."""
 
 FEWEST = 10
@@ -107,9 +108,12 @@ def without_codes(channel: str, values: Array, recorded: Array, source: Source) 
     known = recorded[np.isfinite(recorded)]
     signed = {sign * size for size in CODES for sign in (1.0, -1.0)}
     coded = np.isin(recorded, [code for code in signed if _is_code(code, known)])
+    huge = (np.abs(recorded) > HUGE) & np.isfinite(recorded)
+    if np.count_nonzero(~huge) >= FEWEST:  # SCPI's for not a number, and for beyond the range
+        coded |= huge
     if not coded.any():
         return values
-    found = ", ".join(f"{value:g}" for value in np.unique(recorded[coded]))
+    found = listed([f"{value:g}" for value in np.unique(recorded[coded])], most=5)
     source.warn(
         f"channel {channel!r}: {coded.sum()} sample(s) are {found}, a code for missing ones "
         f"(first in row {source.table.row(int(np.argmax(coded)))})"
@@ -189,7 +193,7 @@ def _is_code(code: float, known: Array) -> bool:
     smooth = bool(inside.size) and np.count_nonzero(inside) > inside.size / 2
     apart = smooth and at.mean() <= SHARE and jump / JUMP > inside.max()
     if code > 0:
-        return abs(code) > HUGE or (far and apart)
+        return far and apart
     if code < 0:
         return far or (apart and int(np.diff(runs(at)).max()) <= LONE)
     return apart and not (at[0] or at[-1])

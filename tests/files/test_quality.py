@@ -210,6 +210,14 @@ def test_sizes_of_another_unit_are_asked_for(put: Put, header: str, largest: flo
     assert header in refused(path).remedy
 
 
+def test_zeros_at_which_another_channel_moves_were_measured(put: Put) -> None:
+    on = (np.arange(N) + 25) % 50 < 42
+    noise = 0.01 * np.random.default_rng(0).standard_normal((2, N))
+    pressure = np.where(on, 4 + noise[0], 0.0)
+    moved = np.where(on, 20.0, 3.0) + noise[1]
+    assert len(one(put("t_s,pressure_bar,displacement_mm", T, pressure, moved))) == N
+
+
 def test_levels_are_no_codes(put: Put) -> None:
     force = np.array([200.0, 500.0, 999.0])[np.arange(N) * 3 // N]
     assert len(one(put("t_s,p_bar,force_gf", T, P, force))) == N

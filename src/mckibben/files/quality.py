@@ -108,6 +108,9 @@ def without_codes(channel: str, values: Array, recorded: Array, source: Source) 
     known = recorded[np.isfinite(recorded)]
     signed = {sign * size for size in CODES for sign in (1.0, -1.0)}
     coded = np.isin(recorded, [code for code in signed if _is_code(code, known)])
+    zero = coded & (recorded == 0)
+    if zero.any() and _moves_with(zero, source):
+        coded &= ~zero
     huge = (np.abs(recorded) > HUGE) & np.isfinite(recorded)
     if np.count_nonzero(~huge) >= FEWEST:  # SCPI's for not a number, and for beyond the range
         coded |= huge
@@ -176,6 +179,18 @@ def fitting_units(value: float, read_in: str, target: str) -> list[str]:
     off = {unit: abs(math.log(max(size, 1e-300)) - typical) for unit, size in sizes.items()}
     nearest, *others = sorted(off, key=lambda unit: off[unit])
     return [nearest, *(unit for unit in others if off[unit] < math.log(10.0))]
+
+
+def _moves_with(at: Mask, source: Source) -> bool:
+    """Return whether another column jumps where runs of samples begin and end: they were measured."""
+    edges = at[1:] != at[:-1]
+    for column in source.table.columns:
+        if column.values is None or column.values.size != at.size or not column.values[at].any():
+            continue
+        steps = np.abs(np.diff(column.values))
+        if np.median(steps[edges]) > JUMP * np.quantile(steps[~edges], 0.95):
+            return True
+    return False
 
 
 def _is_code(code: float, known: Array) -> bool:

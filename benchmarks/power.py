@@ -42,22 +42,18 @@ SECONDS = 900
 FILES, SPLITS = "src/mckibben/files", "src/mckibben/comparison/splits.py"
 FAULTS = [
     # file, what stands there once, what is planted: readers and units off by ten, other splits
-    (
-        f"{FILES}/cells.py",
-        "else np.concatenate(self._parts)",
-        "else 10 * np.concatenate(self._parts)",
-    ),
+    (f"{FILES}/text.py", "values, flaw = cells.to_numpy(", "values, flaw = 10 * cells.to_numpy("),
     (f"{FILES}/bags.py", "= np.array(values,", "= 10 * np.array(values,"),
-    (f"{FILES}/tdms.py", "channel[:], unit", "10 * channel[:], unit"),
-    (f"{FILES}/parquet.py", "= cells.to_numpy()", "= 10 * cells.to_numpy()"),
-    (f"{FILES}/hdf5.py", "else samples", "else 10 * samples"),
+    (f"{FILES}/tdms.py", "place, channel[:],", "place, 10 * channel[:],"),
     (
-        f"{FILES}/calibration.py",
-        "gain * column.values + offset",
-        "gain * column.values + 10 * offset",
+        f"{FILES}/parquet.py",
+        "column(name, cells.to_numpy())",
+        "column(name, 10 * cells.to_numpy())",
     ),
-    (f"{FILES}/units.py", '"kPa": "kPa"', '"hPa": "kPa"'),
-    (f"{FILES}/units.py", '"cm": "cm"', '"dm": "cm"'),
+    (f"{FILES}/hdf5.py", "else samples", "else 10 * samples"),
+    (f"{FILES}/converting.py", '+ calibration["offset"]', '+ 10 * calibration["offset"]'),
+    (f"{FILES}/units.py", '"kPa": "kPa 千帕"', '"hPa": "kPa 千帕"'),
+    (f"{FILES}/units.py", '"cm": "cm 厘米"', '"dm": "cm 厘米"'),
     (f"{FILES}/units.py", '"ms": "ms ', '"centisecond": "ms '),
     (SPLITS, "HELD_OUT = 0.25", "HELD_OUT = 0.35"),
     (SPLITS, "astype(int) % n", "astype(int) % (n + 1)"),

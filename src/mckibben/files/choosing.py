@@ -238,7 +238,7 @@ def _are_dates(column: Column, source: Source) -> bool:
     if not all(instants.may_be_instant(text) for text in column.texts if text):
         return True  # a word among them is refused with its row
     try:
-        times = instants.seconds(column.texts, source.table, source.path)
+        times = instants.seconds(column.texts, source)
     except DataError:
         return False
     return bool(np.all(np.diff(times) >= 0))

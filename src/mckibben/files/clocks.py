@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
 from mckibben.files.headers import unit_of
-from mckibben.files.notices import warn
-from mckibben.files.request import Request
+from mckibben.files.request import Request, Source
 from mckibben.files.table import Column
 from mckibben.files.timebase import GAP
 
 
-def on_one(
-    named: Mapping[str, Column], request: Request, path: Path
-) -> tuple[dict[str, Column], list[str]]:
+def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Column], list[str]]:
     """Return columns of one length, with one of times, and the headers of those left out.
 
     Between its samples a column is linear, or holds the last where it is one of counts; where it has a
@@ -34,27 +29,22 @@ def on_one(
     if all(column.times is None for column in named.values()):
         return dict(named), []
     clocks = {name: column.times for name, column in named.items() if column.times is not None}
-    needed = _needed({name: times for name, times in clocks.items() if times.size > 1}, request)
+    long = {name: times for name, times in clocks.items() if times.size > 1}
+    needed = _needed(long, source.request)
     if not needed:
-        raise DataError(
-            "no channel in it has two samples", file=path, remedy="give a longer recording"
-        )
+        raise source.error("no channel in it has two samples", "give a longer recording")
     for name, times in needed.items():
         wrong = np.flatnonzero(~(np.diff(times) > 0))
         if wrong.size:
             at = int(wrong[0])
-            raise DataError(
-                f"its time goes from {times[at]:.10g} s to {times[at + 1]:.10g} s",
-                file=path,
-                channel=name,
-                row=at + 2,
-                remedy="sort its samples by time, and leave one for each instant",
-            )
+            problem = f"its time goes from {times[at]:.10g} s to {times[at + 1]:.10g} s"
+            remedy = "sort its samples by time, and leave one for each instant"
+            raise source.error(problem, remedy, name, at + 1)
     steps = {name: float(np.median(np.diff(times))) for name, times in needed.items()}
     slowest = max(steps, key=lambda name: steps[name])
     start = max(times[0] for times in needed.values())
     stop = min(times[-1] for times in needed.values())
-    if (rate := request.rate) is None:
+    if (rate := source.request.rate) is None:
         whose, grid = f"times of {slowest!r}", needed[slowest]
         grid = grid[(grid >= start) & (grid <= stop)]
     else:
@@ -62,18 +52,14 @@ def on_one(
         grid = start + np.arange(max(0, count)) / rate
     if grid.size < 2:
         spans = [f"{name} from {t[0]:.6g} to {t[-1]:.6g} s" for name, t in needed.items()]
-        raise DataError(
-            f"its channels have no time in common: {'; '.join(spans[:10])}",
-            file=path,
-            channel=slowest,
-            remedy="record them together, or name other columns with --column CHANNEL=COLUMN",
-        )
+        problem = f"its channels have no time in common: {'; '.join(spans[:10])}"
+        remedy = "record them together, or name other columns with --column CHANNEL=COLUMN"
+        raise source.error(problem, remedy, slowest)
     if any(not np.array_equal(times, grid) for times in needed.values()):
         rates = ", ".join(f"{name} {1 / step:.4g}" for name, step in list(steps.items())[:10])
-        warn(
-            path,
+        source.warn(
             f"channels have times of their own (samples a second: {rates}); they were put on the "
-            f"{whose}, by interpolation",
+            f"{whose}, by interpolation"
         )
     columns: dict[str, Column] = {"time": Column("time", grid, "s")}
     left_out: list[str] = []

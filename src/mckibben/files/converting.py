@@ -84,7 +84,7 @@ def in_package_units(source: Source) -> Samples:
     """
     request = source.request
     columns, left_out = assign(source)
-    columns, dropped = clocks.on_one(columns, request, source.path)
+    columns, dropped = clocks.on_one(columns, source)
     left_out |= dict.fromkeys(dropped, "no samples at the others' times")
     clock = columns.pop("time", None)
     if clock is not None and clock.values is None and request.rate is not None:
@@ -283,12 +283,12 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> tup
 
 def _times(column: Column, source: Source) -> Times:
     """Return the times in a column of numbers or dates, in the unit stated, shown by size or assumed."""
-    request, table, path = source.request, source.table, source.path
+    request = source.request
     if column.values is None:
-        return Times(instants.seconds(column.texts, table, path))
+        return Times(instants.seconds(column.texts, source))
     values = _numbers("time", column, source)
     stated = request.units.get("time") or _stated("time", column, source)
-    unit, assumed = None if stated else timebase.unit_by_size(values, table, path), ""
+    unit, assumed = None if stated else timebase.unit_by_size(values, source), ""
     certain = "time" in request.units or request.described.time.unit is not None
     if unit is not None:
         certain = True

@@ -64,16 +64,9 @@ _SIGNATURES: dict[bytes, tuple[str, tuple[str, ...]]] = {
 
 def tables(path: Path) -> list[Table]:
     """Return what is in a file, before it is interpreted; errors are those of `read`."""
-    with opening(path) as file:
+    _module(path, READERS, "read")  # before a file of another kind is opened
+    with opened(path, most=MOST_BYTES) as file:
         return read(file, path)
-
-
-@contextmanager
-def opening(path: Path, most: float = MOST_BYTES) -> Iterator[BufferedReader]:
-    """Open a recording's file; `DataError` if its ending is unknown, or there is none to be read."""
-    _module(path, READERS, "read")
-    with opened(path, most=int(most)) as file:
-        yield file
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
-from mckibben.files.table import Table
+from mckibben.files.request import Source
 
 _FORM = (
     r"(?:(?P<first>\d{4}|\d{1,2})(?P<mark>[./-])(?P<second>\d{1,2}|[A-Za-z]{3})(?P=mark)"
@@ -33,7 +31,7 @@ def may_be_instant(text: str) -> bool:
     return _BEGINNING.match(text) is not None
 
 
-def seconds(texts: Sequence[str], table: Table, path: Path) -> Array:
+def seconds(texts: Sequence[str], source: Source) -> Array:
     """Return instants as seconds since the first.
 
     Parameters
@@ -57,27 +55,23 @@ def seconds(texts: Sequence[str], table: Table, path: Path) -> Array:
         form, pattern = None, "ISO8601"
         cells = cells.str.replace(",", ".").str.replace(r" ?(?:UTC|GMT)$", "Z", regex=True)
     else:
-        cells, pattern = _in_one_form(cells.str.extract(_FORM, flags=re.ASCII), form, table, path)
+        cells, pattern = _in_one_form(cells.str.extract(_FORM, flags=re.ASCII), form, source)
     zoned = form is None or form["zone"] is not None
     found = pd.to_datetime(cells, format=pattern, errors="coerce", utc=zoned)
     instants = (found.dt.tz_localize(None) if zoned else found).to_numpy("datetime64[ns]")
     bad = np.flatnonzero(np.isnat(instants))
     if bad.size:
-        raise DataError(
-            f"{texts[bad[0]][:40]!r} is no time"
-            + ("" if form is None or bad[0] == 0 else f" as {first[:40]!r} is"),
-            file=path,
-            channel="time",
-            row=table.row(int(bad[0])),
-            remedy="write times in seconds or as 2026-01-31T12:00:00.5, or give --rate",
-        )
+        like = "" if form is None or bad[0] == 0 else f" as {first[:40]!r} is"
+        problem = f"{texts[bad[0]][:40]!r} is no time{like}"
+        remedy = "write times in seconds or as 2026-01-31T12:00:00.5, or give --rate"
+        raise source.error(problem, remedy, "time", int(bad[0]))
     since: Array = (instants - instants[0]).astype(np.float64) * 1e-9
     if form is not None and form["first"] is None:  # times of day go on after midnight
         since[1:] += 86400.0 * np.cumsum(np.diff(since) < -43200.0)
     return since
 
 
-def _in_one_form(parts: Any, form: re.Match[str], table: Table, path: Path) -> tuple[Any, str]:
+def _in_one_form(parts: Any, form: re.Match[str], source: Source) -> tuple[Any, str]:
     """Return instants written alike from their parts, and their format for `pandas.to_datetime`."""
     clock = parts["clock"] if form["clock"] else parts["clock"].fillna("00:00")
     cells = clock + ":" + parts["whole"].fillna("00") + "." + parts["part"].fillna("0")
@@ -94,12 +88,12 @@ def _in_one_form(parts: Any, form: re.Match[str], table: Table, path: Path) -> t
     if len(form["first"]) == 4:
         days = ("%Y", month, "%d")
     else:
-        days = ("%d", month, year) if _day_first(parts, form, table, path) else (month, "%d", year)
+        days = ("%d", month, year) if _day_first(parts, form, source) else (month, "%d", year)
     dates = parts["first"] + "/" + parts["second"] + "/" + parts["third"]
     return dates + " " + cells, f"{'/'.join(days)} {pattern}"
 
 
-def _day_first(parts: Any, form: re.Match[str], table: Table, path: Path) -> bool:
+def _day_first(parts: Any, form: re.Match[str], source: Source) -> bool:
     """Return whether the day is before the month: where no number shows it, after dots it is."""
     import pandas as pd
 
@@ -109,12 +103,10 @@ def _day_first(parts: Any, form: re.Match[str], table: Table, path: Path) -> boo
     if days.max().max() > 12:
         return bool(days["first"].max() > 12)
     if days.nunique().max() > 1 and (days["first"] != days["second"]).any():
-        raise DataError(
+        raise source.error(
             f"{form.group()[:40]!r} may have the day first or the month",
-            file=path,
-            channel="time",
-            row=table.row(0),
-            remedy="write dates as 2026-01-31, or with the day first and dots as in 31.01.2026; or "
-            "give --rate",
+            "write dates as 2026-01-31, or with the day first and dots as in 31.01.2026; or give --rate",
+            "time",
+            0,
         )
     return True  # of one day, only the time of day matters

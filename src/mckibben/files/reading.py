@@ -16,6 +16,7 @@ from mckibben.files.channels import about
 from mckibben.files.choosing import Seen, matrix_hint, seen
 from mckibben.files.converting import ASSUMED, Samples, in_package_units
 from mckibben.files.fingerprint import fingerprint
+from mckibben.files.formats import MOST_BYTES
 from mckibben.files.notices import noted
 from mckibben.files.request import Gaps, Request, Source
 from mckibben.files.units import convert
@@ -38,7 +39,7 @@ def read(
     informative: bool = True,
     calibration: Mapping[str, tuple[float, float]] | None = None,
     constants: Mapping[str, tuple[float, str]] | None = None,
-    most: float = 2.0**31,
+    most: float = MOST_BYTES,
 ) -> list[Recording]:
     """Read the recordings in a file, by its ending, or in a folder.
 
@@ -171,7 +172,7 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
     when: Array = start + (step or 1.0) * np.arange(n, dtype=float)
     times = found.times if step is None else None
     if times is not None:
-        times = replace(times, values=timebase.checked(times.values, table, path))
+        times = replace(times, values=timebase.checked(times.values, source))
         when = convert(times.values, times.unit, "s")
     elif step is None and (columns := matrix_hint(table, time=True)):
         source.warn(f"no column of times is named; use --column time=COLUMN{columns}")
@@ -210,7 +211,7 @@ def _stated_step(found: Samples, source: Source) -> float | None:
     step = table.sample_time if request.rate is None else 1.0 / request.rate
     if step is None and times is None and not table.own:
         described = request.described.time.sample_time
-        return timebase.stated_step(table.rates, source.path) if described is None else described
+        return timebase.stated_step(source) if described is None else described
     if step is None:
         return None
     if table.sample_time is not None and abs(step - table.sample_time) > 1e-3 * step:

@@ -12,6 +12,7 @@ import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files.channels import Channel, Described, Time
+from mckibben.files.formats import MOST_BYTES
 from mckibben.files.notices import warn
 from mckibben.files.table import Table
 
@@ -39,7 +40,7 @@ class Request:
     informative: bool = True
     calibration: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     constants: Mapping[str, tuple[float, str]] = field(default_factory=dict)
-    most: float = 2.0**31
+    most: float = MOST_BYTES
     described: Described = field(default_factory=Described)
 
     @property

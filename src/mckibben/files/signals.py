@@ -152,6 +152,7 @@ def _seconds(clock: Column, table: Table, request: Request, path: Path) -> Array
     alone = Request({}, units, None, request.gaps, None, informative=False, described=said)
     time = replace(clock, header="time", says=None, unit=clock.unit or parse(clock.label).unit)
     rest = Column("signal", np.zeros(table.n_samples), "1")
-    times = in_package_units(alone.of(replace(table, columns=(time, rest)), path)).times
+    source = alone.of(replace(table, columns=(time, rest)), path)
+    times = in_package_units(source).times
     assert times is not None
-    return convert(timebase.checked(times.values, table, path), times.unit, "s")
+    return convert(timebase.checked(times.values, source), times.unit, "s")

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
 from mckibben.files.headers import snake_case
-from mckibben.files.notices import listed, warn
-from mckibben.files.table import Table
+from mckibben.files.notices import listed
+from mckibben.files.request import Source
 
 Span = tuple[int, int]
 """Samples from the first to, not including, the second."""
@@ -57,7 +55,7 @@ class Step:
     jitter: tuple[float, float] | None
 
 
-def checked(time: Array, table: Table, path: Path) -> Array:
+def checked(time: Array, source: Source) -> Array:
     """Return times that rise: counters that wrap go on, and other times that do not rise are refused.
 
     Raises
@@ -67,14 +65,10 @@ def checked(time: Array, table: Table, path: Path) -> Array:
     """
     missing = np.flatnonzero(~np.isfinite(time))
     if missing.size:
-        raise DataError(
-            f"the time is missing in {missing.size} row(s)",
-            file=path,
-            channel="time",
-            row=table.row(int(missing[0])),
-            remedy="fill it in or delete the row; or delete the column and give --rate",
-        )
-    time = _unwrapped(time, table, path)
+        problem = f"the time is missing in {missing.size} row(s)"
+        remedy = "fill it in or delete the row; or delete the column and give --rate"
+        raise source.error(problem, remedy, "time", int(missing[0]))
+    time = _unwrapped(time, source)
     steps = np.diff(time)
     wrong = np.flatnonzero(steps <= 0)
     if not wrong.size:
@@ -88,10 +82,10 @@ def checked(time: Array, table: Table, path: Path) -> Array:
     else:
         problem = f"the time goes back from {time[at]:.10g} to {time[at + 1]:.10g}"
         remedy = "split the file there, or sort its rows by time"
-    raise DataError(problem, file=path, channel="time", row=table.row(at + 1), remedy=remedy)
+    raise source.error(problem, remedy, "time", at + 1)
 
 
-def _unwrapped(time: Array, table: Table, path: Path) -> Array:
+def _unwrapped(time: Array, source: Source) -> Array:
     """Return times of an integer counter that goes on where it wrapped, with a note."""
     steps = np.diff(time)
     back = steps < 0
@@ -101,24 +95,22 @@ def _unwrapped(time: Array, table: Table, path: Path) -> Array:
     for size in WRAPS:
         on = steps[back] + size
         if time.min() >= 0 and time.max() < size and np.all((on > 0) & (on <= GAP * usual)):
-            first = int(np.argmax(back)) + 1
-            warn(
-                path,
-                f"the time wraps at {size:.0f}, first in row {table.row(first)}, and was unwrapped",
-            )
+            row = source.table.row(int(np.argmax(back)) + 1)
+            source.warn(f"the time wraps at {size:.0f}, first in row {row}, and was unwrapped")
             found: Array = time + size * np.concatenate([[0], np.cumsum(back)])
             return found
     return time
 
 
-def stated_step(rates: Mapping[str, float], path: Path) -> float | None:
-    """Return the sample time [s] by scalars such as ``fs = 50``, by their places, with a note.
+def stated_step(source: Source) -> float | None:
+    """Return the sample time [s] by scalars beside the samples such as ``fs = 50``, with a note.
 
     Raises
     ------
     DataError
         If one is no positive finite number, or two contradict each other.
     """
+    rates = source.table.rates
     if not rates:
         return None
     said = listed([f"{place} = {value:g}" for place, value in rates.items()])
@@ -130,16 +122,11 @@ def stated_step(rates: Mapping[str, float], path: Path) -> float | None:
     possible = all(1e-12 <= step < 1e11 for step in steps)
     if not possible or max(steps) - min(steps) > 1e-3 * min(steps):
         problem = "contradict each other" if possible else "cannot be a rate or a sample time"
-        raise DataError(
-            f"{said}: {problem}",
-            file=path,
-            channel="time",
-            remedy="give the samples per second with --rate, or correct them in the file",
-        )
-    warn(
-        path,
+        remedy = "give the samples per second with --rate, or correct them in the file"
+        raise source.error(f"{said}: {problem}", remedy, "time")
+    source.warn(
         f"there are no times, so {said} is read as {steps[0]:g} s between samples; "
-        "use --rate where that is wrong",
+        "use --rate where that is wrong"
     )
     return steps[0]
 
@@ -158,7 +145,7 @@ def _last(place: str) -> str:
     return name if len(name) == 2 else snake_case(name)
 
 
-def unit_by_size(time: Array, table: Table, path: Path) -> str | None:
+def unit_by_size(time: Array, source: Source) -> str | None:
     """Return the unit of times without one where their size shows it, or None.
 
     Raises
@@ -172,14 +159,11 @@ def unit_by_size(time: Array, table: Table, path: Path) -> str | None:
     if any(first <= low and high <= last for first, last in _DAYS):
         steps = np.abs(np.diff(time))
         if 0 < float(np.median(steps)) < _SHORT:
-            raise DataError(
+            problem = (
                 f"the times have no unit; {time[0]:.12g} and the short steps may be days, as "
-                "spreadsheets count them, or seconds",
-                file=path,
-                channel="time",
-                row=table.row(0),
-                remedy="say --unit time=day or --unit time=s",
+                "spreadsheets count them, or seconds"
             )
+            raise source.error(problem, "say --unit time=day or --unit time=s", "time", 0)
     for unit, (first, last) in _SINCE_1970.items():
         if first <= low and high < last:
             return unit

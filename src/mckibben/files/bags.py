@@ -20,7 +20,7 @@ import numpy as np
 
 from mckibben.errors import DataError
 from mckibben.files.formats import reason
-from mckibben.files.headers import channel_of, parse, unit_of
+from mckibben.files.headers import channel_of, is_standard, is_time, parse
 from mckibben.files.notices import listed
 from mckibben.files.table import WIDEST, Column, Table
 from mckibben.system.extras import demand
@@ -58,7 +58,7 @@ class _Topic:
         """Take a message that was recorded at a time [ns]."""
         message = self.decode(raw)
         stamp: Any = getattr(getattr(message, "header", None), "stamp", None)
-        self.stamps.append(stamp.sec * 10**9 + stamp.nanosec if _is_time(stamp) else 0)
+        self.stamps.append(stamp.sec * 10**9 + stamp.nanosec if _is_instant(stamp) else 0)
         for place, value in _numbers(f"/{self.name.strip('/')}", message):
             if isinstance(value, str):
                 self.unread[place] = value
@@ -207,7 +207,7 @@ def _numbers(
         named = len(names) == len(value)
         for k, item in enumerate(value.tolist() if isinstance(value, np.ndarray) else value):
             yield from _numbers(f"{place}/{names[k]}" if named else f"{place}[{k}]", item)
-    elif _is_time(value):
+    elif _is_instant(value):
         yield place, "a time"
     elif not isinstance(value, str):
         found = getattr(value, "name", None)
@@ -217,13 +217,12 @@ def _numbers(
                 yield from _numbers(f"{place}/{member.name}", getattr(value, member.name), names)
 
 
-def _is_time(value: Any) -> bool:
+def _is_instant(value: Any) -> bool:
     return getattr(value, "__msgtype__", "").startswith("builtin_interfaces/msg/")
 
 
 def _is_standard(word: str) -> bool:
-    channel = channel_of(parse(word))
-    return channel != "time" and unit_of(channel) is not None
+    return is_standard(word) and not is_time(word)
 
 
 def _indexed(header: str) -> str:

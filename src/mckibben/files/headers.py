@@ -158,6 +158,20 @@ def unit_of(channel: str) -> str | None:
     return "s" if channel == "time" else standard_unit(channel)
 
 
+def is_standard(text: str) -> bool:
+    """Return whether a header names a standard channel or the time.
+
+    >>> is_standard("Pressure (kPa)"), is_standard("t_s"), is_standard("status")
+    (True, True, False)
+    """
+    return unit_of(channel_of(parse(text))) is not None
+
+
+def is_time(text: str) -> bool:
+    """Return whether a header names the time."""
+    return channel_of(parse(text)) == "time"
+
+
 def snake_case(name: str) -> str:
     """Return a name in lower snake case.
 

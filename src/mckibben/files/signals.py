@@ -14,7 +14,7 @@ from mckibben.errors import DataError
 from mckibben.files import formats, timebase
 from mckibben.files.channels import NAME, Described, Folder, Time
 from mckibben.files.converting import in_package_units
-from mckibben.files.headers import channel_of, parse, unit_of
+from mckibben.files.headers import channel_of, is_standard, is_time, parse, unit_of
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
 from mckibben.files.units import convert
@@ -121,8 +121,7 @@ def _split(table: Table, stamp: str | None) -> tuple[list[Column], list[Column]]
     signals: list[Column] = []
     times: list[Column] = []
     for column in table.columns:
-        header = parse(column.label)
-        if stamp in (column.header, header.name) or channel_of(header) == "time":
+        if stamp in (column.header, parse(column.label).name) or is_time(column.label):
             times.append(column)
         elif column.values is not None:
             signals.append(column)
@@ -131,10 +130,9 @@ def _split(table: Table, stamp: str | None) -> tuple[list[Column], list[Column]]
 
 def _named(column: Column, name: str) -> Column:
     """Return a column with the name of its file for the channel, or else with that of its header."""
-    header = parse(column.header)
-    if unit_of(channel_of(parse(name))) is None and unit_of(channel_of(header)) is not None:
+    if is_standard(column.header) and not is_standard(name):
         return replace(column, header=name, says=column.header)
-    return replace(column, header=name, unit=column.unit or header.unit)
+    return replace(column, header=name, unit=column.unit or parse(column.header).unit)
 
 
 def _same(one: Column, other: Column) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mckibben.errors import DataError
-from mckibben.files.headers import channel_of, foreign_words, parse, unit_of
+from mckibben.files.headers import foreign_words, is_standard
 from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import warn
 from mckibben.files.units import find, find_listed
@@ -229,4 +229,4 @@ def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
 
 def _known(row: Sequence[str]) -> int:
     """Return how many cells of a row name a standard channel."""
-    return sum(unit_of(channel_of(parse(cell))) is not None for cell in row)
+    return sum(map(is_standard, row))

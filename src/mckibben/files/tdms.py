@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files.headers import channel_of, parse
+from mckibben.files.headers import is_time
 from mckibben.files.table import Column, Table, column, plain_meta
 from mckibben.system.extras import demand
 
@@ -47,7 +47,7 @@ def _table(group: Any, meta: Mapping[str, Any], name: str | None) -> Table:
         place, kind = channel.name, channel.dtype.kind
         if not len(channel):
             unread[place] = "no samples"
-        elif kind not in "biufmM" and not _is_time(place):
+        elif kind not in "biufmM" and not is_time(place):
             unread[place] = "complex numbers" if kind == "c" else "text"
         else:
             columns[place] = column(
@@ -69,14 +69,10 @@ def _table(group: Any, meta: Mapping[str, Any], name: str | None) -> Table:
     clocked: list[Column] = []
     for place, each in columns.items():
         step, offset, began = clocks.get(place, (None, 0.0, None))
-        if _is_time(place) or step is None or (first is not None and began is None):
+        if is_time(place) or step is None or (first is not None and began is None):
             unread[place] = "its start and increment are not stated, and others differ in them"
         else:
             late = 0.0 if began is None else float((began - first) / np.timedelta64(1, "us")) / 1e6
             times = offset + late + step * np.arange(each.size, dtype=np.float64)
             clocked.append(replace(each, times=times))
     return Table(tuple(clocked), meta=meta, unread=unread, name=name)
-
-
-def _is_time(header: str) -> bool:
-    return channel_of(parse(header)) == "time"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import timebase
-from mckibben.files.headers import channel_of, parse, unit_of
+from mckibben.files.headers import is_standard, is_time, parse
 from mckibben.files.notices import listed
 from mckibben.files.table import Column, Table, column, is_matrix
 from mckibben.files.units import convert, find
@@ -69,7 +69,7 @@ class _Vector:
     def seconds(self) -> Array | None:
         """The samples [s], if these are times."""
         unit = find(self.unit or parse(self.name).unit or "s")
-        if not _is_time(self.name) or unit is None or unit.target != "s":
+        if not is_time(self.name) or unit is None or unit.target != "s":
             return None
         return convert(np.asarray(self.values, dtype=np.float64), unit.name, "s")
 
@@ -171,7 +171,7 @@ class _Walk:
                         name = header = names
                     elif values.ndim == 1:
                         name, header = home[-1], place
-                    above = home[:-1] if _is_time(name) else home
+                    above = home[:-1] if is_time(name) else home
                 unit = unit if isinstance(unit, str) and unit else None
                 if values.ndim == 1:
                     self.vectors.append(_Vector(place, above, name, header, values, unit))
@@ -248,7 +248,7 @@ def _signal(nodes: Group) -> str | None:
     lengths = [
         (max(node.shape), name)
         for name, node in nodes.items()
-        if isinstance(node, np.ndarray) and node.size > 1 and not _is_time(name)
+        if isinstance(node, np.ndarray) and node.size > 1 and not is_time(name)
     ]
     longest = [name for length, name in lengths if length == max(lengths)[0]]
     return longest[0] if len(longest) == 1 else None
@@ -273,10 +273,6 @@ def _legend(group: Group, *, named: bool) -> dict[str, str]:
     }
     found = {name: unit for name, unit in units.items() if isinstance(unit, str) and unit}
     return found if named or any(map(find, found.values())) else {}
-
-
-def _is_time(name: str) -> bool:
-    return channel_of(parse(name)) == "time"
 
 
 def _clocks(vectors: Sequence[_Vector]) -> tuple[list[_Vector], dict[str, Array]]:
@@ -310,7 +306,7 @@ def _columns(vectors: Sequence[_Vector], times: Mapping[str, Array]) -> list[Col
         name, header = each.name, each.header
         if names[name] > 1:
             header = each.place
-            if unit_of(channel_of(parse(name))) is None:  # no standard channel
+            if not is_standard(name):
                 name = re.sub(r"\W+", "_", each.place).strip("_")
         own = column(header, np.ascontiguousarray(each.values), each.unit)
         says = None if name == header else name

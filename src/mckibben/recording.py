@@ -227,10 +227,10 @@ class Recording(DrawsItself):
     @property
     def bridged(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Which samples were interpolated over a gap when it was read, shape (n,)."""
-        found = np.zeros(self.n_samples, dtype=np.bool_)
-        within = 1e-6 * (self.sample_time or 1.0)
+        time, within = self.time, 1e-6 * (self.sample_time or 1.0)
+        found = np.zeros(time.size, dtype=np.bool_)
         for start, stop in self.meta.get("bridged", ()):
-            found |= (self.time >= start - within) & (self.time <= stop + within)
+            found |= (time >= start - within) & (time <= stop + within)
         return found
 
     def matrix(self, channels: Iterable[str]) -> Array:

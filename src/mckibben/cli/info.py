@@ -199,10 +199,12 @@ def _recordings(
 
 def _lag(recording: Recording) -> int | None:
     """Return the lag of the one channel that pressure or voltage moves, None of several."""
-    from mckibben.files.condition import DRIVEN, lag
+    from mckibben.files.condition import DRIVEN, DRIVING, lag
 
-    inputs = [name for name in recording.channels if name.startswith(("pressure", "voltage"))]
-    outputs = [name for name in recording.channels if name.partition("_")[0] in DRIVEN]
+    inputs, outputs = (
+        [name for name in recording.channels if name.partition("_")[0] in kinds]
+        for kinds in (DRIVING, DRIVEN)
+    )
     if len(inputs) != 1 or len(outputs) != 1:
         return None
     return lag(recording, inputs[0], outputs[0])

@@ -257,16 +257,16 @@ def _early(every: Sequence[Recording], channels: Channels, allow: bool) -> tuple
     found = early(every, channels.inputs[0], channels.outputs[0]) if channels.single else None
     if found is None:
         return ()
-    said = f"{channels.outputs[0]} moves {-found} samples before {channels.inputs[0]}"
+    moves = f"moves {-found} samples before {channels.inputs[0]}"
     if not allow:
         raise DataError(
-            f"it moves {-found} samples before {channels.inputs[0]}",
+            f"it {moves}",
             file=every[0].source,
             channel=channels.outputs[0],
             remedy="check that columns are not swapped and clocks agree; or compare all the same with "
             "--allow-early (allow_early=True)",
         )
-    return (said,)
+    return (f"{channels.outputs[0]} {moves}",)
 
 
 def _checked(

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files.fingerprint import Hashes, mixed, pairs_of_one_row, shared_rows
+from mckibben.files.quality import runs
 from mckibben.recording import Recording
 
 Indices = NDArray[np.int64]
@@ -329,8 +330,7 @@ def _compared(
             alike &= (
                 np.abs(one[name][begin + shift : end + shift] - other[name][begin:end]) <= tolerance
             )
-        edges = np.flatnonzero(np.diff(alike, prepend=False, append=False)) + begin
-        starts, stops = edges[::2], edges[1::2]
+        starts, stops = runs(alike).T + begin
         travelled = moves[1][stops - 1] - moves[1][starts]
         for k in np.flatnonzero(travelled >= enough).tolist():
             start, stop = int(starts[k]), int(stops[k])

@@ -25,8 +25,8 @@ CLEAR = 0.002
 EARLY = -2
 """Lag in samples from which on an output moves before its input."""
 
-DRIVEN = {"displacement", "length", "contraction", "angle"}
-"""Channels that pressure or voltage moves, never before it does."""
+DRIVING, DRIVEN = {"pressure", "voltage"}, {"displacement", "length", "contraction", "angle"}
+"""Channels that move others, and those that they move, never before they do."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,7 @@ def early(recordings: Sequence[Recording], input_: str, output: str) -> int | No
 
     Only motion by pressure or voltage is judged.
     """
-    if not (
-        input_.partition("_")[0] in ("pressure", "voltage") and output.partition("_")[0] in DRIVEN
-    ):
+    if not (input_.partition("_")[0] in DRIVING and output.partition("_")[0] in DRIVEN):
         return None
     lags = [lag(recording, input_, output) for recording in recordings]
     known = sorted(found for found in lags if found is not None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import warnings
 import zlib
-from io import BufferedReader
+from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +28,11 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the vectors of a MAT file, of version 4 to 7.3."""
     if file.peek(10).startswith((b"MATLAB 7.3", b"\x89HDF")):
         return hdf5.read(file, path)
-    _refuse_unknown_types(file.read())
-    file.seek(0)
+    data = file.read()
+    _refuse_unknown_types(data)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        variables: dict[str, Any] = loadmat(file)  # type: ignore[arg-type]  # the stubs take no files
+        variables: dict[str, Any] = loadmat(BytesIO(data))  # type: ignore[arg-type]  # the stubs take no files
     # SciPy names all objects "None", and returns the last of one name
     doubled = [each for each in caught if str(each.message).startswith("Duplicate variable name")]
     objects = sum('"None"' in str(each.message) for each in doubled)
@@ -58,7 +58,7 @@ def _refuse_unknown_types(data: bytes) -> None:
     order = "<" if data[126:128] == b"IM" else ">"
     if data[126:128] not in (b"IM", b"MI"):
         return  # version 4, which has no such elements
-    waiting = [(data, 128)]
+    waiting = [(memoryview(data), 128)]
     while waiting:
         content, at = waiting.pop()
         while at + 8 <= len(content):
@@ -70,7 +70,7 @@ def _refuse_unknown_types(data: bytes) -> None:
                 raise ValueError(f"it has an element of the unknown type {kind}")
             inside = content[start : start + size]
             if kind == _COMPRESSED:
-                waiting.append((zlib.decompressobj().decompress(inside), 0))
+                waiting.append((memoryview(zlib.decompressobj().decompress(inside)), 0))
             elif kind == _MATRIX:
                 waiting.append((inside, 0))
 

@@ -161,8 +161,10 @@ def sniff(lines: Sequence[str], separators: Sequence[str | None] = SEPARATORS) -
             first = best + 1
             while first in words and not any(map(dialect.is_value, heads[first])):
                 first += 1
-        best -= best == first - 1 and best > 0
-        names = heads[best : min(best + 2, first)]
+        above = int(
+            best == first - 1 and best > 0
+        )  # of the last row, the one above it may have names
+        names = heads[best - above : min(best - above + 2, first)]
     elif not solid:  # nothing but words
         first, names = 1, [rows[0][1]]
     else:

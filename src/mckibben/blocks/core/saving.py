@@ -31,12 +31,6 @@ LARGEST_FILE = 64 * 2**20
 MOST_PARTS = 5000
 """Blocks and what is in them that a model may describe, so that reading a large file ends soon."""
 
-RECORDED = (
-    *(".csv", ".tsv", ".txt", ".dat", ".parquet", ".mat", ".h5", ".hdf5", ".tdms", ".xlsx"),
-    *(".lvm", ".bag", ".mcap", ".db3"),
-)
-"""Endings of recordings' names."""
-
 _described: ContextVar[Iterator[int]] = ContextVar("described")
 
 
@@ -153,7 +147,9 @@ def load(path: str | Path) -> Block:
 
 def _recording(path: Path) -> str:
     """Return what to say of a file that is no JSON, if it is there and named as a recording."""
-    if path.suffix.lower() not in RECORDED or not path.is_file():
+    from mckibben.files.formats import SOUGHT
+
+    if path.suffix.casefold() not in SOUGHT or not path.is_file():
         return ""
     return f"{path}: this is a recording. Remedy: the model comes first, then recordings."
 

@@ -31,13 +31,7 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
 """Units of the standard channels; ``pressure_2`` and ``pressure_extensor`` follow ``pressure``."""
 
 
-ROWS = "rows"
-"""Entry of ``meta`` that keeps the fingerprint of the rows that were read, of every channel."""
-
-AT = ""
-"""Entry of these: where the recording begins among the rows, in the time of the file [s], or rows."""
-
-PROVENANCE = ("file", "sha256", ROWS)
+PROVENANCE = ("file", "sha256")
 """Entries of ``meta`` that say where a recording was read from; recordings are equal without them."""
 
 
@@ -213,11 +207,6 @@ class Recording(DrawsItself):
         return "recording" if self.source is None else Path(self.source).stem
 
     @property
-    def known(self) -> dict[str, Any]:
-        """What ``meta`` tells a person: all but the fingerprint of the rows."""
-        return {key: what for key, what in self.meta.items() if key != ROWS}
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed or mended when it was read, as ``meta["notes"]`` has it."""
         given = self.meta.get("notes")
@@ -240,22 +229,10 @@ class Recording(DrawsItself):
     def with_channels(
         self, units: Mapping[str, str] | None = None, /, **samples: ArrayLike
     ) -> Recording:
-        """Return a recording with channels added, or replaced by others that were not read."""
+        """Return a recording with channels added or replaced."""
         added = {name: np.asarray(values, dtype=float) for name, values in samples.items()}
         kept = {name: unit for name, unit in self.units.items() if name not in added}
-        meta, rows = dict(self.meta), self.meta.get(ROWS)
-        if isinstance(rows, Mapping):
-            meta[ROWS] = {name: known for name, known in rows.items() if name not in added}
-        return replace(
-            self,
-            channels={**self.channels, **added},
-            units=kept | dict(units or {}),
-            meta=meta,
-        )
-
-    def processed(self, samples: Mapping[str, Array]) -> Recording:
-        """Return a recording some of whose channels are the same samples, filtered or shifted."""
-        return replace(self, channels={**self.channels, **samples})
+        return replace(self, channels={**self.channels, **added}, units=kept | dict(units or {}))
 
     def with_meta(self, **meta: Any) -> Recording:
         """Return a recording with entries of ``meta`` added or replaced."""
@@ -278,14 +255,10 @@ class Recording(DrawsItself):
                 file=self.source,
                 remedy="cut inside the recording",
             )
-        meta, rows = dict(self.meta), self.meta.get(ROWS)
-        if isinstance(rows, Mapping) and isinstance(at := rows.get(AT), int | float):
-            meta[ROWS] = {**rows, AT: at + float(self.time[start]) - self.start_time}
         return replace(
             self,
             channels={name: samples[start:stop] for name, samples in self.channels.items()},
             start_time=float(self.time[start]),
-            meta=meta,
         )
 
     def continues(self, other: Recording) -> bool:

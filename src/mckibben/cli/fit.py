@@ -74,7 +74,7 @@ def fit(
     from mckibben import registry
     from mckibben.blocks.core.writing import quantities
     from mckibben.comparison.offered import settings_of
-    from mckibben.comparison.shared_stretches import refuse_copies
+    from mckibben.comparison.shared_rows import check_shared
     from mckibben.outputs import claim_model
 
     estimator_class = registry.load("estimators", model)
@@ -104,7 +104,7 @@ def fit(
     held_back = reading.read(validation or [], None, informative=False)
     data = estimator.data(recordings)
     names = [[channel.name for channel in some] for some in (data.inputs, data.outputs)]
-    refuse_copies("fit", recordings, *names)
+    check_shared({"fit": recordings}, *names)
     with progress_bar(f"fitting {model}") as tell:
         estimator.fit(
             recordings,

@@ -154,7 +154,7 @@ def _recordings(
                 for name, samples in recording.channels.items()
             },
             "lag_samples": _lag(recording),
-            "meta": recording.known,
+            "meta": dict(recording.meta),
         }
         for recording in recordings
     ]

@@ -13,7 +13,7 @@ from mckibben.blocks.bands.banded import Banded, inside
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.commanding import commands
 from mckibben.comparison.free_run import refuse_runaway, run_free
-from mckibben.comparison.shared_stretches import GRAVE, refuse_copies, shared_stretches
+from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.recording import Recording, listed
 from mckibben.system.progress import Tell, one_by_one, telling
@@ -139,7 +139,7 @@ def calibration(
                 channel=name,
                 remedy="record while it moves, or name another column with --column",
             )
-    _check_apart(fitted, recordings, inputs, outputs)
+    check_shared({"fit": fitted, "calibrate": recordings}, inputs, outputs)
     held = [held_of(model, recording, outputs) for recording in one_by_one(recordings, tell)]
     found = find_band(model, held, exchangeable)
     return Banded(model, found.band), found
@@ -154,26 +154,6 @@ def _check_time(recordings: Sequence[Recording]) -> None:
             file=recordings[0].source,
             remedy="resample all to one (--resample)",
         )
-
-
-def _check_apart(
-    fitted: Sequence[Recording],
-    recordings: Sequence[Recording],
-    inputs: Sequence[str],
-    outputs: Sequence[str],
-) -> None:
-    """Refuse recordings that the model was fitted to, or that are the same in part."""
-    refuse_copies("calibrate", recordings, inputs, outputs)
-    if not fitted:
-        return
-    for shared in shared_stretches([*fitted, *recordings], inputs, outputs):
-        if shared.share >= GRAVE and shared.first < len(fitted) <= shared.second:
-            raise DataError(
-                f"the model was fitted to {100 * shared.share:.0f} % of its motion, and misses less "
-                "there than elsewhere",
-                file=recordings[shared.second - len(fitted)].source,
-                remedy="calibrate on recordings that it was not fitted to",
-            )
 
 
 def held_of(model: Block, recording: Recording, outputs: Sequence[str]) -> Held:

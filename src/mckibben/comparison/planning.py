@@ -26,7 +26,7 @@ from mckibben.comparison.recognising import (
 )
 from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.row import Row
-from mckibben.comparison.shared_stretches import TESTED, told
+from mckibben.comparison.shared_rows import TESTED, check_shared
 from mckibben.comparison.splits import split_of, validation_folds
 from mckibben.comparison.trying import Data, Item, Tried
 from mckibben.errors import DataError, ModelError
@@ -183,7 +183,7 @@ def plan_of(
     unit = _checked(recordings, [*tests, *checks], channels)
     early = _early(every, channels, allow_early)
     roles = {"fit": recordings, "validate": checks, "test": tests}
-    shared = told(
+    shared = check_shared(
         {role: runs for role, runs in roles.items() if runs or role != "validate"},
         [*channels.inputs, *channels.scheduled(recordings)],
         channels.outputs,

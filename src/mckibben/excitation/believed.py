@@ -13,7 +13,7 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.bands.banded import inside
 from mckibben.blocks.core.block import Block
-from mckibben.comparison.shared_stretches import refuse_copies
+from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError, ModelError
 from mckibben.excitation.candidates import random_plan
 from mckibben.excitation.limits import (
@@ -133,7 +133,7 @@ def from_recordings(
     outputs = [channel.name for channel in block.outputs]
     names = [*inputs, *outputs]
     fitting = tuple(r for r in recordings if all(name in r for name in names))
-    refuse_copies("plan", fitting, inputs, outputs)
+    check_shared({"plan": fitting}, inputs, outputs)
     if not fitting:
         raise DataError(
             f"no recording has all of {', '.join(names)}, which the model needs",

@@ -34,13 +34,11 @@ UNIT_OF_TIME = "name its unit, as in --unit time=ms, or --unit time=s where that
 class Signal:
     """One channel: its samples, and what was done to its column, in the unit ``read_in``.
 
-    ``recorded`` are the samples without gain and offset, by which rows that two recordings share are
-    found; ``assumed`` is the note of a unit that is not stated; ``calibration`` has gain and offset, or
-    the constant that the folder describes.
+    ``assumed`` is the note of a unit that is not stated; ``calibration`` has gain and offset, or the
+    constant that the folder describes.
     """
 
     samples: Array
-    recorded: Array
     unit: str
     read_in: Unit
     assumed: str
@@ -140,7 +138,6 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
     target = standard if own or standard is not None else read_in.target
     unit = read_in.name if target is None else target
     samples = convert(values, read_in.name, unit)
-    recorded = convert(raw, read_in.name, unit) if calibrated else samples
     if not own:
         if not channel.startswith(("voltage", "command_")):  # a sawtooth can be commanded
             quality.refuse_wraps(channel, raw, source)
@@ -149,7 +146,7 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
         quality.refuse_impossible(channel, samples, read_in.name, source)
     if not own and standard is not None:
         quality.note_outliers(channel, samples, source)
-    return Signal(samples, recorded, unit, read_in, assumed, calibration)
+    return Signal(samples, unit, read_in, assumed, calibration)
 
 
 def _numbers(channel: str, column: Column, source: Source) -> Array:

@@ -9,18 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.arrays import Array
 from mckibben.files import gaps as gaps_in
 from mckibben.files import sources, timebase
 from mckibben.files.channels import about
 from mckibben.files.choosing import Seen, matrix_hint, seen
 from mckibben.files.converting import ASSUMED, Samples, in_package_units
-from mckibben.files.fingerprint import fingerprint
 from mckibben.files.formats import MOST_BYTES
 from mckibben.files.notices import noted
 from mckibben.files.request import Gaps, Request, Source
-from mckibben.files.units import convert
-from mckibben.recording import AT, ROWS, Recording
+from mckibben.recording import Recording
 
 MAY_BE_HELD = frozenset(
     {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
@@ -169,11 +166,9 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
         raise source.error(problem, "give a longer recording")
     step = _stated_step(found, source)
     start = table.start_time if found.times is None else found.times.seconds(found.times.values[0])
-    when: Array = start + (step or 1.0) * np.arange(n, dtype=float)
     times = found.times if step is None else None
     if times is not None:
         times = replace(times, values=timebase.checked(times.values, source))
-        when = convert(times.values, times.unit, "s")
     elif step is None and (columns := matrix_hint(table, time=True)):
         source.warn(f"no column of times is named; use --column time=COLUMN{columns}")
     pieces = gaps_in.pieces(channels, times, step, start, source)
@@ -181,7 +176,6 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
         _refuse_constant(pieces, source)
     signals = {name: found.signals[name] for name in pieces[0].samples}
     units = {name: signal.unit for name, signal in signals.items()}
-    rows = fingerprint({name: signal.recorded for name, signal in signals.items()}, when)
     name = {} if table.name is None else {"name": f"{path.stem}[{table.name}]"}
     calibrated = found.meta.get("calibration", {})
     meta = {**table.meta, **found.meta, **name, "file": str(path), "sha256": digest}
@@ -191,13 +185,7 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
             kept = {name: one for name, one in before.items() if name not in calibrated}
             meta[key] = kept | found.meta.get(key, {})
     recordings = [
-        Recording(
-            piece.samples,
-            piece.step,
-            units,
-            piece.start,
-            ({ROWS: rows | {AT: piece.start}} if rows else {}) | meta | piece.meta,
-        )
+        Recording(piece.samples, piece.step, units, piece.start, meta | piece.meta)
         for piece in pieces
     ]
     if len(recordings) == 1:

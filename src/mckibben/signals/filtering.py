@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -56,7 +57,7 @@ def low_pass(
         for name in _chosen(recording, channels)
         if np.ptp(recording[name])  # what is held stays held, to the bit
     }
-    return recording.processed(smooth)
+    return replace(recording, channels={**recording.channels, **smooth})
 
 
 def detrend(recording: Recording, channels: Sequence[str] | None = None) -> Recording:
@@ -78,7 +79,7 @@ def detrend(recording: Recording, channels: Sequence[str] | None = None) -> Reco
         name: recording[name] - place * (place @ recording[name]) / (place @ place)
         for name in _chosen(recording, channels)
     }
-    return recording.processed(level)
+    return replace(recording, channels={**recording.channels, **level})
 
 
 def _chosen(recording: Recording, channels: Sequence[str] | None) -> Sequence[str]:

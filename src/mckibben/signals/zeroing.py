@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -57,7 +58,7 @@ def zeroed(recording: Recording, channels: Sequence[str], over: str) -> Recordin
         If there is no such channel.
     """
     level = {name: _known(recording, name) - rest(recording, name, over) for name in channels}
-    return recording.processed(level)
+    return replace(recording, channels={**recording.channels, **level})
 
 
 def apart(recordings: Sequence[Recording], channel: str, over: str) -> tuple[float, float] | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
-from mckibben.comparison.shared_stretches import refuse_copies
+from mckibben.comparison.shared_rows import check_shared
 from mckibben.recording import Recording, listed
 from mckibben.studying import review_words
 from mckibben.studying.causes import Cause, explained, shares
@@ -217,7 +217,7 @@ def review(
     kept = [one.log.slice(int(np.argmax(one.rows)), len(one.log)) for one in chains]
     runs = [_run(loop, one, part) for one, part in zip(chains, kept, strict=True)]
     check_usable(loop.model, [run.recording for run in runs])
-    refuse_copies("review", [run.recording for run in runs], loop.inputs, loop.outputs)
+    check_shared({"review": [run.recording for run in runs]}, loop.inputs, loop.outputs)
     checked = check_runs(loop.model, runs)
     names = [channel.name for channel in loop.model.outputs]
     outputs = []

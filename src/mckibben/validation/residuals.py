@@ -11,7 +11,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.comparison.free_run import PERIODIC, measured_start, refuse_runaway, run_free
-from mckibben.comparison.shared_stretches import refuse_copies
+from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 
@@ -71,7 +71,7 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
     check_usable(block, recordings)
     inputs = [channel.name for channel in block.inputs]
     outputs = [channel.name for channel in block.outputs]
-    refuse_copies("check", recordings, inputs, outputs)
+    check_shared({"check": recordings}, inputs, outputs)
     found = []
     for recording in recordings:
         with warnings.catch_warnings(), np.errstate(all="ignore"):

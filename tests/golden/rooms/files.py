@@ -137,7 +137,7 @@ def refusal(error: MckibbenError) -> dict[str, Tree]:
 
 def meta(recording: mckibben.Recording) -> dict[str, Tree]:
     """Return ``meta`` without folders and sentences."""
-    known = dict(recording.known)
+    known = dict(recording.meta)
     known["notes"] = len(known.get("notes", ()))
     if "file" in known:
         known["file"] = Path(known["file"]).name

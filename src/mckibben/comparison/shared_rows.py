@@ -1,0 +1,187 @@
+"""Rows that two recordings have in common: copies, slices, one file given twice.
+
+Two runs of one experiment never agree over many movements of the output: noise, creep and the start
+prevent it. Where all channels do, to rounding, it is one measurement in two places, whatever the files'
+formats, names and times. A simulation without noise that is run twice is the same data likewise. Of
+rests only the length counts, since all recordings of one muscle agree there. Copies that were resampled,
+filtered or zeroed hold other numbers, and are not found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from mckibben.arrays import Array
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+
+WINDOW = 64
+"""Movements of the output in a row that must agree; of short recordings, half of theirs."""
+
+FEWEST = 8
+"""Movements below which recordings are not compared."""
+
+ROUNDING = 2e-4
+"""What values are rounded to, as a share of a channel's largest magnitude in all recordings."""
+
+GRAVE = 0.05
+"""Share of the windows of the recording that has fewer from which two recordings share data."""
+
+TESTED = "tested on data it was fitted to, so that the figures say nothing of other data"
+"""What every result says where that is so."""
+
+_WEIGHTS = np.random.default_rng(0).integers(2**64, size=1024, dtype=np.uint64)  # any will do
+
+
+class Shared(NamedTuple):
+    """What a recording has in common with one before it in a list.
+
+    Parameters
+    ----------
+    first, second : int
+        Places of the two in the list; ``first`` is the lower.
+    start, stop : float
+        Times in the second between which the common rows lie [s]; samples without time.
+    begins : float
+        Time of the first of them in the first.
+    share : float
+        Movements within windows that are in both, over those of the recording that has fewer.
+    """
+
+    first: int
+    second: int
+    start: float
+    stop: float
+    begins: float
+    share: float
+
+
+def shared_rows(
+    recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
+) -> list[Shared]:
+    """Return which recordings share data.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        All have the channels.
+    inputs, outputs : sequence of str
+        All of these agree where rows are common; outputs are what must move.
+    """
+    if len(recordings) < 2:
+        return []
+    moves = _movements(recordings, inputs, outputs)
+    counts = np.array([codes.size for _, codes in moves], dtype=np.int64)
+    lengths = np.where(counts < FEWEST, 0, np.clip(counts // 2, FEWEST, WINDOW))
+    found = []
+    for length in np.unique(lengths[lengths > 0]):
+        windows = [
+            np.convolve(codes, _WEIGHTS[:length], "valid") if codes.size >= length else codes[:0]
+            for _, codes in moves
+        ]
+        owners = np.repeat(np.arange(len(windows)), [own.size for own in windows])
+        distinct, places = np.unique(np.concatenate(windows), return_inverse=True)
+        shape = distinct.size, len(windows)
+        present = csr_array((np.ones(owners.size), (places, owners)), shape=shape)
+        present.data[:] = 1.0  # however often a periodic motion repeats
+        common = (present.T @ present).toarray()
+        fewer = np.minimum.outer(common.diagonal(), common.diagonal())
+        share = np.triu(common / np.maximum(fewer, 1.0), 1)
+        share[np.minimum.outer(lengths, lengths) != length] = 0.0
+        for first, second in np.argwhere(share >= GRAVE).tolist():
+            one, other = windows[first], windows[second]
+            both = [np.isin(one, other), np.isin(other, one)]
+            covered = [np.mean(np.convolve(same, np.ones(length)) > 0.5) for same in both]
+            same = np.flatnonzero(both[1])
+            start, stop = moves[second][0][[same[0], same[-1] + length - 1]].tolist()
+            begins = float(moves[first][0][np.argmax(one == other[same[0]])])
+            found.append(Shared(first, second, start, stop, begins, float(max(covered))))
+    return sorted(found)
+
+
+def check_shared(
+    roles: Mapping[str, Sequence[Recording]],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    *,
+    allow: bool | None = None,
+) -> tuple[str, ...]:
+    """Refuse recordings that share data, or return in words what they share.
+
+    Parameters
+    ----------
+    roles : mapping of str to sequence of Recording
+        What each is for: "fit", "validate", "calibrate", "test" in this order, or one other verb.
+    inputs, outputs : sequence of str
+        Channels.
+    allow : bool, optional
+        Whether not to refuse; None where users have no such option.
+
+    Raises
+    ------
+    DataError
+        If they share data, and that is not allowed.
+    """
+    listed = [(role, recording) for role, some in roles.items() for recording in some]
+    found = shared_rows([recording for _, recording in listed], inputs, outputs)
+    sentences = tuple(_sentence(shared, listed) for shared in found)
+    if found and not allow:
+        remedy = "drop the copy, or cut the stretch out of one of them"
+        if allow is not None:
+            remedy += (
+                "; to go on all the same (runs of a sensor with few levels may agree and be two), give "
+                "--allow-shared (allow_shared=True, or the tick beside Fit): every result will say so"
+            )
+        raise DataError(sentences[0], file=listed[found[0].second][1].source, remedy=remedy)
+    return tuple(f"{sentence}." for sentence in sentences)
+
+
+def without_copies(
+    recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
+) -> list[Recording]:
+    """Return recordings without those that are, but for a little, in one before them."""
+    found = shared_rows(recordings, inputs, outputs)
+    copies = {shared.second for shared in found if shared.share > 1 - GRAVE}
+    return [one for place, one in enumerate(recordings) if place not in copies]
+
+
+def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
+    (role, one), (other_role, other) = listed[shared.first], listed[shared.second]
+    names = [one.name, other.name]
+    if one.name == other.name and one.source != other.source:
+        names = [f"{each.name} ({each.source})" for each in (one, other)]
+    unit = "samples" if other.sample_time is None else "s"
+    start, stop = shared.start - other.start_time, shared.stop - other.start_time
+    where = (
+        f"{start:.6g} to {stop:.6g} {unit} after the start of {names[1]} are those of {names[0]} from "
+        f"{shared.begins - one.start_time:.6g} {unit} on, "
+        f"{100 * shared.share:.0f} % of the shorter one's motion"
+    )
+    if role == other_role:
+        return f"the same samples would count twice to {role}: {where}"
+    if "fit" not in (role, other_role):
+        return f"the choice would be made on what is tested on: {where}"
+    verb = {"validate": "validated", "calibrate": "calibrated"}.get(other_role, "tested")
+    return f"{TESTED.replace('tested', verb)}: {where}"
+
+
+def _movements(
+    recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
+) -> list[tuple[Array, NDArray[np.uint64]]]:
+    """Return when the outputs of each move, and hashes of the rows there and the rests before."""
+    every = [recording.matrix([*outputs, *inputs]) for recording in recordings]
+    largest = np.max([abs(one).max(axis=0) for one in every], axis=0, initial=np.finfo(float).tiny)
+    found = []
+    for recording, samples in zip(recordings, every, strict=True):
+        # the offset is irrational, so that round decimals are no ties
+        rounded = np.floor(samples / largest / ROUNDING + 0.5**0.5).astype(np.int64)
+        moved = (np.diff(rounded[:, : len(outputs)], axis=0) != 0).any(axis=1)
+        rows = np.flatnonzero(moved) + 1
+        hashed = np.column_stack([np.diff(rows), rounded[rows[1:]]]).astype(np.uint64)
+        found.append((recording.time[rows[1:]], hashed @ _WEIGHTS[-hashed.shape[1] :]))
+    return found

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files import formats
-from mckibben.files.sniffing import MISSING
+from mckibben.files.cells import MISSING
 
 N = 40
 T = [k / 100 for k in range(N)]
@@ -81,6 +81,7 @@ def tables(draw: st.DrawFn) -> tuple[bytes, list[str], list[list[float]]]:
     return text.encode(coding), names, columns
 
 
+@pytest.mark.filterwarnings("ignore:.*blank or commented")
 @settings(deadline=None, max_examples=150)
 @given(tables())
 def test_a_table_in_any_form_is_read_to_the_last_bit(
@@ -252,8 +253,7 @@ def test_marks_of_thousands_are_not_read_as_anything(
     cells = [f"{size + more:,}".replace(",", mark) for size in SIZES]
     path = marked(tmp_path, "pressure (mbar)", cells, separator)
     if mark == "." and more:  # every number has three digits after the mark: decimals
-        with pytest.warns(DataWarning, match=r"'pressure \(mbar\)'"):
-            (recording,) = mckibben.read(path)
+        (recording,) = mckibben.read(path)  # and no note: the times show the mark
         assert recording["pressure"] == pytest.approx((np.array(SIZES) + more) / 1e6)
         return
     with pytest.raises(DataError) as caught:
@@ -317,6 +317,18 @@ def test_one_number_anywhere_shows_that_a_mark_is_for_decimals(
     else:
         error = refused(tmp_path, "x\n" + lines(cells), channels=["x"])
         assert (error.row, "'1.125'" in error.problem) == (2, True)
+
+
+def test_a_mark_that_no_number_shows_is_noted(tmp_path: Path) -> None:
+    content = "x;y\n" + "".join(f"{k + 1}.250;{k + 2}.500\n" for k in range(N))
+    with pytest.warns(DataWarning, match="'x', 'y' have three digits after the mark '.'"):
+        assert read(tmp_path, content)["x"].tolist() == [k + 1.25 for k in range(N)]
+
+
+def test_rows_left_out_are_noted_where_there_is_no_time(tmp_path: Path) -> None:
+    rows = lines(P, X).splitlines(keepends=True)
+    with pytest.warns(DataWarning, match="blank or commented lines"):
+        read(tmp_path, "p_bar,disp_mm\n" + "".join([*rows[:9], "\n", *rows[9:]]), rate=100)
 
 
 # LabVIEW's files ------------------------------------------------------------------------------

@@ -14,24 +14,16 @@ from mckibben.errors import DataWarning
 _HERE = str(Path(__file__).parent)
 _NOTED: ContextVar[list[str] | None] = ContextVar("noted", default=None)
 
-PLAIN = "; other columns of the file show that mark"
-"""End of a note on what was understood and is hardly in doubt, so that nothing was assumed."""
-
 
 def listed(items: Sequence[str], most: int = 30) -> str:
-    """Return items side by side: the first of many, and how many more there are."""
+    """Return items separated by commas: the first of many, and how many more there are."""
     more = f" and {len(items) - most} more" if len(items) > most else ""
     return ", ".join(items[:most]) + more
 
 
-def is_plain(note: str) -> bool:
-    """Tell whether a note is of what was understood, not of what was assumed or mended."""
-    return note.endswith(PLAIN)
-
-
 @contextmanager
 def noted() -> Iterator[list[str]]:
-    """Yield a list that takes what is said inside, without the name of the file."""
+    """Yield a list of the texts of warnings issued inside."""
     notes: list[str] = []
     token = _NOTED.set(notes)
     try:

@@ -16,7 +16,6 @@ from mckibben.app.kept import Reading
 from mckibben.app.pages.columns import ReadingFields
 from mckibben.app.reading import AS_FOUND, columns
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files.notices import is_plain
 from mckibben.recording import Recording
 
 
@@ -203,7 +202,7 @@ def tell_of(read: dict[str, list[Recording]]) -> None:
         timeless = sum(one.sample_time is None for one in recordings)
         if timeless:
             said += f" {timeless} without time."
-        noted = sum(not all(map(is_plain, one.notes)) for one in recordings)
+        noted = sum(bool(one.notes) for one in recordings)
         if noted:
             said += f" Something was assumed or mended in {noted} of them: see their lines."
     ui.notify(said[:LONGEST], multi_line=True, timeout=8000, type="info")

@@ -10,7 +10,6 @@ from nicegui import ui
 from mckibben.app.desk import named
 from mckibben.app.fields import said
 from mckibben.app.recordings import Entry
-from mckibben.files.notices import is_plain
 
 COLOUR = "text-xs text-amber-900 dark:text-amber-300 break-words"
 """Of notes, on the page."""
@@ -23,15 +22,14 @@ def shared(entries: Iterable[Entry]) -> list[dict[str, str]]:
     found: dict[str, dict[str, str]] = {}
     for entry in entries:
         for note in entry.notes:
-            if not is_plain(note):
-                found.setdefault(_NUMBER.sub("#", note), {})[entry.name] = note
+            found.setdefault(_NUMBER.sub("#", note), {})[entry.name] = note
     return [of for of in found.values() if len(of) > 1]
 
 
 def own(entry: Entry, lots: Iterable[dict[str, str]]) -> tuple[str, ...]:
     """Return the notes that a recording has for itself alone."""
     elsewhere = [of.get(entry.name) for of in lots]
-    return tuple(note for note in entry.notes if not is_plain(note) and note not in elsewhere)
+    return tuple(note for note in entry.notes if note not in elsewhere)
 
 
 def show(lots: Iterable[dict[str, str]]) -> None:

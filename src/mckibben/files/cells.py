@@ -1,0 +1,138 @@
+"""How lines of text are cut into cells, the forms of cells, and the columns that they make."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mckibben.files.instants import may_be_instant
+from mckibben.files.table import Column, Flaw
+
+MISSING = (
+    *("-", "--", "---", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None"),
+    *("∞", "+∞", "-∞", "OL", "OVLD"),
+)
+"""Cells of samples that were not taken, or are beyond the instrument's range."""
+
+_COMMENT = r"#(?!N/?A\b|DIV/0|VALUE!|REF!|NUM!|NAME\?|NULL!)|%|//"  # not the errors of spreadsheets
+_FORMS = {
+    mark: re.compile(
+        r"(?P<hexadecimal>[+-]?0[xX][0-9a-fA-F]+)"
+        rf"|(?P<three_digits>[+-]?0*[1-9]\d{{0,2}}[{mark}]\d{{3}})"  # one, or a thousand: 1,000
+        rf"|(?P<number>[+-]?(?:\d+(?:[{mark}]\d*)?|[{mark}]\d+)(?:[eE][+-]?\d+)?)"
+        r"(?:\s*(?P<unit>[A-Za-z°%µμΩ][^\d,;:]{0,9}\d?))?"
+        r"|(?P<spaced>[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d*)?)"
+        r"|(?P<grouped>[+-]?\d{1,3}(?P<mark>[.,'’`_ \xa0\u2009\u202f])(?:\d{2,3}(?P=mark))*\d{3}"
+        r"(?:[.,]\d*)?|[+-]?\d*[.,]\d+)",  # or a number with the other decimal mark
+        re.ASCII,
+    )
+    for mark in ".,"
+}
+"""Decimal mark -> the forms of cells that hold numbers."""
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How lines are cut into cells and numbers written."""
+
+    separator: str | None
+    decimal: str
+
+    def split(self, line: str, width: int = 0) -> list[str]:
+        """Return the cells of a line; of a header between blanks, so many if it can be."""
+        if '"' in line:
+            line = line if self.separator else line.replace("\t", " ").strip()
+            cells = next(csv.reader([line], delimiter=self.separator or " ", skipinitialspace=True))
+        elif self.separator is None:
+            cells = re.split(r"[ \t]+", line.strip(" \t"))  # other blanks may be in numbers
+            bracketed = re.findall(r"\S+(?:\s*[\[(][^\])]*[\])]+)?", line)
+            wider = (re.split(r"\s{2,}|\t", line.strip()), bracketed)
+            cells = next((w for w in wider if len(cells) != width == len(w)), cells)
+        else:
+            cells = line.split(self.separator)
+        return [cell.strip() for cell in cells]
+
+    @property
+    def comment(self) -> str:
+        """The pattern of what begins a comment: a semicolon only where it does not separate."""
+        return _COMMENT if self.separator == ";" else f"{_COMMENT}|;"
+
+    def is_comment(self, line: str) -> bool:
+        """Return whether a line is a comment."""
+        return re.match(rf"\s*(?:{self.comment})", line) is not None
+
+    def form(self, cell: str) -> tuple[str, re.Match[str] | None]:
+        """Return the form of a cell: one of `_FORMS`, missing or text; and the match of a number."""
+        found = _FORMS[self.decimal].fullmatch(cell.replace("−", "-"))
+        if found:
+            return (found.lastgroup or "").replace("_", " "), found
+        return "text" if cell and cell not in MISSING else "missing", None
+
+    def value(self, found: re.Match[str] | None) -> float:
+        """Return the number of a cell of that form, NaN of one that is missing."""
+        if found is None:
+            return math.nan
+        if found["hexadecimal"]:
+            return int(found["hexadecimal"], 16)
+        return float((found["number"] or found["three_digits"]).replace(self.decimal, "."))
+
+    def is_value(self, cell: str) -> bool:
+        """Return whether a cell holds a number in any form, or an instant."""
+        return self.form(cell)[1] is not None or may_be_instant(cell)
+
+    def balance(self, cells: Sequence[str]) -> int:
+        """Return how many more values than words there are in cells."""
+        filled = [cell for cell in cells if self.form(cell)[0] != "missing"]
+        return 2 * sum(map(self.is_value, filled)) - len(filled)
+
+
+def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[Column, str]:
+    """Return a column by the forms of its cells, and a number that may be of thousands, if all may.
+
+    "1,000" is a thousand to some and one to others: its mark is for decimals where another number of
+    the column shows it, or where no number is without such a mark.
+    """
+    import pandas as pd
+
+    codes, found = pd.factorize(cells)  # -1 is for cells that are missing
+    words = [*(str(word).strip() for word in found), ""]
+    forms, matches = zip(*map(dialect.form, words), strict=True)
+    if may_be_instant(words[0]) and not matches[0]:
+        return Column(name, None, unit, texts=[words[code] for code in codes]), ""
+    plain = [word for word, form in zip(words, forms, strict=True) if form == "number"]
+    decimal = not plain or any(dialect.decimal in word for word in plain)
+    other = {"three digits": "number" if decimal else "grouped", "spaced": "grouped"}
+    each = zip(forms, matches, strict=True)
+    kinds = np.array([f"in {m['unit']}" if f == "unit" else other.get(f, f) for f, m in each])[
+        codes
+    ]
+    filled = kinds != "missing"
+    counts = pd.Series(kinds[filled]).value_counts()
+    numbers = counts.drop("text", errors="ignore")
+    if 2 * numbers.sum() <= counts.sum():
+        return Column(name, None, unit, texts=[words[code] for code in codes[:5]]), ""
+    usual = str(numbers.index[0])
+    if usual.startswith("in "):
+        unit = unit or usual.removeprefix("in ")
+        usual = f"in {unit}"
+    wrong, problem = kinds == "grouped", "may mean several numbers"
+    remedy = (
+        "write numbers without marks between thousands, with one decimal mark in the whole file, and "
+        "whole numbers with it too, such as 2.0 for 2"
+    )
+    if not wrong.any():
+        wrong, problem = filled & (kinds != usual), "is not a number like the others"
+        remedy = "correct that cell, or leave it blank and use --gaps split or interpolate"
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        flaw = Flaw(at, f"{words[codes[at]][:40]!r} {problem}", remedy)
+        return Column(name, np.full(codes.size, np.nan), unit, flaw=flaw), ""
+    values = np.array([dialect.value(match) for match in matches])
+    cell = next((w for w, f in zip(words, forms, strict=True) if f == "three digits"), "")
+    return Column(name, values[codes], unit), "" if plain else cell

@@ -29,13 +29,10 @@ _DOUBTFUL = {"in", "min", "rev", "turn"}
 """Endings that are units only where the channel suits: ``pressure_in`` is that of an inlet."""
 _LETTERS = {"m", "s", "N", "V"}
 """Single letters that are units after any name but a standard one: ``u1_V``, not ``pressure_A``."""
-_SYMBOLS = {
-    *("bar", "mbar", "Pa", "hPa", "kPa", "MPa", "psi", "mm", "cm", "m", "um", "N", "kN", "mN"),
-    *("s", "ms", "us", "deg", "rad", "mrad", "V", "mV", "mA", "Hz"),
-}
-"""Words that are a part of a unit where another one follows: ``stiffness_N_mm``, ``rate_bar_s``."""
 _AMOUNTS = {"l", "L", "ml", "g", "kg"}
 """What flows in a time, where it is no name: ``flow_l_s``, but ``muscle_l_mm``."""
+_REFERENCES = {"abs": "absolute", "absolute": "absolute", "gauge": "gauge"}
+"""What a pressure is measured from, where it is in the name: ``p_abs [bar]``."""
 
 _BRACKETED = re.compile(r"(?P<name>.*?)[\s_,/]*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]")
 _IN = re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)")  # Kraft in N
@@ -45,10 +42,7 @@ _COMPOSITE = re.compile(  # speed mm/s, flow_l/min
 _OVER = re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*\(?(?P<unit>[^()]*)\)?")  # length/mm
 _ENDINGS = (
     re.compile(r"(?P<name>.*[^\s_])[\s_]*(?P<unit>%|°C|°F|°)"),  # contraction_%, angle°
-    re.compile(  # pressure kPa abs
-        r"(?P<name>.*[^\s_,])[\s_,]+(?P<unit>[A-Za-z]+[\s_]\(?(?:gauge|absolute|abs)\)?)", re.I
-    ),
-    re.compile(r"(?P<name>.*[^\s_])[\s_]+(?P<unit>[^\s_]+_[sm])"),  # velocity_mm_s, torque_N_m
+    re.compile(r"(?P<name>.*[^\s_,])[\s_,]+(?P<unit>[^\s_,]+[\s_][^\s_,]+)"),  # p kPa abs, v_mm_s
     re.compile(r"(?P<name>.*[^\s_,.:;-])[\s_,.:;-]+(?P<unit>[^\s_,.:;-]+)"),  # force_N, Druck, bar
 )
 
@@ -78,24 +72,22 @@ def parse(text: str) -> Header:
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
         name, unit = bracketed["name"], bracketed["unit"].strip()
-        pure = unit == "1" and _expected(name) == ""  # contraction [1]
-        if unit.isdecimal() and not pure:  # the second of several alike: pos (2)
-            inner = parse(name)
+        if unit.isdecimal() and not (unit == "1" and _expected(name) == ""):  # but contraction [1]
+            inner = parse(name)  # the second of several alike: pos (2)
             return Header(f"{inner.name} {unit}", inner.unit)
-        return Header(name, unit)
+        return Header(name, _referred(unit, name))
     over = _OVER.fullmatch(text)
     named = over and _names(_last(over["name"]), over["unit"])
-    for form in (_IN, _OVER if named else _COMPOSITE, _OVER):
+    for form in (_IN, _OVER if named else _COMPOSITE, _OVER, *_ENDINGS):
         match = form.fullmatch(text)
-        if match and find(match["unit"]) is not None:
-            if form is _OVER and _is_part(match["name"], match["unit"], stroke=True):
-                return Header(text, None)
-            return Header(match["name"], match["unit"].strip())
-    for form in _ENDINGS:
-        match = form.fullmatch(text)
-        if match and _is_unit(match["unit"], match["name"]):
-            part = _is_part(match["name"], match["unit"], stroke=False)
-            return Header(text, None) if part else Header(match["name"], match["unit"])
+        if match is None:
+            continue
+        name, unit = match["name"], match["unit"].strip()
+        if _is_unit(unit, name) if form in _ENDINGS else find(unit) is not None:
+            stroke = form is _OVER
+            if (stroke or form in _ENDINGS) and _is_part(name, unit, stroke=stroke):
+                break
+            return Header(name, _referred(unit, name))
     return Header(text, None)
 
 
@@ -106,12 +98,15 @@ def channel_of(header: Header) -> str:
     ('pressure_1', 'u1', 'f')
     """
     name = snake_case(header.name)
+    unit = None if header.unit is None else find(header.unit)
+    if unit is not None and unit.reference is not None:
+        words = [word for word in _words(name) if _REFERENCES.get(word) != unit.reference]
+        name = "_".join(words) or name
     standard = _standard(name)
     if standard is None:
         rest, _, about = name.rpartition("_")
         plain = f"{about}_of_{rest}" if unit_of(name) is not None and about in _ABOUT else name
         return _of_loop(name, header) or plain
-    unit = None if header.unit is None else find(header.unit)
     base = standard.partition("_")[0]
     if unit is None or unit.target == _expected(base):
         return standard
@@ -236,8 +231,19 @@ def _is_unit(text: str, name: str) -> bool:
         return fits or (expected == "N" and weight(text) != text)
     if unit.target == expected or (expected == "" and unit.target == "mm"):
         return True
-    doubtful = text.casefold() in _DOUBTFUL or (len(text) == 1 and text.isalpha())
-    return not doubtful or (expected is None and text in _LETTERS)
+    return not _is_doubtful(text) and (expected is None or text not in _LETTERS)
+
+
+def _is_doubtful(text: str) -> bool:
+    """Return whether a word that is a unit may as well be a name."""
+    letter = len(text) == 1 and text.isalpha() and text not in _LETTERS
+    return letter or text.casefold() in _DOUBTFUL
+
+
+def _referred(unit: str, name: str) -> str:
+    """Return a unit with the reference of a pressure that the name has."""
+    found = [f"{unit} {word}" for word in _words(name) if word in _REFERENCES]
+    return found[0] if found and GAUGE.fullmatch(found[0]) else unit
 
 
 def _last(name: str) -> str:
@@ -262,4 +268,5 @@ def _is_part(name: str, unit: str, *, stroke: bool) -> bool:
         return False
     amount = len(word) <= 4 or word.isdigit() if stroke else word in _AMOUNTS
     timed = found is not None and found.target == "s"
-    return word == "per" or word in _SYMBOLS or (timed and amount)
+    symbol = None if _is_doubtful(word) else find_listed(word)
+    return word == "per" or (timed and amount) or bool(symbol and symbol.target)

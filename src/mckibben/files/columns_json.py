@@ -22,33 +22,29 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
     ``units`` may be beside, also in ``meta``. A ``.jsonl`` file has a record a line.
     """
-    text: Any = file.read()
+    text = file.read()
     if path.suffix.casefold() == ".jsonl":
         text = b"[" + b",".join(filter(None, map(bytes.strip, text.splitlines()))) + b"]"
     found = _node(json.loads(text, object_pairs_hook=_distinct))
-    said = found.get("format") if isinstance(found, dict) else None  # models and jobs have one
-    if said is not None or not isinstance(found, dict):
-        what = "without columns" if said is None else f"of format {said!r:.40}"
-        raise DataError(
-            f"it is JSON {what}, not of columns of numbers",
-            file=path,
-            remedy='give JSON such as {"columns": {"time": [...], "pressure": [...]}}',
+    if not isinstance(found, dict) or "format" in found:  # models and jobs have a format
+        what = (
+            f"of format {found['format']!r:.40}" if isinstance(found, dict) else "without columns"
         )
+        problem = f"it is JSON {what}, not of columns of numbers"
+        remedy = 'give JSON such as {"columns": {"time": [...], "pressure": [...]}}'
+        raise DataError(problem, file=path, remedy=remedy)
     for wrapper in ("meta", "columns", "data"):
         if isinstance(inner := found.get(wrapper), dict):
             del found[wrapper]
             found = inner | found if wrapper == "meta" else found | inner
     meta = {name: one for name, one in plain_meta(found).items() if not timebase.is_rate(name)}
     table = tree.table(found, path, meta=meta)
-    units = found.get("units")
     columns = {word for column in table.columns for word in (column.header, column.label)}
-    for name in units if isinstance(units, dict) else {}:
-        if name not in columns and name not in found:
-            raise DataError(
-                f"its units have {name!r:.40}, which is no column",
-                file=path,
-                remedy="give units by the names of columns",
-            )
+    units = found.get("units")
+    for name in units if isinstance(units, dict) else ():
+        if name not in columns | found.keys():
+            problem, remedy = f"its units have {name!r:.40}, which is no column", "name a column"
+            raise DataError(problem, file=path, remedy=remedy)
     return [table]
 
 
@@ -79,13 +75,13 @@ def _records(records: Sequence[Mapping[str, Any]]) -> Node:
     ((usual, _),) = Counter(tuple(record) for record in records if record).most_common(1)
     first = next(record for record in records if tuple(record) == usual)
     numbers = {name for name in usual if not isinstance(first[name], str)} or set(usual)
-    rows = [each for each in records if not each or numbers & each.keys()]
+    rows = [record for record in records if not record or numbers & record.keys()]
     names = dict.fromkeys(name for record in rows for name in record)
     columns = {name: _node([record.get(name) for record in rows]) for name in names}
-    others = len(records) - len(rows)
-    return columns | (
-        {"other records": Unread(f"{others} without {', '.join(usual)}")} if others else {}
-    )
+    if len(rows) < len(records):
+        others = f"{len(records) - len(rows)} without {', '.join(usual)}"
+        columns["other records"] = Unread(others)
+    return columns
 
 
 def _distinct(pairs: Sequence[tuple[str, Any]]) -> Mapping[str, Any]:

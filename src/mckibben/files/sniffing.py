@@ -70,13 +70,9 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
     """
     dialects = [Dialect(s, d) for s in separators for d in ".," if s != d]
     *_, width, dialect = max((_fitness(each, lines) for each in dialects), key=lambda fit: fit[:3])
-    rows: list[tuple[int, list[str]]] = []
-    comments: list[tuple[int, list[str]]] = []
-    for at, line in enumerate(lines):
-        if dialect.is_comment(line):
-            comments.append((at, dialect.split(line.lstrip("#%/; \t"), width)))
-        elif line.strip():
-            rows.append((at, dialect.split(line, width)))
+    comments = [at for at, line in enumerate(lines) if dialect.is_comment(line)]
+    filled = [at for at, line in enumerate(lines) if line.strip() and at not in comments]
+    rows = [(at, dialect.split(lines[at], width)) for at in filled]
     if not rows:
         problem, remedy = "there is nothing in it", "give a file with a header and samples"
         raise DataError(problem, file=path, remedy=remedy)
@@ -88,7 +84,7 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
     # one row of numbers between words is a part of the header
     begun = [k for k in range(len(rows)) if all(samples[k : k + 2])]
     n_above = begun[0] if begun else int(not solid)
-    above, first = rows[:n_above], (*(at for at, _ in rows), len(lines))[n_above]
+    above, first = rows[:n_above], [*filled, len(lines)][n_above]
     for _, row in above:  # which may end with a separator that the samples lack, or lack theirs
         if len(row) == width + 1 and not row[-1]:
             row.pop()
@@ -96,7 +92,9 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
             row.append("")
     heads = [(at, row) for at, row in above if len(row) == width]
     if not any(dialect.balance(row) < 0 for _, row in heads):
-        heads = [(at, row) for at, row in comments if at < first and len(row) == width]
+        notes = [(at, lines[at].lstrip("#%/; \t")) for at in comments if at < first]
+        split = [(at, dialect.split(note, width)) for at, note in notes]
+        heads = [(at, row) for at, row in split if len(row) == width]
     units = [k for k in range(1, len(heads)) if _are_units(heads[k][1], heads[k - 1][1])]
     names = [
         k
@@ -105,18 +103,13 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
     ]
     best = max(names, key=lambda k: (_known(heads[k][1]), k), default=-1)
     last = heads[best + (best + 1 in units)][0] if names else -1  # line of the header
-    damaged = [  # samples
-        at
-        for at, row in above
-        if at > last and (names or len(row) == width) and any(map(dialect.is_value, row))
-    ]
-    first = min([*damaged, first])
+    for at, row in reversed(above):  # damaged samples
+        if at > last and (names or len(row) == width) and any(map(dialect.is_value, row)):
+            first = at
     others = [row for at, row in above if at < first and len(row) > 1]
-    if names:
-        headers = heads[best][1]
-    elif others:  # of more or fewer cells than the samples, which is refused
-        headers = others[-1]
-    else:
+    # without names, a header of more or fewer cells than the samples is refused with these
+    headers = heads[best][1] if names else others[-1] if others else []
+    if not headers:
         headers = [f"column_{i}" for i in range(1, width + 1)]
         warn(path, f"no line of names: the columns are called column_1 to column_{width}")
     stated = heads[best + 1][1] if best + 1 in units else [""] * len(headers)

@@ -30,7 +30,7 @@ from mckibben.system.atomic import replacing
 from mckibben.system.manifest import digest
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
-_SNIFFED, _SNIFFED_BYTES = 400, 2**18  # by which a table is recognised, but 4 lines at least
+_SNIFFED = 2**18  # bytes by which the layout of a table is recognised
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -102,9 +102,8 @@ def parsed(data: bytes, path: Path, separators: Sequence[str | None] = SEPARATOR
     if named:
         separators = (named[1].decode(),)
         data = b"\n" + data[named.end() :]  # so that lines have the same numbers
-    start = data[: 4 * _SNIFFED_BYTES].decode("utf-8", "replace").split("\n")
-    start = start[: max(4, data.count(b"\n", 0, _SNIFFED_BYTES))][:_SNIFFED]
-    return block(data, sniff(start, path, separators), path)
+    start = data[:_SNIFFED].decode("utf-8", "replace").split("\n")
+    return block(data, sniff(start[:400], path, separators), path)
 
 
 def block(data: bytes, layout: Layout, path: Path, stop: int | None = None) -> Table:
@@ -175,35 +174,30 @@ def _samples(data: bytes, layout: Layout, path: Path, stop: int | None) -> tuple
     if not numbers:
         remedy = "give a file with samples"
         raise DataError("there is a header and no samples", file=path, remedy=remedy)
-    if numbers[-1] - numbers[0] >= len(numbers) and not any(map(is_time, headers)):
-        warn(
-            path, "blank or commented lines between samples are left out, as if no time was missing"
-        )
-    lines = [rows[number - 1] for number in numbers]
-    body = b"\n".join(lines).replace("−".encode(), b"-")
-    bare = lines
-    if b'"' in body:
-        unquoted = re.sub(rb'"[^"\n]*"', b"_", body)
-        bare = unquoted.split(b"\n")
-        if b'"' in unquoted:
-            row = next(k for k, line in zip(numbers, bare, strict=True) if b'"' in line)
-            problem, remedy = "a quotation mark is not closed", "write no line breaks in cells"
-            raise DataError(problem, file=path, row=row, remedy=remedy)
+    lines = bare = [rows[number - 1] for number in numbers]
+    if b'"' in data:
+        bare = re.sub(rb'"[^"\n]*"', b"_", b"\n".join(lines)).split(b"\n")
+        for number, line in zip(numbers, bare, strict=True):
+            if b'"' in line:
+                problem, remedy = "a quotation mark is not closed", "write no line breaks in cells"
+                raise DataError(problem, file=path, row=number, remedy=remedy)
     if dialect.separator is None:
         counts = np.array([len(line.split()) for line in bare])
     else:
         counts = np.array([line.count(separator) + 1 for line in bare])
     wrong = np.flatnonzero((counts > len(headers)) | (counts < len(headers) - (not headers[-1])))
-    if not wrong.size:
-        return numbers, body
-    at = int(wrong[0])
-    rest = " ".join(b" ".join(lines[at:]).decode("utf-8", "replace").split())
-    if at == 0 or re.search(r"\d", rest, re.ASCII):
-        problem = f"there are {counts[at]} cells where the header has {len(headers)}"
-        remedy = "complete or delete that line"
-        raise DataError(problem, file=path, row=numbers[at], remedy=remedy)
-    warn(path, f"from row {numbers[at]} on there are words alone, left out: {rest[:60]!r}")
-    return numbers[:at], b"\n".join(body.split(b"\n")[:at])
+    if wrong.size:
+        at = int(wrong[0])
+        rest = " ".join(b" ".join(lines[at:]).decode("utf-8", "replace").split())
+        if at == 0 or re.search(r"\d", rest, re.ASCII):
+            problem = f"there are {counts[at]} cells where the header has {len(headers)}"
+            remedy = "complete or delete that line"
+            raise DataError(problem, file=path, row=numbers[at], remedy=remedy)
+        warn(path, f"from row {numbers[at]} on there are words alone, left out: {rest[:60]!r}")
+        numbers, lines = numbers[:at], lines[:at]
+    if numbers[-1] - numbers[0] >= len(numbers) and not any(map(is_time, headers)):
+        warn(path, "blank or commented lines are left out: without times, what follows moves up")
+    return numbers, b"\n".join(lines).replace("−".encode(), b"-")
 
 
 def _shows_decimals(values: Array) -> bool:

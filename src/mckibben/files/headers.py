@@ -198,12 +198,10 @@ def _words(text: str) -> list[str]:
 
 def _standard(name: str) -> str | None:
     words = name.split("_")
-    if _EXTENSOR & set(words):
-        others = "_".join(word for word in words if word not in _EXTENSOR)
-        if _CHANNELS.get(others.rstrip("0123456789").rstrip("_")) == "pressure":
-            return "pressure_extensor"
-    alias = name.rstrip("0123456789")
-    number, alias = name[len(alias) :], alias.removesuffix("_")
+    others = "_".join(word for word in words if word not in _EXTENSOR)
+    if others != name and _CHANNELS.get(re.sub(r"_?\d*$", "", others)) == "pressure":
+        return "pressure_extensor"
+    alias, number = re.sub(r"_?\d+$", "", name), re.sub(r".*\D", "", name)
     if name in _CHANNELS or not number:
         return _CHANNELS.get(name)
     channel = _CHANNELS.get(alias, "time")

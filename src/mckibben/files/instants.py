@@ -52,27 +52,35 @@ def seconds(texts: Sequence[str], source: Source) -> Array:
     first = next((text for text in texts if text), "")
     form = re.match(_FORM, first, re.ASCII)
     if form is None or (form["mark"] == "-" and len(form["first"]) == 4):
-        form, pattern = None, "ISO8601"
+        form, patterns = None, ["ISO8601"]
         cells = cells.str.replace(",", ".").str.replace(r" ?(?:UTC|GMT)$", "Z", regex=True)
     else:
-        cells, pattern = _in_one_form(cells.str.extract(_FORM, flags=re.ASCII), form, source)
+        cells, patterns = _in_one_form(cells.str.extract(_FORM, flags=re.ASCII), form)
     zoned = form is None or form["zone"] is not None
-    found = pd.to_datetime(cells, format=pattern, errors="coerce", utc=zoned)
-    instants = (found.dt.tz_localize(None) if zoned else found).to_numpy("datetime64[ns]")
+    found = []
+    for pattern in patterns:
+        read = pd.to_datetime(cells, format=pattern, errors="coerce", utc=zoned)
+        found.append((read.dt.tz_localize(None) if zoned else read).to_numpy("datetime64[ns]"))
+    instants, *others = sorted(found, key=lambda each: np.isnat(each).sum())
     bad = np.flatnonzero(np.isnat(instants))
     if bad.size:
         like = "" if form is None or bad[0] == 0 else f" as {first[:40]!r} is"
         problem = f"{texts[bad[0]][:40]!r} is no time{like}"
         remedy = "write times in seconds or as 2026-01-31T12:00:00.5, or give --rate"
         raise source.error(problem, remedy, "time", int(bad[0]))
+    for other in others:
+        if not np.isnat(other).any() and np.any(other - other[0] != instants - instants[0]):
+            problem = f"{first[:40]!r} may have the day first or the month"
+            remedy = "write dates as 2026-01-31, or with the day first and dots, or give --rate"
+            raise source.error(problem, remedy, "time", 0)
     since: Array = (instants - instants[0]).astype(np.float64) * 1e-9
     if form is not None and form["first"] is None:  # times of day go on after midnight
         since[1:] += 86400.0 * np.cumsum(np.diff(since) < -43200.0)
     return since
 
 
-def _in_one_form(parts: Any, form: re.Match[str], source: Source) -> tuple[Any, str]:
-    """Return instants written alike from their parts, and their format for `pandas.to_datetime`."""
+def _in_one_form(parts: Any, form: re.Match[str]) -> tuple[Any, list[str]]:
+    """Return instants written alike from their parts, and their formats for `pandas.to_datetime`."""
     clock = parts["clock"] if form["clock"] else parts["clock"].fillna("00:00")
     cells = clock + ":" + parts["whole"].fillna("00") + "." + parts["part"].fillna("0")
     pattern = "%H:%M:%S.%f"
@@ -82,31 +90,13 @@ def _in_one_form(parts: Any, form: re.Match[str], source: Source) -> tuple[Any, 
         cells = cells + parts["zone"].str.replace("UTC|GMT", "Z", regex=True)
         pattern += "%z"
     if form["first"] is None:  # the time of day alone
-        return cells.where(parts["first"].isna()), pattern
-    year = "%Y" if len(form["third"]) == 4 else "%y"
+        return cells.where(parts["first"].isna()), [pattern]
     month = "%b" if form["second"].isalpha() else "%m"
+    year = "%Y" if len(form["third"]) == 4 else "%y"
+    orders = [f"%d/{month}/{year}"]
     if len(form["first"]) == 4:
-        days = ("%Y", month, "%d")
-    else:
-        days = ("%d", month, year) if _day_first(parts, form, source) else (month, "%d", year)
+        orders = [f"%Y/{month}/%d"]
+    elif form["mark"] != "." and month == "%m":
+        orders.append(f"%m/%d/{year}")
     dates = parts["first"] + "/" + parts["second"] + "/" + parts["third"]
-    return dates + " " + cells, f"{'/'.join(days)} {pattern}"
-
-
-def _day_first(parts: Any, form: re.Match[str], source: Source) -> bool:
-    """Return whether the day is before the month: where no number shows it, after dots it is."""
-    import pandas as pd
-
-    if form["mark"] == "." or form["second"].isalpha():
-        return True
-    days = parts[["first", "second"]].apply(pd.to_numeric, errors="coerce").dropna()
-    if days.max().max() > 12:
-        return bool(days["first"].max() > 12)
-    if days.nunique().max() > 1 and (days["first"] != days["second"]).any():
-        raise source.error(
-            f"{form.group()[:40]!r} may have the day first or the month",
-            "write dates as 2026-01-31, or with the day first and dots as in 31.01.2026; or give --rate",
-            "time",
-            0,
-        )
-    return True  # of one day, only the time of day matters
+    return dates + " " + cells, [f"{order} {pattern}" for order in orders]

@@ -82,8 +82,7 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
         len(row) == width and dialect.balance([row[i] for i in solid]) > 0 for _, row in rows
     ]
     # one row of numbers between words is a part of the header
-    begun = [k for k in range(len(rows)) if all(samples[k : k + 2])]
-    n_above = begun[0] if begun else int(not solid)
+    n_above = next((k for k in range(len(rows)) if all(samples[k : k + 2])), int(not solid))
     above, first = rows[:n_above], [*filled, len(lines)][n_above]
     for _, row in above:  # which may end with a separator that the samples lack, or lack theirs
         if len(row) == width + 1 and not row[-1]:
@@ -92,9 +91,8 @@ def sniff(lines: Sequence[str], path: Path, separators: Sequence[str | None]) ->
             row.append("")
     heads = [(at, row) for at, row in above if len(row) == width]
     if not any(dialect.balance(row) < 0 for _, row in heads):
-        notes = [(at, lines[at].lstrip("#%/; \t")) for at in comments if at < first]
-        split = [(at, dialect.split(note, width)) for at, note in notes]
-        heads = [(at, row) for at, row in split if len(row) == width]
+        notes = [(at, dialect.split(lines[at].lstrip("#%/; \t"), width)) for at in comments]
+        heads = [(at, row) for at, row in notes if at < first and len(row) == width]
     units = [k for k in range(1, len(heads)) if _are_units(heads[k][1], heads[k - 1][1])]
     names = [
         k

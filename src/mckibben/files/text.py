@@ -127,7 +127,7 @@ def block(data: bytes, layout: Layout, path: Path, stop: int | None = None) -> T
         raise DataError("its lines are not those of a table", file=path, remedy="export it again")
     marked = [i for i in frame if frame[i].dtype.kind == "f" and frame[i].notna().any()]
     unclear = [i for i in marked if not _shows_decimals(frame[i].to_numpy())]
-    texts = _frame(body, dialect, dtype=str, usecols=unclear, **options) if unclear else {}
+    texts = _frame(body, dialect, dtype=object, usecols=unclear, **options) if unclear else {}
     columns: list[Column] = []
     unread: dict[str, str] = {}
     decimals: dict[str, str] = {}  # column -> a number that has three digits after the mark, as all

@@ -111,7 +111,12 @@ def test_wraps_of_counters_are_refused(put: Put, size: int) -> None:
     counts = np.rint(Y / 30 * 2.5 * size)
     path = put("t_s,p_bar,displacement_um", T, P, counts % size)
     assert refused(path).channel == "displacement"
+    assert len(one(path, gaps="raw")) == N
     assert len(one(put("t_s,p_bar,displacement_um", T, P, np.minimum(counts, size - 1)))) == N
+    about_zero = np.where(T < 7, np.arange(N) % 3 - 1, T > 7.9) % size
+    assert refused(put("t_s,p_bar,displacement_um", T, P, about_zero)).channel == "displacement"
+    valve = np.where(T % 2 < 1, size - 1, 0)
+    assert len(one(put("t_s,displacement_um,valve", T, counts / size, valve))) == N
 
 
 def test_a_time_counter_that_wraps_goes_on(put: Put) -> None:
@@ -210,12 +215,16 @@ def test_sizes_of_another_unit_are_asked_for(put: Put, header: str, largest: flo
     assert header in refused(path).remedy
 
 
-def test_zeros_at_which_another_channel_moves_were_measured(put: Put) -> None:
+@pytest.mark.parametrize("rest", [0.0, 3.0])
+def test_zeros_that_were_measured_are_read_raw(put: Put, rest: float) -> None:
     on = (np.arange(N) + 25) % 50 < 42
     noise = 0.01 * np.random.default_rng(0).standard_normal((2, N))
-    pressure = np.where(on, 4 + noise[0], 0.0)
-    moved = np.where(on, 20.0, 3.0) + noise[1]
-    assert len(one(put("t_s,pressure_bar,displacement_mm", T, pressure, moved))) == N
+    pressure, moved = np.where(on, 4 + noise[0], 0.0), np.where(on, 20.0 + noise[1], rest)
+    path = put("t_s,pressure_bar,displacement_mm", T, pressure, moved)
+    assert "--gaps raw" in refused(path).remedy
+    found = one(path, gaps="raw")
+    assert found["pressure"] == pytest.approx(pressure)
+    assert found["displacement"] == pytest.approx(moved)
 
 
 def test_levels_are_no_codes(put: Put) -> None:
@@ -259,7 +268,7 @@ def test_an_early_output_is_compared_only_where_that_is_allowed() -> None:
 
 def test_condition_counts_what_is_saturated_and_stuck() -> None:
     clipped = np.minimum(Y, 20.0)
-    assert condition(clipped).saturated == pytest.approx(np.mean(Y >= 20), abs=0.01)
+    assert condition(clipped)["saturated"] == pytest.approx(np.mean(Y >= 20), abs=0.01)
     stuck = Y.copy()
     stuck[110:170] = stuck[110]
-    assert condition(stuck).stuck == 60
+    assert condition(stuck)["stuck"] == 60

@@ -9,7 +9,12 @@ from mckibben.errors import DataError
 LONGEST = 2000
 """Characters of a message that are shown."""
 
-GAPS = {"error": "refuse", "split": "split there", "interpolate": "bridge by straight lines"}
+GAPS = {
+    "error": "refuse",
+    "split": "split there",
+    "interpolate": "bridge by straight lines",
+    "raw": "refuse, read codes as numbers",
+}
 """What is done about gaps, in words."""
 
 READING = "How it was read"
@@ -20,6 +25,7 @@ _WAYS = (
     (r"--gaps interpolate or split", f"“{GAPS['interpolate']}” or “{GAPS['split']}”"),
     (r"--gaps split", f"“{GAPS['split']}”"),
     (r"--gaps interpolate", f"“{GAPS['interpolate']}”"),
+    (r"--gaps raw", f"“{GAPS['raw']}”"),
     (r"say --unit CHANNEL=UNIT", f"give units by “{READING}”"),
     (r"say --unit (\w+)=UNIT", rf"give the unit of \1 by “{READING}”"),
     (r"--unit (\w+)=UNIT", r"the field Unit of \1"),

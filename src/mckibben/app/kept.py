@@ -56,7 +56,7 @@ class Reading(Kept):
     calibration: dict[Text, tuple[float, float]] = {}
     constants: dict[Text, tuple[float, Text]] = {}
     rate: Number = None
-    gaps: Literal["error", "split", "interpolate"] = "error"
+    gaps: Literal["error", "split", "interpolate", "raw"] = "error"
     channels: list[Text] | None = None
 
     model_config = ConfigDict(extra="ignore", strict=False)  # JSON has lists for pairs

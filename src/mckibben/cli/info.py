@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -45,8 +44,7 @@ def info(
         _model(files[0], as_json)
     else:
         named = [*(inputs or ()), *(outputs or ())] or None
-        recordings = reading.read(files, named, informative=False)
-        columns = {str(file): _columns(file, reading) for file in files if file.is_file()}
+        recordings, columns = reading.look(files, named)
         gaps = _untold(recordings, inputs, outputs, model)
         _recordings(recordings, columns, gaps, as_json)
 
@@ -59,15 +57,6 @@ def _is_columns(file: Path) -> bool:
         return bool(columns_of(file))
     except DataError:
         return False
-
-
-def _columns(file: Path, reading: Reading) -> list[Seen]:
-    """Return the columns of a file, and the channel that each is read as."""
-    from mckibben.files import columns_of
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # issued when its recordings were read
-        return columns_of(file, **reading.options())
 
 
 def _models(as_json: bool) -> None:
@@ -149,7 +138,7 @@ def _recordings(
                     "unit": recording.units[name],
                     "min": float(samples.min()),
                     "max": float(samples.max()),
-                    **asdict(condition(samples)),
+                    **condition(samples),
                 }
                 for name, samples in recording.channels.items()
             },

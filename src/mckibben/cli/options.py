@@ -8,22 +8,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mckibben.errors import DataError, ModelError
 
 if TYPE_CHECKING:
+    from mckibben.files.choosing import Seen
     from mckibben.recording import Recording
 
 
 class Gaps(StrEnum):
-    """What to do about gaps in time."""
+    """What to do about gaps in time and missing samples."""
 
     ERROR = "error"
     SPLIT = "split"
     INTERPOLATE = "interpolate"
+    RAW = "raw"
 
 
 Files = Annotated[
@@ -94,7 +96,9 @@ Rate = Annotated[
     float | None,
     typer.Option("--rate", metavar="HZ", help="Samples per second, without a time column."),
 ]
-GapPolicy = Annotated[Gaps, typer.Option("--gaps", help="What to do about gaps in time.")]
+GapPolicy = Annotated[
+    Gaps, typer.Option("--gaps", help="What to do about gaps and codes for missing samples.")
+]
 Resample = Annotated[
     float | None,
     typer.Option(
@@ -158,13 +162,6 @@ Dask = Annotated[
 ]
 
 
-_POLICIES: dict[Gaps, Literal["error", "split", "interpolate"]] = {
-    Gaps.ERROR: "error",
-    Gaps.SPLIT: "split",
-    Gaps.INTERPOLATE: "interpolate",
-}
-
-
 SEVERAL = re.compile(r"(pressure|voltage|displacement|angle)_\d+|voltage|angle|command_.+")
 """Names of channels by which recordings of several muscles, of voltages or angles, and logs are told."""
 
@@ -197,7 +194,7 @@ class Reading:
             "calibration": calibration,
             "constants": _constants(self.constant),
             "rate": self.rate,
-            "gaps": _POLICIES[self.gaps],
+            "gaps": self.gaps.value,
             "most": _bytes(self.most),
         }
 
@@ -210,6 +207,27 @@ class Reading:
         recordings: list[Recording] = []
         for file in files:
             recordings += read(file, channels=channels, informative=informative, **self.options())
+        return self._prepared(recordings)
+
+    def look(
+        self, files: Sequence[Path], channels: Sequence[str] | None
+    ) -> tuple[list[Recording], dict[str, list[Seen]]]:
+        """Return the recordings in all files, and the columns of each that is no folder."""
+        from mckibben.files.reading import look, read
+
+        recordings: list[Recording] = []
+        columns: dict[str, list[Seen]] = {}
+        options = {"channels": channels, "informative": False, **self.options()}
+        for file in files:
+            if file.is_dir():
+                recordings += read(file, **options)
+            else:
+                found, columns[str(file)] = look(file, **options)
+                recordings += found
+        return self._prepared(recordings), columns
+
+    def _prepared(self, recordings: list[Recording]) -> list[Recording]:
+        """Return recordings resampled and zeroed as asked for."""
         if self.resample is not None:
             from mckibben.signals import resample
 

@@ -9,16 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files import instants, timebase
 from mckibben.files.channels import NAME
-from mckibben.files.headers import LONGEST, by_units, channel_of, parse, snake_case, unit_of
+from mckibben.files.headers import by_units, channel_of, parse, snake_case, unit_of
+from mckibben.files.instants import may_be_instant
 from mckibben.files.notices import listed
-from mckibben.files.request import Request, Source
+from mckibben.files.request import Source
 from mckibben.files.table import Column, Table
 from mckibben.files.units import find, weight
-
-ROLES = ("reference_", "command_")
-"""Beginnings of the names of a loop's channels."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +41,27 @@ def seen(source: Source) -> list[Seen]:
         Seen(
             column.header,
             column.unit or parse(column.label).unit or "",
-            tuple(_cell(column, k) for k in range(min(4, column.size))),
+            tuple(str(text)[:40] for text in column.texts[:4])
+            if column.values is None
+            else tuple(f"{value:.6g}" for value in column.values[:4]),
             asked.get(id(column), ""),
             unasked.get(id(column), ""),
         )
         for column in source.table.columns
     ]
+
+
+def _by_identity(source: Source) -> dict[int, str]:
+    """Return the channel of every column, by the column's identity."""
+    try:
+        named, _ = assign(source)
+    except DataError:  # two columns are one channel, for example: each is then named by its header
+        named = {}
+        for column in source.table.columns:
+            if column.values is not None:
+                named.setdefault(channel_of(parse(column.label)), column)
+    asked = source.request.channels
+    return {id(c): name for name, c in named.items() if asked is None or name in (*asked, "time")}
 
 
 def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
@@ -64,12 +76,7 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
     DataError
         If a channel asked for is missing, or two columns are one channel.
     """
-    request, own = source.request, source.table.own
-    clocks = source.table.has_clocks
-    long = [c.header for c in source.table.columns if len(c.header) > LONGEST and not own]
-    if long:
-        problem = f"the header {long[0][:40]!r}... has {len(long[0])} characters"
-        raise source.error(problem, f"shorten it to {LONGEST} at most")
+    request, own, clocks = source.request, source.table.own, source.table.has_clocks
     fixed = {
         channel: find_column(wanted, channel, source)
         for channel, wanted in request.columns.items()
@@ -84,7 +91,9 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
             continue
         header = parse(column.label)
         channel = column.header if own else channel_of(header)
-        if (channel in fixed and not own) or (channel in named and channel.startswith(ROLES)):
+        if (channel in fixed and not own) or (
+            channel in named and channel.startswith(("reference_", "command_"))
+        ):
             channel = snake_case(header.name)  # the first of several references is the loop's
         if channel in named and channel not in fixed and not request.needs(channel):
             channel = snake_case(column.header)
@@ -108,15 +117,19 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
     if "time" not in named and not own and not clocks and (time := _only_time(named, source)):
         left_out.pop(time.header, None)
         named = {"time": time} | {name: c for name, c in named.items() if c is not time}
-    renamed = {} if own else _by_units(named, source.request)
-    notes = [f"{named[name].header!r} as {channel}" for name, channel in renamed.items()]
-    named = {renamed.get(name, name): column for name, column in named.items()}
+    if not own:
+        used = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
+        used |= request.described.channels.keys()
+        units = {name: "" if name in used else _target(column) for name, column in named.items()}
+        renamed = by_units(units)  # channels without a known name, such as u1
+        notes = [f"{named[name].header!r} as {channel}" for name, channel in renamed.items()]
+        named = {renamed.get(name, name): column for name, column in named.items()}
+        if notes:
+            source.warn(
+                f"no name identifies these columns, so they are read by their units: {listed(notes)}; "
+                "use --column CHANNEL=COLUMN where that is wrong"
+            )
     _require(named, source)
-    if notes:
-        source.warn(
-            f"no name identifies these columns, so they are read by their units: {listed(notes)}; "
-            "use --column CHANNEL=COLUMN where that is wrong"
-        )
     return named, left_out | dict(source.table.unread)
 
 
@@ -154,7 +167,9 @@ def matrix_hint(table: Table, *, time: bool) -> str:
         return ""
     hint = f", one of {listed([column.header for column in columns])}"
     first = columns[0]
-    if time and first.values is not None and timebase.rises_evenly(first.values):
+    steps = np.diff([] if first.values is None else first.values)
+    usual = np.median(steps) if steps.size else 0.0
+    if time and usual > 0 and np.all(np.abs(steps - usual) < 0.5 * usual):
         hint += f"; {first.header} rises evenly, as time does: --column time={first.header}"
     return hint
 
@@ -167,17 +182,13 @@ def _of_one_length(source: Source, fixed: Mapping[str, Column]) -> tuple[Source,
     asked = {channel: column.size for channel, column in fixed.items()}
     if len(set(asked.values())) > 1:
         sizes = ", ".join(f"{channel} {size}" for channel, size in asked.items())
-        raise source.error(
-            f"the columns asked for have unlike numbers of samples: {sizes}",
-            "name columns of one length with --column CHANNEL=COLUMN",
-            next(iter(asked)),
-        )
+        problem = f"the columns asked for have unlike numbers of samples: {sizes}"
+        remedy = "name columns of one length with --column CHANNEL=COLUMN"
+        raise source.error(problem, remedy, next(iter(asked)))
     found = Counter(column.size for column in columns if column.size > 1)
     if not found:
-        raise source.error(
-            "there are no vectors of numbers in it",
-            "save each channel as one vector, all of one length, or as a column of one matrix",
-        )
+        remedy = "save each channel as one vector, all of one length, or as a column of one matrix"
+        raise source.error("there are no vectors of numbers in it", remedy)
     shared = [size for size, several in found.items() if several > 1]
     size = next(iter(asked.values()), max(shared or found))
     table = replace(source.table, columns=tuple(c for c in columns if c.size == size))
@@ -214,50 +225,26 @@ def _described(source: Source) -> dict[str, Column]:
 
 
 def _only_time(named: Mapping[str, Column], source: Source) -> Column | None:
-    """Return the one column that can only be the time: in seconds, or of dates, and rising."""
+    """Return the one column that can only be the time: in seconds and rising, or else of dates."""
     in_seconds = [
         column
         for column in named.values()
-        if _target(column) == "s"
-        and column.values is not None
+        if column.values is not None
+        and _target(column) == "s"
         and np.all(np.diff(column.values) > 0)
     ]
-    if len(in_seconds) == 1:
-        return in_seconds[0]
-    dates = [column for column in source.table.columns if _are_dates(column, source)]
-    return dates[0] if len(dates) == 1 else None
-
-
-def _are_dates(column: Column, source: Source) -> bool:
-    if (
-        column.values is not None
-        or not column.texts
-        or not instants.may_be_instant(column.texts[0])
-    ):
-        return False
-    if not all(instants.may_be_instant(text) for text in column.texts if text):
-        return True  # a word among them is refused with its row
-    try:
-        times = instants.seconds(column.texts, source)
-    except DataError:
-        return False
-    return bool(np.all(np.diff(times) >= 0))
+    dates = [
+        column
+        for column in source.table.columns
+        if column.values is None and column.texts and may_be_instant(column.texts[0])
+    ]
+    return next((few[0] for few in (in_seconds, dates) if len(few) == 1), None)
 
 
 def _target(column: Column) -> str:
     """Return the package's unit for the unit that a column states, empty where there is none."""
     unit = find(column.unit or parse(column.label).unit or "")
     return (unit.target or "") if unit else ""
-
-
-def _by_units(named: Mapping[str, Column], request: Request) -> dict[str, str]:
-    """Return the channels of columns without a known name, such as u1, by their units.
-
-    A name that the caller or the folder uses stays.
-    """
-    used = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
-    used |= request.described.channels.keys()
-    return by_units({name: "" if name in used else _target(c) for name, c in named.items()})
 
 
 def _require(named: Mapping[str, Column], source: Source) -> None:
@@ -269,31 +256,12 @@ def _require(named: Mapping[str, Column], source: Source) -> None:
             problem = f"there is no such channel; the columns are {_headers(table)}"
             remedy = f"name its column with --column {channel}=COLUMN{hint}"
             raise source.error(problem, remedy, channel)
-    options = dict.fromkeys(request.calibration, ("calibration", "--calibrate"))
-    for channel, (word, option) in (
-        options | dict.fromkeys(request.units, ("unit", "--unit"))
-    ).items():
-        if channel not in named:
-            problem = f"a {word} is given for it and it is not there; there are {', '.join(named)}"
-            raise source.error(problem, f"give {option} for one of them", channel)
+    for option, given in (("--calibrate", request.calibration), ("--unit", request.units)):
+        for channel in given:
+            if channel not in named:
+                problem = f"it is not there; there are {', '.join(named)}"
+                raise source.error(problem, f"give {option} for one of them", channel)
 
 
 def _headers(table: Table) -> str:
     return listed([*(column.header for column in table.columns), *table.unread])
-
-
-def _by_identity(source: Source) -> dict[int, str]:
-    """Return the channel of every column, by the column's identity."""
-    try:
-        named, _ = assign(source)
-    except DataError:  # two columns are one channel, for example: each is then named by its header
-        named = {}
-        for column in source.table.columns:
-            if column.values is not None:
-                named.setdefault(channel_of(parse(column.label)), column)
-    asked = source.request.channels
-    return {id(c): name for name, c in named.items() if asked is None or name in (*asked, "time")}
-
-
-def _cell(column: Column, k: int) -> str:
-    return str(column.texts[k])[:40] if column.values is None else f"{column.values[k]:.6g}"

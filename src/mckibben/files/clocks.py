@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.files.headers import unit_of
-from mckibben.files.request import Request, Source
+from mckibben.files.request import Source
 from mckibben.files.table import Column
 from mckibben.files.timebase import GAP
 
@@ -17,26 +17,30 @@ from mckibben.files.timebase import GAP
 def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Column], list[str]]:
     """Return columns of one length, with one of times, and the headers of those left out.
 
-    Between its samples a column is linear, or holds the last where it is one of counts; where it has a
-    gap, or another one needed has not begun or is over, samples are missing. Columns that were sampled
-    together do not change.
+    The clock suits the channels asked for, or else those that have a meaning (a temperature that nobody
+    asks for does not slow the rest down), or all. Between its samples a column is linear, or holds the
+    last where it is one of counts; where it has a gap, or another one needed has not begun or is over,
+    samples are missing. Columns that were sampled together do not change.
 
     Raises
     ------
     DataError
         If times go back, or those of columns that are needed have nothing in common.
     """
-    if all(column.times is None for column in named.values()):
-        return dict(named), []
     clocks = {name: column.times for name, column in named.items() if column.times is not None}
+    if not clocks:
+        return dict(named), []
+    request = source.request
     long = {name: times for name, times in clocks.items() if times.size > 1}
-    needed = _needed(long, source.request)
+    meant = {*request.columns, *request.described.channels}
+    meant |= {name for name in long if unit_of(name) not in (None, "degC")}
+    asked = {name: times for name, times in long.items() if request.asks_for(name)}
+    needed = asked or {name: times for name, times in long.items() if name in meant} or long
     if not needed:
         raise source.error("no channel in it has two samples", "give a longer recording")
     for name, times in needed.items():
-        wrong = np.flatnonzero(~(np.diff(times) > 0))
-        if wrong.size:
-            at = int(wrong[0])
+        if (back := np.flatnonzero(~(np.diff(times) > 0))).size:
+            at = int(back[0])
             problem = f"its time goes from {times[at]:.10g} s to {times[at + 1]:.10g} s"
             remedy = "sort its samples by time, and leave one for each instant"
             raise source.error(problem, remedy, name, at + 1)
@@ -44,12 +48,12 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     slowest = max(steps, key=lambda name: steps[name])
     start = max(times[0] for times in needed.values())
     stop = min(times[-1] for times in needed.values())
-    if (rate := source.request.rate) is None:
+    if request.rate is None:
         whose, grid = f"times of {slowest!r}", needed[slowest]
         grid = grid[(grid >= start) & (grid <= stop)]
     else:
-        whose, count = f"{rate:g} a second", int((stop - start) * rate + 1e-6) + 1
-        grid = start + np.arange(max(0, count)) / rate
+        whose, count = f"{request.rate:g} a second", int((stop - start) * request.rate + 1e-6) + 1
+        grid = start + np.arange(max(0, count)) / request.rate
     if grid.size < 2:
         spans = [f"{name} from {t[0]:.6g} to {t[-1]:.6g} s" for name, t in needed.items()]
         problem = f"its channels have no time in common: {'; '.join(spans[:10])}"
@@ -73,21 +77,6 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
         else:
             left_out.append(column.header)
     return columns, left_out
-
-
-def _needed(clocks: dict[str, Array], request: Request) -> dict[str, Array]:
-    """Return what the common clock must suit: what is asked for, or else what has a meaning, or all.
-
-    A temperature that nobody asks for does not slow the rest down.
-    """
-    named = {*request.columns, *request.described.channels}
-    asked = {name: times for name, times in clocks.items() if request.asks_for(name)}
-    meant = {
-        name: times
-        for name, times in clocks.items()
-        if name in named or unit_of(name) not in (None, "degC")
-    }
-    return asked or meant or clocks
 
 
 def _spans(times: Array, grid: Array) -> bool:

@@ -14,7 +14,7 @@ from mckibben.errors import DataError
 from mckibben.files import clocks, instants, quality, timebase
 from mckibben.files.channels import NAME, Channel, Time
 from mckibben.files.choosing import assign
-from mckibben.files.headers import LONGEST, parse, snake_case, unit_of
+from mckibben.files.headers import parse, snake_case, unit_of
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column
@@ -23,25 +23,19 @@ from mckibben.files.units import COUNTS, Unit, convert, find, weight
 ASSUMED = "no unit is given, so these are assumed: "
 """Beginning of a note on assumed units."""
 
-EXAMPLES = {"bar": "kPa", "N": "kN", "s": "ms", "rad": "deg", "mm": "um"}
-"""Package unit -> another unit of that dimension, for remedies."""
-
-UNIT_OF_TIME = "name its unit, as in --unit time=ms, or --unit time=s where that is right"
-"""Remedy of times whose unit is in doubt."""
-
 
 @dataclass(frozen=True)
 class Signal:
     """One channel: its samples, and what was done to its column, in the unit ``read_in``.
 
-    ``assumed`` is the note of a unit that is not stated; ``calibration`` has gain and offset, or the
+    ``assumed`` is whether no unit is stated; ``calibration`` has gain and offset, or the
     constant that the folder describes.
     """
 
     samples: Array
     unit: str
     read_in: Unit
-    assumed: str
+    assumed: bool
     calibration: Mapping[str, Any]
 
 
@@ -49,30 +43,21 @@ class Signal:
 class Times:
     """Times in their own unit, so that the digits recorded can still be seen.
 
-    The unit is ``certain`` where it is stated or they are dates; ``assumed`` is as in `Signal`.
+    The unit is ``certain`` where it was asked for or is not the second.
     """
 
     values: Array
     unit: str = "s"
     certain: bool = True
-    assumed: str = ""
+    assumed: bool = False
 
     def seconds(self, duration: float) -> float:
         """Return a time or duration in this unit in seconds."""
         return float(convert(np.array([duration]), self.unit, "s")[0])
 
 
-@dataclass(frozen=True)
-class Samples:
-    """The channels of a table in the package's units, its times, and what else is recorded."""
-
-    signals: dict[str, Signal]
-    times: Times | None
-    meta: dict[str, Any]
-
-
-def in_package_units(source: Source) -> Samples:
-    """Choose and convert the channels of a table.
+def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, dict[str, Any]]:
+    """Return the channels of a table in the package's units, its times, and what else is recorded.
 
     Raises
     ------
@@ -93,8 +78,7 @@ def in_package_units(source: Source) -> Samples:
         try:
             signals[name] = _signal(name, column, source)
         except DataError as error:
-            standard = unit_of(name) is not None
-            if request.needs(name) and (standard or request.asks_for(name)):
+            if request.needs(name) and (unit_of(name) is not None or request.asks_for(name)):
                 raise
             left_out[column.header] = error.problem
     if not signals:
@@ -112,7 +96,8 @@ def in_package_units(source: Source) -> Samples:
         "pressure_reference": references,
         "calibration": {name: one.calibration for name, one in each if one.calibration},
     }
-    assumed = [one.assumed for one in (times, *signals.values()) if one and one.assumed]
+    assumed = ["time in s"] if times is not None and times.assumed else []
+    assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed]
     if assumed:
         source.warn(f"{ASSUMED}{listed(assumed)}; use --unit CHANNEL=UNIT where that is wrong")
     absolute = [name for name, kind in references.items() if kind == "absolute"]
@@ -121,7 +106,19 @@ def in_package_units(source: Source) -> Samples:
     if left_out and not (source.table.own or request.names_channels):
         reasons = [f"{header} ({why})" for header, why in left_out.items()]
         source.warn(f"not read: {listed(reasons)}")
-    return Samples(signals, times, {name: found for name, found in meta.items() if found})
+    return signals, times, {name: found for name, found in meta.items() if found}
+
+
+def _times(column: Column, source: Source) -> Times:
+    """Return the times in a column of numbers or dates."""
+    if column.values is None:
+        return Times(instants.seconds(column.texts, source))
+    values = _numbers("time", column, source)
+    found, assumed = _unit("time", column, values, source)
+    unit = found.name
+    quality.refuse_impossible("time", convert(values, unit, "s"), unit, source)
+    asked = "time" in source.request.units or source.request.described.time.unit is not None
+    return Times(values, unit, asked or unit != "s", assumed)
 
 
 def _signal(channel: str, column: Column, source: Source) -> Signal:
@@ -135,10 +132,10 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
             values = calibration["gain"] * raw + calibration["offset"]
     read_in, assumed = _unit(channel, column, values, source)
     own, standard = source.table.own, unit_of(channel)
-    target = standard if own or standard is not None else read_in.target
-    unit = read_in.name if target is None else target
+    unit = standard if own or standard is not None else read_in.target
+    unit = read_in.name if unit is None else unit
     samples = convert(values, read_in.name, unit)
-    if not own:
+    if not own and source.request.gaps != "raw":
         if not channel.startswith(("voltage", "command_")):  # a sawtooth can be commanded
             quality.refuse_wraps(channel, raw, source)
         samples = quality.without_codes(channel, samples, raw, source)
@@ -180,42 +177,42 @@ def _describes(given: Channel | Time, column: Column) -> bool:
     return named in (snake_case(column.header), snake_case(parse(column.header).name))
 
 
-def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[Unit, str]:
-    """Return the unit of a column, asked for, stated or assumed, and the note of an assumption.
-
-    Raises
-    ------
-    DataError
-        If the file and the folder state different ones, and none is asked for; or if it is unknown or
-        of another dimension.
-    """
+def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[Unit, bool]:
+    """Return the unit of a column, asked for, stated or assumed, and whether it is assumed."""
     expected = unit_of(channel)
     asked = source.request.units.get(channel)
     text = _stated(channel, column, source) if asked is None else asked
     if text is None:
-        return _assumed(channel, column, values, source)
+        by_size = timebase.unit_by_size(values, source) if channel == "time" else None
+        if by_size:
+            return Unit(by_size, "s"), False
+        return _assumed(channel, column, values, source), bool(expected)
     if source.table.own and asked is None and expected in (None, text):
-        return Unit(text, expected), ""
+        return Unit(text, expected), False
     unit = find(text)
-    if unit is None and asked is None and expected is None and len(text) <= LONGEST:
-        return Unit(text, None), ""
+    if unit is None and asked is None and expected is None:
+        return Unit(text, None), False
     if unit is None:
-        remedy = f"name it, as in --unit {channel}={EXAMPLES.get(expected or '', 'UNIT')}"
+        remedy = f"name it, as in --unit {channel}={expected or 'UNIT'}"
         raise source.error(f"the unit {text[:40]!r} is unknown", remedy, channel)
-    if expected is not None and unit.target != expected:
-        problem = f"in {text!r}, which does not convert to" if text else "without a unit: it is in"
+    if expected is None or unit.target == expected:
+        return unit, False
+    if unit.target in ("V", "A") or text.casefold() in COUNTS:
+        remedy = f"calibrate it, as in {_option(channel, column, expected)}, or in {NAME}"
+    elif weight(text) != text:
+        remedy = f"where it is the weight of that mass, use --unit {channel}={weight(text)}"
+    else:
         remedy = (
             f"correct the unit with --unit {channel}={expected or '%'}, or name another column with "
             f"--column {channel}=COLUMN"
         )
-        if unit.target in ("V", "A") or text.casefold() in COUNTS:
-            option = f"--calibrate {channel}={column.header}:GAIN:OFFSET:{expected}"
-            remedy = f"calibrate it, as in {option}, or in {NAME}"
-        elif weight(text) != text:
-            remedy = f"where it is the weight of that mass, use --unit {channel}={weight(text)}"
-        problem = f"it cannot be {problem} {expected or 'a pure number'}"
-        raise source.error(problem, remedy, channel)
-    return unit, ""
+    problem = f"in {text!r}, which does not convert to" if text else "without a unit: it is in"
+    problem = f"it cannot be {problem} {expected or 'a pure number'}"
+    raise source.error(problem, remedy, channel)
+
+
+def _option(channel: str, column: Column, unit: str) -> str:
+    return f"--calibrate {channel}={column.header}:GAIN:OFFSET:{unit}"
 
 
 def _stated(channel: str, column: Column, source: Source) -> str | None:
@@ -243,29 +240,21 @@ def _stated(channel: str, column: Column, source: Source) -> str | None:
     return last
 
 
-def _assumed(channel: str, column: Column, values: Array, source: Source) -> tuple[Unit, str]:
-    """Return the package's unit.
-
-    Raises
-    ------
-    DataError
-        If a word of the header is a unit, or a name of raw numbers, or the size is common in another
-        unit.
-    """
+def _assumed(channel: str, column: Column, values: Array, source: Source) -> Unit:
+    """Return the package's unit; `DataError` if a word of the header or the size shows another."""
     expected = unit_of(channel)
     if expected is None:
-        return Unit("", ""), ""
+        return Unit("", "")
     for word in re.findall(r"[^\W\d_]+", column.label)[1:] if expected else ():
         unit = find(word)
         if word.casefold() in COUNTS or (len(word) > 1 and unit and unit.target == expected):
             raise source.error(
                 f"its unit is not certain: {column.label!r} has {word!r}",
-                f"name its unit, as in --unit {channel}={expected}, or calibrate it, as in --calibrate "
-                f"{channel}={column.header}:GAIN:OFFSET:{expected}",
+                f"name its unit, as in --unit {channel}={expected}, or calibrate it, as in "
+                f"{_option(channel, column, expected)}",
                 channel,
             )
-    finite = np.abs(values[np.isfinite(values)])
-    largest = float(finite.max()) if finite.size else 0.0
+    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     plausible = quality.PLAUSIBLE[expected]
     if 0 < largest < plausible.least or largest > plausible.most:
         fitting = quality.fitting_units(largest, expected, expected)[0]
@@ -275,30 +264,4 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> tup
             "where that is right",
             channel,
         )
-    return Unit(expected, expected), f"{channel} in {expected}" if expected else ""
-
-
-def _times(column: Column, source: Source) -> Times:
-    """Return the times in a column of numbers or dates, in the unit stated, shown by size or assumed."""
-    request = source.request
-    if column.values is None:
-        return Times(instants.seconds(column.texts, source))
-    values = _numbers("time", column, source)
-    stated = request.units.get("time") or _stated("time", column, source)
-    unit, assumed = None if stated else timebase.unit_by_size(values, source), ""
-    certain = "time" in request.units or request.described.time.unit is not None
-    if unit is not None:
-        certain = True
-        source.warn(
-            f"the times have no unit; by their size they are counted in {unit} since 1970; "
-            "use --unit time=UNIT where that is wrong"
-        )
-    elif not stated and timebase.counts(values):
-        problem = "it has no unit and counts in whole numbers: is it in ms?"
-        raise source.error(problem, UNIT_OF_TIME, "time", 0)
-    else:
-        found, assumed = _unit("time", column, values, source)
-        unit = found.name
-        certain |= bool(stated) and unit != "s"
-    quality.refuse_impossible("time", convert(values, unit, "s"), unit, source)
-    return Times(values, unit, certain, assumed)
+    return Unit(expected, expected)

@@ -2,44 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.files import timebase
-from mckibben.files.converting import UNIT_OF_TIME, Times
+from mckibben.files.converting import Times
 from mckibben.files.notices import listed
 from mckibben.files.quality import Mask, runs
 from mckibben.files.request import FEWEST, Source
-from mckibben.files.timebase import Span
+from mckibben.files.units import convert
 
 Channels = dict[str, Array]
 
-LONGEST_BRIDGE = 100
-"""Most samples to which gaps are interpolated, over those there are."""
-
-LONGEST_STEP = 5.0
-"""Longest sample time [s] that is believed of times without a certain unit."""
+REFUSED = ("error", "raw")
+"""Policies by which gaps are refused."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Samples on a uniform grid: the step [s], None without time, the start [s], and what is bridged."""
+    """Samples on a uniform grid: the step [s], None without time, and the start [s].
+
+    ``bridged`` has the first and the last time of each run of samples that were interpolated.
+    """
 
     samples: Channels
     step: float | None
     start: float
-    bridged: Mask
-
-    @property
-    def meta(self) -> dict[str, Any]:
-        """The first and last times of bridged samples, as ``meta`` lists them."""
-        times = self.start + (self.step or 1.0) * (runs(self.bridged) - [0, 1])
-        return {"bridged": times.tolist()} if times.size else {}
+    bridged: list[list[float]]
 
 
 def pieces(
@@ -64,25 +56,46 @@ def pieces(
         long enough; or if steps are so long that the unit of the times is in doubt.
     """
     missing = _missing(channels, source)
-    channels = {name: samples for name, samples in channels.items() if name in missing}
-    order = np.arange(next(iter(channels.values())).size, dtype=float)
-    time = order if times is None else times.values
     holes = np.logical_or.reduce(list(missing.values()))
-    spans: list[Span] = [(0, time.size)]
-    if not holes.any():
-        pass
-    elif source.request.gaps == "split":
-        spans = [(int(first), int(last)) for first, last in runs(~holes)]
-        holes = np.zeros_like(holes)
-    else:
-        channels, span = _interpolated(channels, missing, time, source)
-        spans = [span]
+    time = np.arange(holes.size, dtype=float) if times is None else times.values
+    split = source.request.gaps == "split"
+    inside = ~holes if split else _enclosed(missing, source)
+    steps = np.diff(time)
+    gap = np.append(False, steps > timebase.GAP * np.median(steps))
+    begins = inside & (gap | ~np.append(False, inside[:-1]))
+    ends = inside & (np.append(gap[1:], True) | ~np.append(inside[1:], False))
+    stretches = np.column_stack([np.flatnonzero(begins), np.flatnonzero(ends) + 1])
+    cuts = stretches[len(stretches) if split else 1 :, 0]
+    if times is not None and cuts.size:
+        _judge_gaps(cuts, times, source)
+    whole = stretches.reshape(1, -1)[:, [0, -1]] if stretches.size else stretches
+    spans = _long_enough(stretches if split else whole, source)
+    size, jitter = 1.0, None
     if times is not None:
-        return _on_grid(channels, times, spans, holes, source)
-    return [
-        Piece(_cut(channels, span), step, start + (step or 1.0) * span[0], holes[slice(*span)])
-        for span in _long_enough(spans, source)
-    ]
+        size, jitter = timebase.common_step(time, spans if split else stretches)
+        step = _judged_step(size, jitter, times, source)
+        if cuts.size and (time[-1] - time[0]) / size > 100 * time.size:
+            raise source.error("its gaps are too long to bridge", "use --gaps split", "time")
+    found = []
+    for first, after in spans:
+        t, bridged = time[first:after], holes[first:after] & (not split)
+        grid = t
+        if cuts.size or jitter is not None:
+            grid = t[0] + size * np.arange(int((t[-1] - t[0]) / size + 1e-6) + 1)
+            # a sample of the grid is bridged where either neighbour is, or both enclose a gap
+            right = np.clip(np.searchsorted(t, grid - 1e-9 * size), 1, t.size - 1)
+            between = (grid < t[right] - 1e-6 * size) & (grid > t[right - 1] + 1e-6 * size)
+            bridged = bridged[right] | bridged[right - 1] | (np.isin(right + first, cuts) & between)
+        samples = {
+            name: channels[name][first:after]
+            if grid is t and not mask.any()
+            else np.interp(grid, time[~mask], channels[name][~mask])
+            for name, mask in missing.items()
+        }
+        begin = start + (step or 1.0) * first if times is None else times.seconds(t[0])
+        marked = begin + (step or 1.0) * (runs(bridged) - [0, 1])
+        found.append(Piece(samples, step, float(begin), marked.tolist()))
+    return found
 
 
 def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
@@ -97,9 +110,12 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
         if n == missing.size:
             remedy = f"name a column that holds numbers with --column {name}=COLUMN"
             raise source.error("all of its samples are missing", remedy, name, 0)
-        if n and source.request.gaps == "error":
+        if n and source.request.gaps in REFUSED:
             problem = f"{n} of {missing.size} samples are missing or not finite"
-            remedy = "use --gaps interpolate to bridge them or --gaps split to cut them out"
+            remedy = (
+                "use --gaps interpolate to bridge them, --gaps split to cut them out, or --gaps raw "
+                "where they are numbers that were measured"
+            )
             raise source.error(problem, remedy, name, int(np.argmax(missing)))
         found[name] = missing
     if not found:
@@ -108,100 +124,67 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
     return found
 
 
-def _interpolated(
-    channels: Channels, missing: dict[str, Mask], time: Array, source: Source
-) -> tuple[Channels, Span]:
-    """Return channels with missing samples interpolated, and the span in which that is possible."""
-    inside = [np.flatnonzero(~mask)[[0, -1]] for mask in missing.values()]
-    start, stop = int(max(first for first, _ in inside)), int(min(last for _, last in inside)) + 1
-    channels = dict(channels)
+def _enclosed(missing: dict[str, Mask], source: Source) -> Mask:
+    """Return where every channel has samples before and after, with a note of what is interpolated."""
+    inside = np.logical_and.reduce(
+        [
+            np.logical_or.accumulate(~mask) & np.logical_or.accumulate(~mask[::-1])[::-1]
+            for mask in missing.values()
+        ]
+    )
     for name, mask in missing.items():
         if mask.any():
-            channels[name] = np.interp(time, time[~mask], channels[name][~mask])
-            n = mask[start:stop].sum()
+            n = (mask & inside).sum()
             source.warn(f"channel {name!r}: {n} missing sample(s) were interpolated")
-    if start > 0 or stop < time.size:
+    if not inside.all():
         source.warn(
-            f"{start} row(s) at the start and {time.size - stop} at the end were cut off, "
-            "where samples are missing and there is nothing to interpolate from"
+            f"{inside.argmax()} row(s) at the start and {inside[::-1].argmax()} at the end were cut "
+            "off, where samples are missing and there is nothing to interpolate from"
         )
-    return channels, (start, stop)
+    return inside
 
 
-def _on_grid(
-    channels: Channels, times: Times, spans: list[Span], holes: Mask, source: Source
-) -> list[Piece]:
-    """Return the spans on one grid: as they are where times are uniform, else resampled."""
-    time = times.values
-    cuts = [int(at) for at in timebase.gaps(time) if any(a < at < b for a, b in spans)]
-    lengths = [times.seconds(time[at] - time[at - 1]) for at in cuts]
-    total = sum(lengths)
-    if cuts and source.request.gaps == "error":
-        others = f" ({len(cuts)} gaps in all, together {total:.3g} s)" if len(cuts) > 1 else ""
-        raise source.error(
-            f"there is a gap of {lengths[0]:.6g} s before this row{others}",
-            "use --gaps split to cut there or --gaps interpolate to bridge them",
-            "time",
-            cuts[0],
-        )
-    if source.request.gaps == "split":
-        spans, cuts = _split(spans, cuts), []
-    spans = _long_enough(spans, source)
-    step = timebase.common_step(time, _split(spans, cuts))
-    seconds = times.seconds(step.size)
-    if seconds > LONGEST_STEP and not times.certain:
+def _judge_gaps(cuts: NDArray[np.intp], times: Times, source: Source) -> None:
+    """Refuse gaps in time, or note that they are bridged."""
+    lengths = convert(times.values[cuts] - times.values[cuts - 1], times.unit, "s")
+    total = f"{len(cuts)} gap(s) in time, {lengths.sum():.6g} s in all"
+    if source.request.gaps in REFUSED:
+        problem = f"there is a gap of {lengths[0]:.6g} s before this row ({total})"
+        remedy = "use --gaps split to cut there or --gaps interpolate to bridge them"
+        raise source.error(problem, remedy, "time", int(cuts[0]))
+    source.warn(f"{total}, were interpolated over")
+
+
+def _judged_step(
+    size: float, jitter: tuple[float, float] | None, times: Times, source: Source
+) -> float:
+    """Return the step in seconds; refuse one of a doubtful unit, and note jitter."""
+    seconds = times.seconds(size)
+    if seconds > 5.0 and not times.certain:
         problem = f"its steps are {seconds:.6g} s: is time in ms?"
-        raise source.error(problem, UNIT_OF_TIME, "time", 0)
-    if step.jitter is not None:
-        rms, worst = (times.seconds(deviation) for deviation in step.jitter)
+        raise source.error(problem, timebase.UNIT_OF_TIME, "time", 0)
+    if jitter is not None:
+        rms, worst = (f"{times.seconds(x):.3g} s ({100 * x / size:.3g} %)" for x in jitter)
         source.warn(
-            f"the time is not uniform: its steps deviate from {seconds:.6g} s by {rms:.3g} s rms "
-            f"({100 * rms / seconds:.3g} %) and {worst:.3g} s at worst "
-            f"({100 * worst / seconds:.3g} %); the samples were interpolated onto a uniform grid"
+            f"the time is not uniform: its steps deviate from {seconds:.6g} s by {rms} rms and "
+            f"{worst} at worst; the samples were interpolated onto a uniform grid"
         )
-    if cuts:
-        gaps = f"{len(cuts)} gap(s)"
-        if (time[-1] - time[0]) / step.size > LONGEST_BRIDGE * time.size:
-            problem = f"{gaps} of {total:.6g} s in all are too long to interpolate over"
-            raise source.error(problem, "use --gaps split", "time")
-        source.warn(f"{gaps} in time, {total:.6g} s in all, were interpolated over")
-    found = []
-    for start, stop in spans:
-        samples, t, bridged = _cut(channels, (start, stop)), time[start:stop], holes[start:stop]
-        if cuts or step.jitter is not None:
-            grid = timebase.grid(t, step.size)
-            samples = {name: np.interp(grid, t, values) for name, values in samples.items()}
-            # a sample of the grid is bridged where either neighbour is, or both enclose a gap
-            after = np.clip(np.searchsorted(t, grid - 1e-9 * step.size), 1, t.size - 1)
-            gap = np.isin(after + start, cuts) & (grid < t[after] - 1e-6 * step.size)
-            gap &= grid > t[after - 1] + 1e-6 * step.size
-            bridged = bridged[after] | bridged[after - 1] | gap
-        found.append(Piece(samples, seconds, times.seconds(t[0]), bridged))
-    return found
+    return seconds
 
 
-def _long_enough(spans: list[Span], source: Source) -> list[Span]:
+def _long_enough(spans: timebase.Spans, source: Source) -> timebase.Spans:
     """Return the spans that are not too short to be of use."""
     fewest = FEWEST if len(spans) > 1 else source.request.fewest
-    long = [span for span in spans if span[1] - span[0] >= fewest]
-    if not long:
+    long = spans[spans[:, 1] - spans[:, 0] >= fewest]
+    if not long.size:
         raise source.error(
             f"no stretch without gaps has {fewest} samples",
             "use --gaps interpolate, or give a recording with fewer gaps",
         )
     if len(long) < len(spans):
-        rows = [f"{source.table.row(start)}" for start, stop in spans if stop - start < fewest]
+        rows = [f"{source.table.row(first)}" for first in np.setdiff1d(spans[:, 0], long[:, 0])]
         source.warn(
             f"{len(rows)} of {len(spans)} stretches between gaps have fewer than {fewest} samples and "
             f"were left out: they begin in row {listed(rows)}"
         )
     return long
-
-
-def _split(spans: list[Span], cuts: Sequence[int]) -> list[Span]:
-    ends = [[start, *(at for at in cuts if start < at < stop), stop] for start, stop in spans]
-    return [pair for edges in ends for pair in pairwise(edges)]
-
-
-def _cut(channels: Channels, span: Span) -> Channels:
-    return {name: samples[slice(*span)] for name, samples in channels.items()}

@@ -44,29 +44,15 @@ PLAUSIBLE = {
 }
 """By the package's unit."""
 
-SMALLEST_BAR, ZERO_BAR = 1e-7, 1e-12
-"""A pressure whose largest value lies between these [bar] is in another unit, not the rounding of 0."""
+TOO_SMALL = {"bar": (1e-12, 1e-7)}
+"""By the package's unit: largest values that are in another unit, and more than the rounding of 0."""
 
-CODES = (0.0, *(10.0**k - 1 for k in range(3, 8)), 2.0**15 - 1, 2.0**16 - 1)
-"""Sizes that instruments write for a missing sample; 0 only where the other samples exclude it."""
+_SIZES = (0.0, *(10.0**k - 1 for k in range(3, 8)), 2.0**15 - 1, 2.0**16 - 1)
+CODES = tuple({sign * size for size in _SIZES for sign in (1.0, -1.0)})
+"""What instruments write for a missing sample."""
 
-FEWEST = 10
-"""Fewest other samples by which a code can be distinguished from a measurement."""
-
-JUMP = 5.0
-"""Steps to and from a code, over the largest step between other samples."""
-
-SHARE = 0.25
-"""Largest share of samples that can be zeros, or ends of a range, for missing ones."""
-
-HUGE = 1e30
-"""Size beyond which a number is a code, whatever the channel."""
-
-WRAPS = (2.0**8, 2.0**16)
+WRAPS = (2.0**8, 2.0**16, 2.0**32)
 """Range of integer counters, which begin anew beyond it."""
-
-LONE, FAR = 3, 1.0
-"""Longest run of samples that is an outlier, and its distance from the others over their range."""
 
 
 def runs(mask: Mask) -> NDArray[np.intp]:
@@ -74,30 +60,39 @@ def runs(mask: Mask) -> NDArray[np.intp]:
     return np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
 
 
+def wraps(values: Array) -> tuple[float, Array] | None:
+    """Return the range of an integer counter, and how often it wraps upwards at each of n - 1 steps.
+
+    None where the n values, all finite, are no whole numbers of one of the ranges `WRAPS`, or do not
+    wrap: where steps are not alike once they go on beyond the end of the range.
+    """
+    steps = np.diff(values)
+    sizes = np.abs(steps)
+    largest = sizes.max(initial=0.0)
+    for size in WRAPS:
+        if not size / 2 < largest < size:
+            continue
+        jumps = sizes > size / 2
+        usual = sizes[~jumps].max(initial=0.0)
+        alike = size - sizes[jumps].min() <= 2 * usual < 0.2 * size
+        low, high = values.min(), values.max()
+        within = -size / 2 <= low and high < size and high - low < size
+        if alike and within and np.array_equal(values, np.rint(values)):
+            return size, -np.sign(steps) * jumps
+    return None
+
+
 def refuse_wraps(channel: str, recorded: Array, source: Source) -> None:
     """Refuse samples, as in the file, of an integer counter that wraps."""
     finite = np.isfinite(recorded)
-    known = recorded[finite]
-    steps = np.diff(known)
-    largest = float(np.abs(steps).max()) if steps.size else 0.0
-    for size in WRAPS:
-        if not 0.9 * size < largest < size or np.ptp(known) >= size:
-            continue
-        jumps = np.abs(steps) > 0.9 * size
-        others = steps[~jumps]
-        unwrapped = steps[jumps] - np.sign(steps[jumps]) * size
-        if (
-            np.count_nonzero(others) > FEWEST
-            and np.array_equal(known, np.rint(known))
-            and np.abs(unwrapped).max() <= 2 * np.abs(others).max() < 0.2 * size
-        ):
-            raise source.error(
-                f"it jumps by almost {size:.0f} there: an integer counter that wraps",
-                f"add {size:.0f} after each wrap, or name another column with --column "
-                f"{channel}=COLUMN",
-                channel,
-                int(np.flatnonzero(finite)[np.argmax(jumps) + 1]),
-            )
+    found = wraps(recorded[finite])
+    if found is not None:
+        raise source.error(
+            f"it jumps by almost {found[0]:.0f} there: an integer counter that wraps",
+            f"add {found[0]:.0f} after each wrap, or use --gaps raw where that was measured",
+            channel,
+            int(np.flatnonzero(finite)[np.flatnonzero(found[1])[0] + 1]),
+        )
 
 
 def without_codes(channel: str, values: Array, recorded: Array, source: Source) -> Array:
@@ -106,33 +101,46 @@ def without_codes(channel: str, values: Array, recorded: Array, source: Source) 
     Codes are round numbers as ``recorded`` in the file, not in the package's unit.
     """
     known = recorded[np.isfinite(recorded)]
-    signed = {sign * size for size in CODES for sign in (1.0, -1.0)}
-    coded = np.isin(recorded, [code for code in signed if _is_code(code, known)])
-    zero = coded & (recorded == 0)
-    if zero.any() and _moves_with(zero, source):
-        coded &= ~zero
-    huge = (np.abs(recorded) > HUGE) & np.isfinite(recorded)
-    if np.count_nonzero(~huge) >= FEWEST:  # SCPI's for not a number, and for beyond the range
+    coded = np.isin(recorded, [code for code in CODES if _is_code(code, known)])
+    huge = (np.abs(recorded) > 1e30) & np.isfinite(recorded)
+    if not huge.all():  # SCPI's for not a number, and for beyond the range
         coded |= huge
     if not coded.any():
         return values
     found = listed([f"{value:g}" for value in np.unique(recorded[coded])], most=5)
     source.warn(
         f"channel {channel!r}: {coded.sum()} sample(s) are {found}, a code for missing ones "
-        f"(first in row {source.table.row(int(np.argmax(coded)))})"
+        f"(first in row {source.table.row(int(np.argmax(coded)))}); "
+        "use --gaps raw where that was measured"
     )
     return np.where(coded, np.nan, values)
+
+
+def _is_code(code: float, known: Array) -> bool:
+    """Return whether a number is what a sensor drops to, far outside the range of the others."""
+    at = known == code
+    # a muscle rests at 0 before and after it moves, and as often as not
+    if not at.any() or at.all() or (code == 0 and (at[0] or at[-1] or at.mean() > 0.25)):
+        return False
+    others = known[~at]
+    low, high = others.min(), others.max()
+    steps = np.abs(np.diff(known))
+    inside = steps[~at[1:] & ~at[:-1]].max(initial=0.0)
+    far = max(code - high, low - code) > high - low
+    at_once = not low < code < high and steps[at[1:] != at[:-1]].min() > 5 * inside
+    # one of few values is a level of the signal
+    return bool(far or at_once) and np.unique(others).size >= 10
 
 
 def note_outliers(channel: str, values: Array, source: Source) -> None:
     """Note samples in short runs far from all others, which may be measured."""
     finite = np.flatnonzero(np.isfinite(values))
-    if finite.size < 10 * FEWEST:
+    if finite.size < 100:
         return
     known = values[finite]
     low, high = np.quantile(known, (0.01, 0.99))
-    first, after = runs(np.maximum(known - high, low - known) > FAR * (high - low)).T
-    lone = (after - first <= LONE) & (first > 0) & (after < known.size)
+    first, after = runs(np.maximum(known - high, low - known) > high - low).T
+    lone = (after - first <= 3) & (first > 0) & (after < known.size)
     if high > low and lone.any():
         n, at = np.sum((after - first)[lone]), int(finite[first[lone][0]])
         source.warn(
@@ -142,28 +150,19 @@ def note_outliers(channel: str, values: Array, source: Source) -> None:
 
 
 def refuse_impossible(channel: str, values: Array, read_in: str, source: Source) -> None:
-    """Refuse values of a standard channel or of time that no rig has, and propose a unit.
-
-    Parameters
-    ----------
-    values : numpy.ndarray, shape (n,)
-        In the package's unit; those that are not finite are passed over.
-    read_in : str
-        The unit that they were read in.
-    """
+    """Refuse values, in the package's unit, that no rig has, and propose another than ``read_in``."""
     target = unit_of(channel)
-    if target not in PLAUSIBLE or not values.size:
+    finite = np.isfinite(values)
+    if target not in PLAUSIBLE or not finite.any():
         return
     low, high, *_ = PLAUSIBLE[target]
-    least, largest = float(values.min()), float(values.max())
-    smallest = SMALLEST_BAR if target == "bar" else 0.0
-    if low <= least and largest <= high and max(-least, largest) >= smallest:
-        return  # as nearly always, without a copy; NaN fails the comparison
-    sizes = np.where(np.isfinite(values), values, 0.0)
-    outside = np.maximum(sizes - high, low - sizes)
-    at = int(np.argmax(outside if outside.max() > 0 else np.abs(sizes)))
-    if outside[at] <= 0 and not ZERO_BAR < abs(sizes[at]) < smallest:
+    zero, small = TOO_SMALL.get(target, (0.0, 0.0))
+    known = values[finite]
+    least, largest = known.min(), known.max()
+    if low <= least and largest <= high and not zero < max(-least, largest) < small:
         return
+    excess = np.maximum(known - high, low - known)
+    at = int(np.flatnonzero(finite)[np.argmax(excess if excess.max() > 0 else np.abs(known))])
     units = fitting_units(values[at], read_in, target)
     options = " or ".join(f"--unit {channel}={unit}" for unit in units[:2])
     problem = f"{values[at]:.6g} {target} is impossible: is it in {units[0]}?"
@@ -179,36 +178,3 @@ def fitting_units(value: float, read_in: str, target: str) -> list[str]:
     off = {unit: abs(math.log(max(size, 1e-300)) - typical) for unit, size in sizes.items()}
     nearest, *others = sorted(off, key=lambda unit: off[unit])
     return [nearest, *(unit for unit in others if off[unit] < math.log(10.0))]
-
-
-def _moves_with(at: Mask, source: Source) -> bool:
-    """Return whether another column jumps where runs of samples begin and end: they were measured."""
-    edges = at[1:] != at[:-1]
-    for column in source.table.columns:
-        if column.values is None or column.values.size != at.size or not column.values[at].any():
-            continue
-        steps = np.abs(np.diff(column.values))
-        if np.median(steps[edges]) > JUMP * np.quantile(steps[~edges], 0.95):
-            return True
-    return False
-
-
-def _is_code(code: float, known: Array) -> bool:
-    """Return whether a number is a code for missing samples among those as recorded."""
-    at = known == code
-    others = known[~at]
-    if not at.any() or others.size < FEWEST:
-        return False
-    steps = np.abs(np.diff(known))
-    inside = steps[~at[1:] & ~at[:-1]]
-    jump = float(steps[at[1:] != at[:-1]].min())
-    low, high = float(others.min()), float(others.max())
-    far = max(code - high, low - code) > high - low > 0  # of two levels, neither is a code
-    # a signal of levels moves by jumps alone; one that is measured, by steps of all sizes
-    smooth = bool(inside.size) and np.count_nonzero(inside) > inside.size / 2
-    apart = smooth and at.mean() <= SHARE and jump / JUMP > inside.max()
-    if code > 0:
-        return far and apart
-    if code < 0:
-        return far or (apart and int(np.diff(runs(at)).max()) <= LONE)
-    return apart and not (at[0] or at[-1])

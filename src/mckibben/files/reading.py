@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from mckibben.files import gaps as gaps_in
 from mckibben.files import sources, timebase
 from mckibben.files.channels import about
 from mckibben.files.choosing import Seen, matrix_hint, seen
-from mckibben.files.converting import ASSUMED, Samples, in_package_units
+from mckibben.files.converting import ASSUMED, Times, in_package_units
 from mckibben.files.formats import MOST_BYTES
 from mckibben.files.notices import noted
 from mckibben.files.request import Gaps, Request, Source
@@ -58,10 +59,11 @@ def read(
         Samples per second, positive, where there is no column of times. Without either, a scalar
         beside the samples may state it, such as ``fs``, or the recording has no time. Channels with
         times of their own are put on a clock of this rate.
-    gaps : {"error", "split", "interpolate"}
+    gaps : {"error", "split", "interpolate", "raw"}
         What to do where time is missing (a step of more than three median steps) or a sample is
         (blank, NaN, infinite, or a code such as -9999): refuse, cut into several recordings, or bridge
         linearly. Bridged samples are not fitted: ``meta["bridged"]`` has their first and last times.
+        ``"raw"`` refuses, but reads codes, and counters that seem to wrap, as numbers measured.
     channels : sequence of str, optional
         Channels that must be there and whole. Others are left out, with a `DataWarning`, if samples of
         theirs are missing. By default all must be whole.
@@ -99,7 +101,6 @@ def read(
         Of units assumed, jittered time that was resampled, channels put on one clock, gaps bridged, and
         what was left out.
     """
-    path = Path(path)
     request = Request(
         columns or {},
         units or {},
@@ -111,8 +112,25 @@ def read(
         constants or {},
         most,
     )
-    request.check(path)
-    return [each for one in sources.inside(path) for each in _read(one, request)]
+    request.check(Path(path))
+    return [each for one in sources.inside(Path(path)) for each in _read(one, request)[0]]
+
+
+def look(path: str | Path, **options: Any) -> tuple[list[Recording], list[Seen]]:
+    """Return the recordings in a file, as `read` does, and its columns, as `columns_of` does, read once.
+
+    Parameters
+    ----------
+    path : path
+    **options
+        Those of `read`; ``channels`` does not leave out any column.
+    """
+    request = Request(**options)
+    request.check(Path(path))
+    recordings, source = _read(Path(path), request)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # issued when the recordings were read
+        return recordings, seen(replace(source, request=replace(source.request, channels=None)))
 
 
 def columns_of(path: str | Path, **options: Any) -> list[Seen]:
@@ -140,12 +158,13 @@ def columns_of(path: str | Path, **options: Any) -> list[Seen]:
     return seen(request.of(table, path))
 
 
-def _read(path: Path, request: Request) -> list[Recording]:
-    """Return the recordings of a file, with the notes of this reading after earlier ones."""
+def _read(path: Path, request: Request) -> tuple[list[Recording], Source]:
+    """Return the recordings of a file, with notes after earlier ones, and the first that it is of."""
     request = replace(request, described=about(path))
     with noted() as notes:
         tables, digest = sources.tables(path, request)
-        found = [each for table in tables for each in _recordings(request.of(table, path), digest)]
+        of_each = [request.of(table, path) for table in tables]
+        found = [each for source in of_each for each in _recordings(source, digest)]
     stated = bool(request.columns or request.units)  # then units that were assumed before are not
     recordings = []
     for recording in found:
@@ -153,20 +172,20 @@ def _read(path: Path, request: Request) -> list[Recording]:
         both = [*dict.fromkeys([*earlier, *notes])]
         same = both == list(recording.notes)
         recordings.append(recording if same else recording.with_meta(notes=both))
-    return recordings
+    return recordings, of_each[0]
 
 
 def _recordings(source: Source, digest: str) -> list[Recording]:
     table, request, path = source.table, source.request, source.path
-    found = in_package_units(source)
-    channels = {name: signal.samples for name, signal in found.signals.items()}
+    found, clock, meta = in_package_units(source)
+    channels = {name: signal.samples for name, signal in found.items()}
     n = next(iter(channels.values())).size
     if n < request.fewest:
         problem = f"{n} sample(s) are too few, at least {request.fewest} are needed"
         raise source.error(problem, "give a longer recording")
-    step = _stated_step(found, source)
-    start = table.start_time if found.times is None else found.times.seconds(found.times.values[0])
-    times = found.times if step is None else None
+    step = _stated_step(clock, source)
+    start = table.start_time if clock is None else clock.seconds(clock.values[0])
+    times = clock if step is None else None
     if times is not None:
         times = replace(times, values=timebase.checked(times.values, source))
     elif step is None and (columns := matrix_hint(table, time=True)):
@@ -174,43 +193,41 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
     pieces = gaps_in.pieces(channels, times, step, start, source)
     if request.informative:
         _refuse_constant(pieces, source)
-    signals = {name: found.signals[name] for name in pieces[0].samples}
+    signals = {name: found[name] for name in pieces[0].samples}
     units = {name: signal.unit for name, signal in signals.items()}
-    name = {} if table.name is None else {"name": f"{path.stem}[{table.name}]"}
-    calibrated = found.meta.get("calibration", {})
-    meta = {**table.meta, **found.meta, **name, "file": str(path), "sha256": digest}
+    now = meta.get("calibration", {})
     for key in ("calibration", "pressure_reference"):  # of channels that are not calibrated now
-        before = table.meta.get(key)
-        if isinstance(before, Mapping):
-            kept = {name: one for name, one in before.items() if name not in calibrated}
-            meta[key] = kept | found.meta.get(key, {})
-    recordings = [
-        Recording(piece.samples, piece.step, units, piece.start, meta | piece.meta)
-        for piece in pieces
-    ]
+        if isinstance(before := table.meta.get(key), Mapping):
+            meta[key] = {c: v for c, v in before.items() if c not in now} | meta.get(key, {})
+    meta = {**table.meta, **meta, "file": str(path), "sha256": digest}
+    if table.name is not None:
+        meta["name"] = f"{path.stem}[{table.name}]"
+    recordings = []
+    for piece in pieces:
+        known = meta | ({"bridged": piece.bridged} if piece.bridged else {})
+        recordings.append(Recording(piece.samples, piece.step, units, piece.start, known))
     if len(recordings) == 1:
         return recordings
     return [each.with_meta(name=f"{each.name}[{i}]") for i, each in enumerate(recordings, start=1)]
 
 
-def _stated_step(found: Samples, source: Source) -> float | None:
+def _stated_step(times: Times | None, source: Source) -> float | None:
     """Return the sample time that the caller or the file states, which the times must not contradict."""
-    table, request, times = source.table, source.request, found.times
+    table, request = source.table, source.request
     step = table.sample_time if request.rate is None else 1.0 / request.rate
     if step is None and times is None and not table.own:
-        described = request.described.time.sample_time
-        return timebase.stated_step(source) if described is None else described
+        step = request.described.time.sample_time
+        return timebase.stated_step(source) if step is None else step
     if step is None:
         return None
     if table.sample_time is not None and abs(step - table.sample_time) > 1e-3 * step:
         problem = f"the file states {1 / table.sample_time:g} samples per second"
     elif times is not None and not timebase.agrees(times.values, step / times.seconds(1.0)):
-        duration = times.seconds(times.values[-1] - times.values[0])
-        mean = (times.values.size - 1) / duration if duration else np.nan
-        problem = f"the column of times has {mean:.6g} samples per second on average"
+        mean = np.mean(np.diff(times.values)) * times.seconds(1.0)
+        problem = f"the times are {mean:.6g} s apart on average, or not evenly"
     else:
         return step if table.sample_time is None else table.sample_time
-    problem = f"{problem}, or not evenly, which is not the {1 / step:g} asked for"
+    problem = f"{problem}, which is not the {1 / step:g} a second asked for"
     raise source.error(problem, "leave --rate out, or delete the column of times", "time")
 
 

@@ -19,7 +19,7 @@ from mckibben.files.table import Table
 FEWEST = 10
 """Fewest samples of a recording, or of a stretch of one, that can show a loop."""
 
-Gaps = Literal["error", "split", "interpolate"]
+Gaps = Literal["error", "split", "interpolate", "raw"]
 
 
 @dataclass(frozen=True)

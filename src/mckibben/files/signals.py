@@ -151,6 +151,6 @@ def _seconds(clock: Column, table: Table, request: Request, path: Path) -> Array
     time = replace(clock, header="time", says=None, unit=clock.unit or parse(clock.label).unit)
     rest = Column("signal", np.zeros(table.n_samples), "1")
     source = alone.of(replace(table, columns=(time, rest)), path)
-    times = in_package_units(source).times
+    _, times, _ = in_package_units(source)
     assert times is not None
     return convert(timebase.checked(times.values, source), times.unit, "s")

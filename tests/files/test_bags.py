@@ -4,45 +4,32 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rosbags import rosbag1, rosbag2
+from rosbags.typesys import Stores, get_typestore
 
-import mckibben
 from mckibben import DataError
-from mckibben.files import formats
 from mckibben.files.sources import roles
-from mckibben.files.table import Table
-
-pytestmark = pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+from tests.files.made import columns, one, place, several, table
 
 KINDS = ("bag", "mcap", "db3")
 BEGAN, STEP, LATE = 1_700_000_000_123_456_789, 10_000_001, 3_000_000
 """First message, time between two, and how long after its stamp one is recorded [ns]."""
+PRESSURE = (2 + np.sin(np.arange(40) / 3)).tolist()
 
-TYPES = {
-    "/rig/pressure_bar": "std_msgs/msg/Float64",
-    "/force_N": "std_msgs/msg/Float64",
-    "/count": "std_msgs/msg/UInt8",
-    "/air": "sensor_msgs/msg/FluidPressure",
-    "/arm": "sensor_msgs/msg/JointState",
-    "/words": "std_msgs/msg/String",
-    "/picture": "std_msgs/msg/Float64MultiArray",
-    "/near": "diagnostic_msgs/msg/DiagnosticStatus",
-    "/clock": "rosgraph_msgs/msg/Clock",
-}
-Messages = Mapping[str, Sequence[tuple[int, Mapping[str, Any]]]]
+New = Callable[..., Any]
+Messages = Mapping[str, Sequence[tuple[int, Any]]]
+Content = Callable[[New], Messages]
 
 
-def bag(path: Path, kind: str, messages: Messages, packed: str = "") -> Path:
+def bag(path: Path, kind: str, content: Content, packed: str = "") -> Path:
     """Write messages, each at a time [ns], and return the file, or the folder of ROS 2."""
-    from rosbags import rosbag1, rosbag2
-    from rosbags.typesys import Stores, get_typestore
-
     store = get_typestore(Stores.ROS1_NOETIC if kind == "bag" else Stores.ROS2_JAZZY)
     writer: Any
     if kind == "bag":
@@ -57,71 +44,68 @@ def bag(path: Path, kind: str, messages: Messages, packed: str = "") -> Path:
             mode = rosbag2.CompressionMode[packed]
             writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
 
-    def message(name: str, fields: Mapping[str, Any]) -> Any:
-        made = dict(fields)
-        for place in made.keys() & {"stamp", "clock"}:
-            time = store.types["builtin_interfaces/msg/Time"](*divmod(made[place], 10**9))
-            made[place] = time
-        if "stamp" in made:
-            time = made.pop("stamp")
-            extra = {"seq": 0} if kind == "bag" else {}
-            made["header"] = store.types["std_msgs/msg/Header"](stamp=time, frame_id="", **extra)
-        if "layout" in made:
-            made["layout"] = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
-        return store.types[name](**made)
+    def new(name: str, *fields: Any) -> Any:
+        made: Any = store.types[name.replace("/", "/msg/")]
+        first = [0] if "seq" in made.__dataclass_fields__ else []  # of headers of ROS 1
+        return made(*first, *fields)
 
     serialize = store.serialize_ros1 if kind == "bag" else store.serialize_cdr
     with writer:
-        for topic, sent in messages.items():
-            connection = writer.add_connection(topic, TYPES[topic], typestore=store)
-            for when, fields in sent:
-                raw = serialize(message(TYPES[topic], fields), TYPES[topic])
-                writer.write(connection, when, raw)
+        for topic, sent in content(new).items():
+            name = sent[0][1].__msgtype__
+            connection = writer.add_connection(topic, name, typestore=store)
+            for when, message in sent:
+                writer.write(connection, when, serialize(message, name))
     return path
 
 
-def numbers(values: Sequence[float], began: int = BEGAN, step: int = STEP) -> list[Any]:
-    return [(began + k * step, {"data": value}) for k, value in enumerate(values)]
+def numbers(new: New, values: Sequence[Any], began: int = BEGAN, kind: str = "Float64") -> Any:
+    return [(began + k * STEP, new(f"std_msgs/{kind}", value)) for k, value in enumerate(values)]
 
 
-def joints(n: int) -> list[Any]:
-    """Return stamped joints whose order changes."""
-    found = []
-    for k in range(n):
+def time(new: New, at: int) -> Any:
+    return new("builtin_interfaces/Time", *divmod(at, 10**9))
+
+
+def stamped(new: New) -> Messages:
+    """Return messages with stamps, of joints whose order changes and, recorded later, of air."""
+    arm, air = [], []
+    for k in range(20):
         names = ["a", "b"][:: -1 if k % 2 else 1]
-        position = np.array([{"a": 0.1, "b": 0.2}[name] * k for name in names])
-        fields = {"name": names, "position": position, "velocity": position[:0], "effort": position}
-        found.append((BEGAN + 2 * k * STEP + LATE, {"stamp": BEGAN + 2 * k * STEP, **fields}))
-    return found
+        angles = np.array([{"a": 0.1, "b": 0.2}[name] * k for name in names])
+        at = BEGAN + 2 * k * STEP
+        header = new("std_msgs/Header", time(new, at), "")
+        joints = new("sensor_msgs/JointState", header, names, angles, angles[:0], angles)
+        arm.append((at + LATE, joints))
+    for k in range(12):
+        at = BEGAN + k * STEP
+        header = new("std_msgs/Header", time(new, at - LATE), "")
+        air.append((at, new("sensor_msgs/FluidPressure", header, 6e5, 0.0)))
+    return {"/arm": arm, "/air": air}
 
 
-PRESSURE = (2 + np.sin(np.arange(40) / 3)).tolist()
-AIR = {"fluid_pressure": 6e5, "variance": 0.0}
-STAMPED: Messages = {
-    "/arm": joints(20),
-    "/air": [(BEGAN + k * STEP, {"stamp": BEGAN + k * STEP - LATE, **AIR}) for k in range(12)],
-}
-MIXED: Messages = {
-    **STAMPED,
-    "/rig/pressure_bar": numbers(PRESSURE),
-    "/count": numbers([k % 256 for k in range(30)]),
-    "/words": numbers(["up"]),  # type: ignore[list-item]
-    "/picture": [(BEGAN, {"layout": None, "data": np.ones(65)})],
-    "/near": [(BEGAN, {"level": 2, "name": "", "message": "", "hardware_id": "", "values": []})],
-    "/clock": [(BEGAN, {"clock": BEGAN})],
-}
+def words(new: New) -> Messages:
+    return {"/words": numbers(new, ["up"], kind="String")}
 
 
-def table(path: Path) -> Table:
-    (found,) = formats.bag(path) if path.is_dir() else formats.tables(path)
-    return found
+def mixed(new: New) -> Messages:
+    layout = new("std_msgs/MultiArrayLayout", [], 0)
+    return {
+        **stamped(new),
+        **words(new),
+        "/rig/pressure_bar": numbers(new, PRESSURE),
+        "/count": numbers(new, [k % 256 for k in range(30)], kind="UInt8"),
+        "/picture": [(BEGAN, new("std_msgs/Float64MultiArray", layout, np.ones(65)))],
+        "/near": [(BEGAN, new("diagnostic_msgs/DiagnosticStatus", 2, "", "", "", []))],
+        "/clock": [(BEGAN, new("rosgraph_msgs/Clock", time(new, BEGAN)))],
+    }
 
 
-def columns(found: Table) -> dict[str, tuple[list[float], list[float]]]:
+def samples(path: Path) -> dict[str, tuple[list[float], list[float]]]:
     """Return times and samples by header."""
     return {
-        column.header: (np.asarray(column.times).tolist(), np.asarray(column.values).tolist())
-        for column in found.columns
+        header: (np.asarray(column.times).tolist(), np.asarray(column.values).tolist())
+        for header, column in columns(path).items()
     }
 
 
@@ -136,66 +120,66 @@ def seconds(n: int, step: int = STEP, start: int = 0) -> list[float]:
 def test_columns_are_what_was_written_each_at_its_times(
     tmp_path: Path, kind: str, packed: str
 ) -> None:
-    path = bag(tmp_path / "run", kind, MIXED, packed)
+    path = bag(tmp_path / "run", kind, mixed, packed)
     path = path.rename(path.with_stem("50% #1?"))  # which are signs in addresses
-    one = table(path)
-    found = columns(one)
+    found = samples(path)
     assert found["/rig/pressure_bar/data"] == (seconds(40), PRESSURE)
     assert found["/count/data"] == (seconds(30), list(range(30)))
     for joint, scale in (("a", 0.1), ("b", 0.2)):
         expected = seconds(20, 2 * STEP, LATE), [scale * k for k in range(20)]
         assert found[f"/arm/position/{joint}"] == found[f"/arm/effort/{joint}"] == expected
     assert [each for each in found if "/near" in each] == ["/near/level"]  # constants are no fields
-    assert one.meta == {"time_source": "recording times"}  # as the pressure has no stamps
-    reasons = {"/words": "no numbers", "/picture/data": "array of 65", "/clock/clock": "a time"}
-    assert all(reason in one.unread[place] for place, reason in reasons.items())
-    assert {column.header: column.held for column in one.columns}["/count/data"]
+    assert {"/words", "/picture/data", "/clock/clock"} <= set(table(path).unread)
     if kind != "bag" and not packed:
         (alone,) = (each for each in path.iterdir() if each.suffix == f".{kind}")
-        assert columns(table(alone)) == found
-    (recording,) = mckibben.read(path, columns={"pressure": "/air/fluid_pressure"})
+        assert samples(alone) == found
+    recording = one(path, columns={"pressure": "/air/fluid_pressure"})
     assert recording["pressure"] == pytest.approx(6.0)  # in Pa, as the type of its messages has it
+    assert recording.meta["time_source"] == "recording times"  # as some have no stamps
     assert roles(tmp_path) == {"train": [path]}
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_stamps_are_the_times_where_all_topics_have_them(tmp_path: Path, kind: str) -> None:
-    found = table(bag(tmp_path / "run", kind, {**STAMPED, "/words": MIXED["/words"]}))
-    assert found.meta == {"time_source": "header stamps"}
-    times = {name: times for name, (times, _) in columns(found).items()}
-    assert times["/air/fluid_pressure"] == seconds(12)
-    assert times["/arm/position/a"] == seconds(20, 2 * STEP, LATE)  # the air's came first
+    path = bag(tmp_path / "run", kind, lambda new: {**stamped(new), **words(new)})
+    assert table(path).meta == {"time_source": "header stamps"}
+    found = samples(path)
+    assert found["/air/fluid_pressure"][0] == seconds(12)
+    assert found["/arm/position/a"][0] == seconds(20, 2 * STEP, LATE)  # the air's came first
+
+
+def change(path: Path, *statements: str) -> Path:
+    """Change a database, and return it."""
+    with closing(sqlite3.connect(path)) as base:
+        for statement in statements:
+            base.execute(statement)
+        base.commit()
+    return path
 
 
 def test_a_bag_cut_into_files_is_the_whole_one(tmp_path: Path) -> None:
-    whole, cut = (bag(tmp_path / name, "db3", MIXED) for name in ("whole", "cut"))
-    first = cut / "cut.db3"
-    second = cut / "cut_1.db3"
+    whole, cut = (bag(tmp_path / name, "db3", mixed) for name in ("whole", "cut"))
+    first, second = cut / "cut.db3", cut / "cut_1.db3"
     shutil.copy(first, second)
     about = (cut / "metadata.yaml").read_text()
     (cut / "metadata.yaml").write_text(about.replace("- cut.db3", "- cut.db3\n  - cut_1.db3"))
     for path, sign in ((first, ">="), (second, "<")):
         change(path, f"DELETE FROM messages WHERE timestamp {sign} {BEGAN + 11 * STEP}")
-    assert columns(table(cut)) == columns(table(whole))
-    packed = bag(tmp_path / "packed", "db3", MIXED, "FILE")
-    asked = {"angle": "/arm/position/a"}
-    (one,), (other,) = (mckibben.read(path, columns=asked) for path in (whole, packed))
-    assert np.array_equal(one["angle"], other["angle"])
-
-
-def change(path: Path, *statements: str) -> None:
-    with closing(sqlite3.connect(path)) as base:
-        for statement in statements:
-            base.execute(statement)
-        base.commit()
+    packed = bag(tmp_path / "packed", "db3", mixed, "FILE")
+    assert samples(cut) == samples(packed) == samples(whole)
 
 
 def database(folder: Path, *statements: str) -> Path:
     """Return the database of a bag with a pressure and a count, changed."""
-    messages = {"/rig/pressure_bar": numbers(PRESSURE), "/count": numbers(list(range(40)))}
-    path = bag(folder / "run", "db3", messages) / "run.db3"
-    change(path, *statements)
-    return path
+    path = bag(
+        folder / "run",
+        "db3",
+        lambda new: {
+            "/rig/pressure_bar": numbers(new, PRESSURE),
+            "/count": numbers(new, [*range(40)], kind="UInt8"),
+        },
+    )
+    return change(path / "run.db3", *statements)
 
 
 IDL = "module std_msgs { module msg { struct Float64 { double data; }; }; };"
@@ -221,11 +205,11 @@ OF_COUNT = "WHERE name = '/count'"
 def test_a_topic_is_read_or_listed_with_the_reason(
     tmp_path: Path, statements: list[str], reason: str
 ) -> None:
-    one = table(database(tmp_path, *statements))
-    found = columns(one)
+    path = database(tmp_path, *statements)
+    found = samples(path)
     assert found.pop("/rig/pressure_bar/data") == (seconds(40), PRESSURE)
     assert bool(found) is not bool(reason)
-    assert reason in one.unread.get("/count", "")
+    assert reason in table(path).unread.get("/count", "")
 
 
 ATTACKS = [
@@ -249,28 +233,17 @@ def test_code_in_definitions_is_never_run(tmp_path: Path, kind: str, text: str) 
         f"UPDATE message_definitions SET topic_type = '{kind}', encoded_message_definition = '{text}'",
     )
     try:
-        assert mckibben.read(path)
+        assert several(path)
     except DataError as error:
         assert error.file == path  # noqa: PT017
     assert not ran.exists()
 
 
-@pytest.mark.parametrize(
-    ("messages", "channel"),
-    [
-        (
-            {
-                "/rig/pressure_bar": numbers(PRESSURE),
-                "/force_N": numbers(PRESSURE, BEGAN + 10**10),
-            },
-            "pressure",
-        ),
-        ({"/words": MIXED["/words"]}, None),
-    ],
-    ids=["no common time", "no numbers"],
-)
-def test_what_cannot_be_read(tmp_path: Path, messages: Messages, channel: str | None) -> None:
-    path = bag(tmp_path / "run", "mcap", messages)
-    with pytest.raises(DataError) as caught:
-        mckibben.read(path)
-    assert (caught.value.file, caught.value.channel) == (path, channel)
+def apart(new: New) -> Messages:
+    late = numbers(new, PRESSURE, BEGAN + 10**10)
+    return {"/rig/pressure_bar": numbers(new, PRESSURE), "/force_N": late}
+
+
+@pytest.mark.parametrize(("content", "channel"), [(apart, "pressure"), (words, None)])
+def test_what_cannot_be_read(tmp_path: Path, content: Content, channel: str | None) -> None:
+    assert place(bag(tmp_path / "run", "mcap", content)) == (channel, None)

@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mckibben.files.headers import channel_of, parse
 from mckibben.files.names import CHANNELS, ROLES, words_of
+from mckibben.files.reading import columns_of
 from mckibben.files.units import RARE, SPELLINGS
+
+pytestmark = pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 
 FORMS = {
     "pressure_bar": ("pressure", "bar"), "Pressure (kPa)": ("pressure", "kPa"),
     "p [MPa]": ("pressure", "MPa"), "length/mm": ("length", "mm"), "force N": ("force", "N"),
-    "t (ms)": ("time", "ms"), "Timestamp": ("time", None), "valve_voltage_V": ("voltage", "V"),
-    "u": ("voltage", None), "y1_cm": ("y1", "cm"), "PRESSURE_BAR": ("pressure", "BAR"),
+    "t (ms)": ("time", "ms"), "Timestamp": ("time", ""), "valve_voltage_V": ("voltage", "V"),
+    "u": ("voltage", ""), "y1_cm": ("displacement_1", "cm"), "PRESSURE_BAR": ("pressure", "BAR"),
     "Weg [mm]": ("displacement", "mm"), "Länge in cm": ("length", "cm"),
-    "load (N)": ("force", "N"), "load [kg]": ("load", "kg"), "input_V": ("input", "V"),
-    "angle (°)": ("angle", "°"), "temperature_C": ("temperature", "C"), "x": ("x", None),
-    "TipPosition": ("tip_position", None), "f [Hz]": ("f", "Hz"),
+    "load (N)": ("force", "N"), "load [kg]": ("load", "kg"), "input_V": ("voltage", "V"),
+    "angle (°)": ("angle", "°"), "temperature_C": ("temperature", "C"), "x": ("x", ""),
+    "TipPosition": ("tip_position", ""), "f [Hz]": ("f", "Hz"),
     "position (V)": ("position", "V"),
     # languages
     "圧力 (kPa)": ("pressure", "kPa"), "圧力２（ｋＰａ）": ("pressure_2", "kPa"),
     "变形量/mm": ("displacement", "mm"), "变位（ｍｍ）": ("变位", "mm"),
     "時間[秒]": ("time", "秒"), "目標変位 (mm)": ("reference_displacement", "mm"),
-    "设定压力": ("command_pressure", None), "힘 (N)": ("force", "N"),
+    "设定压力": ("command_pressure", ""), "힘 (N)": ("force", "N"),
     "pression [bar]": ("pressure", "bar"), "forza N": ("force", "N"),
     "spostamento_mm": ("displacement", "mm"), "tiempo (s)": ("time", "s"),
     "posição_cm": ("displacement", "cm"), "consigne pression (bar)": ("command_pressure", "bar"),
     "ref_mm": ("reference_displacement", "mm"), "p_cmd_kPa": ("command_pressure", "kPa"),
-    "setpoint": ("reference_displacement", None), "目標圧力": ("command_pressure", None),
+    "setpoint": ("reference_displacement", ""), "目標圧力": ("command_pressure", ""),
     # references of pressures
     "pressure_barg": ("pressure", "barg"), "Pressure (bar(g))": ("pressure", "bar(g)"),
     "p [psia]": ("pressure", "psia"), "pressure kPa abs": ("pressure", "kPa abs"),
@@ -39,70 +45,77 @@ FORMS = {
     # units of several parts
     "velocity_mm_s": ("velocity", "mm_s"), "velocity/(mm/s)": ("velocity", "mm/s"),
     "speed_in/s": ("velocity", "in/s"), "velocity_m·s^-1": ("velocity", "m·s^-1"),
-    "flow_l/min": ("flow", "l/min"), "flow_Nl/min": ("flow_nl_min", None),
-    "flow_l_min": ("flow_l_min", None), "q_deg/s": ("q", "deg/s"), "q_deg_s": ("q", "deg_s"),
-    "rate_1/s": ("rate_1_s", None), "rate_bar/s": ("rate", "bar/s"),
+    "flow_l/min": ("flow", "l/min"), "flow_Nl/min": ("flow_nl_min", ""),
+    "flow_l_min": ("flow_l_min", ""), "q_deg/s": ("q", "deg/s"), "q_deg_s": ("q", "deg_s"),
+    "rate_1/s": ("rate_1_s", ""), "rate_bar/s": ("rate", "bar/s"),
     "torque_N*m": ("torque", "N*m"), "torque_N_m": ("torque", "N_m"),
     "Drehmoment [mN·m]": ("torque", "mN·m"), "k_N/mm": ("k", "N/mm"),
-    "gain_mm_per_bar": ("gain_mm_per_bar", None), "pressure_N/mm^2": ("pressure", "N/mm^2"),
+    "gain_mm_per_bar": ("gain_mm_per_bar", ""), "pressure_N/mm^2": ("pressure", "N/mm^2"),
     "p_kgf/cm2": ("pressure", "kgf/cm2"),
     # names that end like units, and units that do not suit
     "muscle_l/mm": ("muscle_l", "mm"), "muscle_l_mm": ("muscle_l", "mm"),
-    "rise_time/ms": ("rise_time", "ms"), "pressure_1/bar": ("pressure_1", "bar"),
-    "pressure_in/bar": ("pressure_in", "bar"), "pressure_in": ("pressure_in", None),
-    "pressure_A": ("pressure_a", None), "pressure_mm": ("pressure", "mm"),
-    "pressure [foo]": ("pressure", "foo"), "displacement_nm": ("displacement", "nm"),
-    "DISPLACEMENT_NM": ("displacement", "NM"), "displacement_amp": ("displacement", "amp"),
-    "pressure_counts": ("pressure", "counts"), "loop_count": ("loop_count", None),
-    "force_kg": ("force", "kg"), "pressure_mmHg": ("pressure", "mmHg"),
-    "contraction_%": ("contraction", "%"), "contraction [1]": ("contraction", "1"),
-    "contraction (mm)": ("displacement", "mm"),
+    "pressure_1/bar": ("pressure_1", "bar"), "pressure_in/bar": ("pressure_in", "bar"),
+    "pressure_in": ("pressure_in", ""), "pressure_A": ("pressure_a", ""),
+    "pressure_mm": ("pressure", "mm"), "pressure [foo]": ("pressure", "foo"),
+    "displacement_nm": ("displacement", "nm"), "DISPLACEMENT_NM": ("displacement", "NM"),
+    "displacement_amp": ("displacement", "amp"), "pressure_counts": ("pressure", "counts"),
+    "loop_count": ("loop_count", ""), "force_kg": ("force", "kg"),
+    "pressure_mmHg": ("pressure", "mmHg"), "contraction_%": ("contraction", "%"),
+    "contraction [1]": ("contraction", "1"), "contraction (mm)": ("displacement", "mm"),
     # numbers of several alike, and what is about a channel
-    "p1": ("pressure_1", None), "P1 [bar]": ("pressure_1", "bar"),
-    "pressure_2_bar": ("pressure_2", "bar"), "p0": ("pressure_0", None),
-    "current (1)": ("current_1", None), "current [2]": ("current_2", None),
+    "p1": ("pressure_1", ""), "P1 [bar]": ("pressure_1", "bar"),
+    "pressure_2_bar": ("pressure_2", "bar"), "p0": ("pressure_0", ""),
+    "current (1)": ("current_1", ""), "current [2]": ("current_2", ""),
     "pos (2) [mm]": ("displacement_2", "mm"), "pos [mm] (2)": ("displacement_2", "mm"),
-    "target pos (1)": ("reference_displacement_1", None),
+    "target pos (1)": ("reference_displacement_1", ""),
     "p0 (extensor) [bar]": ("pressure_extensor", "bar"),
     "extensor_pressure_kPa": ("pressure_extensor", "kPa"),
-    "pressure_model": ("pressure_model", None),
-    "pressure_variance": ("variance_of_pressure", None),
+    "pressure_model": ("pressure_model", ""), "pressure_variance": ("variance_of_pressure", ""),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("text", FORMS)
-def test_form(text: str) -> None:
-    header = parse(text)
-    assert (channel_of(header), header.unit) == FORMS[text]
+def seen(folder: Path, *headers: str) -> list[tuple[str, str]]:
+    """Return what channel and unit columns have, each the only one of a file but for a counter."""
+    path, found = folder / "a.parquet", []
+    for header in headers:
+        pq.write_table(pa.table({header: range(12), "counter": range(12)}), path)
+        first = columns_of(path)[0]
+        found.append((first.channel, first.unit))
+    return found
 
 
-def test_every_word_in_any_case_is_its_channel() -> None:
+@pytest.mark.parametrize("header", FORMS)
+def test_form(tmp_path: Path, header: str) -> None:
+    assert seen(tmp_path, header) == [FORMS[header]]
+
+
+def test_every_word_in_any_case_is_its_channel(tmp_path: Path) -> None:
     for word, channel in words_of(CHANNELS).items():
-        for text in (word, word.upper(), word.capitalize(), word.replace("_", " ")):
-            assert channel_of(parse(text)) == channel
+        forms = {word, word.upper(), word.capitalize(), word.replace("_", " ")}
+        assert {found for found, _ in seen(tmp_path, *forms)} == {channel}
 
 
 def test_no_word_has_two_meanings() -> None:
     words = [
         (word, meaning)
-        for table in (CHANNELS, ROLES)
-        for meaning, languages in table.items()
+        for names in (CHANNELS, ROLES)
+        for meaning, languages in names.items()
         for word in " ".join(languages.values()).split()
     ]
     assert len({word for word, _ in words}) == len(set(words))
 
 
 @pytest.mark.parametrize("form", ["{} ({})", "{} [{}]", "{}/{}", "{} in {}"])
-@pytest.mark.parametrize("table", [SPELLINGS, RARE])
-def test_every_spelling_of_a_unit_is_found_in_every_form(
-    form: str, table: dict[str, dict[str, str]]
-) -> None:
-    for spelling in " ".join(" ".join(units.values()) for units in table.values()).split():
-        if spelling != "1":  # which is the number of one of several alike, in brackets
-            header = parse(form.format("some thing", spelling))
-            assert (header.name, header.unit) == ("some thing", spelling)
+def test_every_spelling_of_a_unit_is_found_in_every_form(tmp_path: Path, form: str) -> None:
+    texts = [
+        text for known in (SPELLINGS, RARE) for units in known.values() for text in units.values()
+    ]
+    spellings = [spelling for spelling in " ".join(texts).split() if spelling != "1"]
+    found = seen(tmp_path, *(form.format("some thing", spelling) for spelling in spellings))
+    assert [unit for _, unit in found] == spellings  # but 1, the number of one of several alike
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(max_size=30))
-def test_any_text_is_some_header(text: str) -> None:
-    assert isinstance(channel_of(parse(text)), str)
+def test_any_text_is_some_header(tmp_path: Path, text: str) -> None:
+    assert seen(tmp_path, text)

@@ -1,9 +1,7 @@
-"""Impossible values, codes for missing samples, wraps, outliers, units; the condition of signals."""
+"""Choosing columns; missing samples, their codes, wraps, outliers; units; the condition of signals."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,236 +9,216 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import DataError, DataWarning, Recording
+from mckibben import DataError, Recording
 from mckibben.files.condition import condition, early, lag
 from mckibben.registry import load
+from tests.files.made import Cells, one, place, put, refused, several
 
 N = 400
-T = np.arange(N) / 50
+K = np.arange(N)
+T = K / 50
 P = 2.5 - 2.5 * np.cos(2 * np.pi * T / 4)
 Y = 6 * P + 2
 
-Put = Callable[..., Path]
+
+def table(folder: Path, header: str, *columns: Cells) -> Path:
+    """Write columns beside the times, by default a pressure and a length."""
+    return put(folder / "run.csv", f"t_s,{header}", T, *(columns or (P, Y)))
 
 
-@pytest.fixture
-def put(tmp_path: Path) -> Put:
-    """Write a file of three columns and return its path."""
-
-    def write(header: str, *columns: Sequence[Any], rows: Sequence[str] = ()) -> Path:
-        path = tmp_path / "run.csv"
-        lines = (",".join(f"{x:.10g}" for x in row) for row in zip(*columns, strict=True))
-        path.write_text("\n".join([header, *rows, *lines]) + "\n")
-        return path
-
-    return write
+def changed(samples: Any, at: Any, to: object) -> Any:
+    """Return samples of which some are another cell."""
+    other = samples.copy()
+    other[at] = to
+    return other
 
 
-def refused(path: Path, **options: Any) -> DataError:
-    with pytest.raises(DataError) as caught:
-        one(path, **options)
-    assert caught.value.remedy
-    return caught.value
+@pytest.mark.parametrize("name", ["P2 [kPa]", "P2", "p2", "p2 [KPA]"])
+def test_a_column_is_found_by_header_or_name(tmp_path: Path, name: str) -> None:
+    recording = one(table(tmp_path, "P1 [kPa],P2 [kPa]"), columns={"pressure": name})
+    assert recording["pressure"] == pytest.approx(Y / 100)
+    assert list(recording.channels) == ["pressure_1", "pressure"]
 
 
-def one(path: Path, **options: Any) -> Recording:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DataWarning)
-        (recording,) = mckibben.read(path, **options)
-    return recording
+def test_a_mapped_column_goes_before_an_alias(tmp_path: Path) -> None:
+    path = table(tmp_path, "position_mm,x_mm,displacement_mm", Y, P, Y)
+    recording = one(path, columns={"displacement": "x_mm"})
+    assert recording["displacement"].tolist() == P.tolist()
+    assert recording["position"].tolist() == Y.tolist()
+    assert recording.meta["ignored_columns"] == ["displacement_mm"]
 
 
-@pytest.mark.parametrize(
-    ("header", "columns", "channel", "unit", "gain"),
-    [
-        ("t_s,pressure_bar,x_mm", (T, 100 * P, Y), "pressure", "kPa", 1.0),
-        ("t_s,pressure_MPa,x_mm", (T, 100 * P, Y), "pressure", "kPa", 1.0),
-        ("t_s,pressure_bar,displacement_mm", (T, P, 1e3 * Y), "displacement", "um", 1.0),
-        ("t_s,pressure_bar,force_N", (T, P, 1e6 * Y), "force", "mN", 1e3),
-    ],
-)
-def test_impossible_values_are_refused_and_the_proposed_unit_is_read(
-    put: Put, header: str, columns: Any, channel: str, unit: str, gain: float
+# Samples that were not measured ---------------------------------------------------------------
+
+WORDS = ["OVER", "ERR", "0x1F", "1.2.3", "2.5 kPa", "#DIV/0!", "n.d."]
+MISSING = ["", "-", "--", "---", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL"]
+MISSING += ["None", "inf", "-inf", "∞", "+∞", "-∞", "OL", "OVLD"]
+
+
+@pytest.mark.parametrize("cell", WORDS + MISSING)
+@pytest.mark.parametrize("at", [0, 7, N - 1])
+@pytest.mark.parametrize("header", ["t_s,pressure_bar,x_mm", "count,pressure_bar,force_N"])
+def test_a_cell_without_a_number_is_refused_by_its_row(
+    tmp_path: Path, cell: str, at: int, header: str
 ) -> None:
-    path = put(header, *columns)
-    error = refused(path)
-    assert error.channel == channel
-    assert error.row is not None
-    assert f"--unit {channel}={unit}" in error.remedy
-    right = P if channel == "pressure" else Y
-    assert one(path, units={channel: unit})[channel] == pytest.approx(gain * right)
+    path = put(tmp_path / "a.csv", header, T, changed(P.astype(object), at, cell), Y)
+    for channels in (None, ["pressure"]):
+        error = refused(path, channels=channels)
+        assert (error.channel, error.row) == ("pressure", at + 2)
+        assert (cell if cell in WORDS else "1 of 400") in error.problem
+        assert cell in WORDS or "--gaps interpolate" in error.remedy
 
 
-@pytest.mark.parametrize("header", ["time,pressure_bar,x_mm", "Time,p_bar,x_mm"])
-def test_steps_of_many_seconds_ask_for_the_unit(put: Put, header: str) -> None:
-    path = put(header, 20 * np.arange(N), P, Y)
-    assert refused(path).channel == "time"
-    assert one(path, units={"time": "ms"}).sample_time == pytest.approx(0.02)
-    assert one(path, units={"time": "s"}).sample_time == 20
+def test_other_columns_with_such_cells_are_left_out(tmp_path: Path) -> None:
+    path = table(tmp_path, "a,b", changed(P.astype(object), 7, "n.d."), Y)
+    recording = one(path)
+    assert list(recording.channels) == ["b"]
+    assert any("'n.d.'" in note for note in recording.notes)
+    assert place(path, channels=["a"]) == ("a", 9)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_missing_samples_split(tmp_path: Path, timed: bool) -> None:
+    columns = changed(P, 15, np.nan), changed(Y, [16, 20], np.nan)
+    path = put(tmp_path / "run.csv", "pressure_bar,force_N", *columns)
+    if timed:
+        path = table(tmp_path, "pressure_bar,force_N", *columns)
+    first, second = several(path, gaps="split", rate=None if timed else 50)
+    assert first["pressure"].tolist() == P[:15].tolist()
+    assert second["force"].tolist() == Y[21:].tolist()
+    assert second.start_time == pytest.approx(T[21])
+    assert (first.name, second.name) == ("run[1]", "run[2]")
+    assert any("1 of 3 " in note for note in first.notes)
 
 
 @pytest.mark.parametrize("code", [-9999.0, 99999.0, 32767.0, 9.91e37, -9.9e37])
 @pytest.mark.parametrize("length", [1, 3, 40])
-def test_codes_are_missing_samples(put: Put, code: float, length: int) -> None:
-    y = Y.copy()
-    y[100 : 100 + length] = code
-    path = put("t_s,pressure_bar,displacement_mm", T, P, y)
-    error = refused(path)
-    assert (error.channel, error.row) == ("displacement", 102)
+def test_codes_are_missing_samples(tmp_path: Path, code: float, length: int) -> None:
+    holes = slice(100, 100 + length)
+    path = table(tmp_path, "pressure_bar,displacement_mm", P, changed(Y, holes, code))
+    assert place(path) == ("displacement", 102)
     recording = one(path, gaps="interpolate")
-    assert recording["displacement"].max() == Y.max()
-    assert recording.bridged.nonzero()[0].tolist() == list(range(100, 100 + length))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DataWarning)
-        assert len(mckibben.read(path, gaps="split")) == 2
-
-
-@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
-def test_zeros_are_codes_only_where_other_samples_exclude_them(put: Put) -> None:
-    dropped = Y + 40
-    dropped[[50, 51, 200, 201, 202]] = 0.0
-    assert refused(put("t_s,p_bar,length_mm", T, P, dropped)).row == 52
-    steps = 2.0 * ((np.arange(N) // 50) % 2) + (np.arange(N) // 100)
-    switched = np.where(T % 2 < 1, 0.0, 9999.0)
-    for legitimate in (steps, np.maximum(P - 2.0, 0.0), np.where(T < 1, 0.0, Y), switched):
-        assert len(one(put("t_s,p_bar,displacement_mm", T, P, legitimate))) == N
-
-
-@pytest.mark.parametrize("size", [2**8, 2**16])
-def test_wraps_of_counters_are_refused(put: Put, size: int) -> None:
-    counts = np.rint(Y / 30 * 2.5 * size)
-    path = put("t_s,p_bar,displacement_um", T, P, counts % size)
-    assert refused(path).channel == "displacement"
-    assert len(one(path, gaps="raw")) == N
-    assert len(one(put("t_s,p_bar,displacement_um", T, P, np.minimum(counts, size - 1)))) == N
-    about_zero = np.where(T < 7, np.arange(N) % 3 - 1, T > 7.9) % size
-    assert refused(put("t_s,p_bar,displacement_um", T, P, about_zero)).channel == "displacement"
-    valve = np.where(T % 2 < 1, size - 1, 0)
-    assert len(one(put("t_s,displacement_um,valve", T, counts / size, valve))) == N
-
-
-def test_a_time_counter_that_wraps_goes_on(put: Put) -> None:
-    ticks = (65000 + 20 * np.arange(N)) % 2**16
-    recording = one(put("time_ms,pressure_bar,x_mm", ticks, P, Y))
-    assert recording.sample_time == pytest.approx(0.02)
-    assert recording.duration == pytest.approx(0.02 * (N - 1))
-
-
-@pytest.mark.parametrize("length", [1, 3])
-def test_outliers_are_noted(put: Put, length: int) -> None:
-    y = Y.copy()
-    y[100 : 100 + length] = 100.0
-    path = put("t_s,pressure_bar,displacement_mm", T, P, y)
-    with pytest.warns(DataWarning, match="row 102"):
-        mckibben.read(path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        y[100 : 100 + 4] = 100.0  # lasts, and so was measured
-        mckibben.read(put("t_s,pressure_bar,displacement_mm", T, P, y))
+    expected = np.interp(K, np.delete(K, holes), np.delete(Y, holes))
+    assert recording["displacement"] == pytest.approx(expected)
+    assert recording.bridged.nonzero()[0].tolist() == K[holes].tolist()
+    assert len(several(path, gaps="split")) == 2
 
 
 @pytest.mark.parametrize(
-    ("row", "toml"), [("s,kPa,mm", ""), ("", '[channels.pressure]\nunit="kPa"\n')]
+    ("header", "columns", "row"),
+    [
+        ("p_bar,length_mm", (P, changed(Y + 40, [50, 51, 200, 201, 202], 0.0)), 52),
+        ("pressure_mbar,x_mm", (changed(400 * P + 20, [70, 150], -999.0), Y), 72),
+        ("p_bar,displacement_um", (P, np.rint(Y / 30 * 2.5 * 2**8) % 2**8), None),
+        ("p_bar,displacement_um", (P, np.rint(Y / 30 * 2.5 * 2**16) % 2**16), None),
+    ],
+    ids=["zeros", "codes", "8 bits", "16 bits"],
 )
-def test_units_that_contradict_each_other_are_refused(put: Put, row: str, toml: str) -> None:
-    path = put("t_s,pressure_bar,displacement_mm", T, P, Y, rows=[row] if row else [])
-    if toml:
-        path.with_name("channels.toml").write_text(toml)
-    assert refused(path).channel == "pressure"
-    assert one(path, units={"pressure": "bar"})["pressure"] == pytest.approx(P)
+def test_zeros_codes_and_wraps_are_refused(
+    tmp_path: Path, header: str, columns: Any, row: int | None
+) -> None:
+    error = refused(table(tmp_path, header, *columns))
+    assert str(error.channel) in header
+    assert row is None or error.row == row
 
 
-@pytest.mark.parametrize("unit", ["bara", "psia", "kPa abs", "bar(a)"])
-def test_absolute_pressure_is_noted_and_never_mixed(put: Put, unit: str) -> None:
-    with pytest.warns(DataWarning, match="absolute"):
-        (absolute,) = mckibben.read(put(f"t_s,p [{unit}],displacement_mm", T, P + 1, Y))
-    assert absolute.meta["pressure_reference"] == {"pressure": "absolute"}
-    gauge = one(put("t_s,p [barg],displacement_mm", T, P, Y))
-    assert gauge.meta["pressure_reference"] == {"pressure": "gauge"}
-    with pytest.raises(DataError) as caught:
-        mckibben.compare(absolute, gauge, models=["pi"], jobs=1)
-    assert caught.value.channel == "pressure"
+ON = (K + 25) % 50 < 42
+MOVED = np.where(ON, 20.0, 3.0) + 0.01 * np.random.default_rng(0).standard_normal(N)
+NOISY = np.where(ON, 4 + MOVED / 100, 0.0)
+LEGITIMATE: dict[str, tuple[str, *tuple[Cells, ...]]] = {
+    "steps": ("p_bar,displacement_mm", P, 2.0 * ((K // 50) % 2) + (K // 100)),
+    "a limit at zero": ("p_bar,displacement_mm", P, np.maximum(P - 2.0, 0.0)),
+    "zero at first": ("p_bar,displacement_mm", P, np.where(T < 1, 0.0, Y)),
+    "two levels": ("p_bar,displacement_mm", P, np.where(T % 2 < 1, 0.0, 9999.0)),
+    "three levels": ("p_bar,force_gf", P, np.array([200.0, 500.0, 999.0])[K * 3 // N]),
+    "a status": ("p_bar,x_mm,status", P, Y, np.where(T < 1, 0, 999)),
+    "8 bits": ("p_bar,displacement_um", P, np.minimum(np.rint(Y / 30 * 640), 2**8 - 1)),
+    "16 bits": ("p_bar,displacement_um", P, np.minimum(np.rint(Y / 30 * 163840), 2**16 - 1)),
+    "zeros at which another moves": ("pressure_bar,displacement_mm", NOISY, MOVED),
+}
 
 
-def test_what_is_calibrated_again_is_neither_absolute_nor_calibrated_twice(put: Put) -> None:
-    path = put("t_s,p [bara],displacement_mm", T, P + 1, Y)
-    again = path.with_name("again.csv")
-    mckibben.write(one(path, calibration={"displacement": (2.0, 0.0)}), again)
-    found = one(again, calibration={"pressure": (1.0, -1.0)}, units={"pressure": "bar"})
-    assert found["pressure"] == pytest.approx(P)
-    assert "pressure" not in found.meta["pressure_reference"]
-    assert set(found.meta["calibration"]) == {"pressure", "displacement"}
+@pytest.mark.parametrize("name", LEGITIMATE)
+def test_what_was_measured_is_read(tmp_path: Path, name: str) -> None:
+    recording = one(table(tmp_path, *LEGITIMATE[name]))
+    assert recording.n_samples == N
+    assert not recording.bridged.any()
 
 
-def test_flaws_of_columns_not_asked_for_do_not_matter(put: Put) -> None:
-    path = put(
-        "t_s,pressure_bar,displacement_mm,force_parsec,force 2_N,force_2_N", T, P, Y, P, P, P
-    )
-    assert refused(path).channel in ("force", "force_2")
-    asked = one(path, columns={"pressure": "pressure", "displacement": "displacement"})
-    assert {"pressure", "displacement"} <= set(asked.channels)
-    assert asked["displacement"].tolist() == pytest.approx(Y)
+@pytest.mark.parametrize("length", [1, 3, 4])
+def test_outliers_are_noted_unless_they_last(tmp_path: Path, length: int) -> None:
+    y = changed(Y, slice(100, 100 + length), 100.0)
+    notes = one(table(tmp_path, "pressure_bar,displacement_mm", P, y)).notes
+    assert any("row 102" in note for note in notes) == (length < 4)
 
 
-def test_bridged_samples_are_not_fitted(put: Put) -> None:
-    y = Y.copy()
-    y[150:190] = np.nan
-    path = put("t_s,pressure_bar,displacement_mm", T, P, y)
+def test_bridged_samples_are_not_fitted(tmp_path: Path) -> None:
+    y = changed(Y, slice(150, 190), np.nan)
+    path = table(tmp_path, "pressure_bar,displacement_mm", P, y)
     recording = one(path, gaps="interpolate")
     wrong = recording.with_channels(displacement=np.where(recording.bridged, 99.0, Y))
     block = load("estimators", "pi")().fit(wrong.slice(20, N)).model_
     assert block.simulate(recording)["displacement"][-50:] == pytest.approx(Y[-50:], abs=0.1)
 
 
-@pytest.mark.parametrize(
-    "header",
-    [
-        *("displacement_cm_filtered", "displacement cm 1", "displacement_ft_1", "displacement_adc"),
-        *("displacement_raw", "displacement_x_inc"),
-    ],
-)
-def test_a_unit_within_a_header_is_never_replaced_by_the_default(put: Put, header: str) -> None:
-    path = put(f"t_s,pressure_bar,{header}", T, P, Y)
-    columns = {"displacement": header}
-    assert refused(path, columns=columns).channel == "displacement"
-    assert one(path, columns=columns, units={"displacement": "cm"})["displacement"].max() > 300
+# Units and calibrations -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("header", "largest"),
-    [("pressure", 40.0), ("angle", 85.0), ("contraction", 22.0), ("displacement", 0.03)],
+    ("row", "toml"), [("s,kPa,mm", ""), ("", '[channels.pressure]\nunit="kPa"\n')]
 )
-def test_sizes_of_another_unit_are_asked_for(put: Put, header: str, largest: float) -> None:
-    path = put(f"t_s,x_mm,{header}", T, Y, largest * P / 5)
-    assert header in refused(path).remedy
+def test_units_that_contradict_each_other_are_refused(tmp_path: Path, row: str, toml: str) -> None:
+    path = table(tmp_path, f"pressure_bar,displacement_mm\n{row}".rstrip(), P, Y)
+    if toml:
+        path.with_name("channels.toml").write_text(toml)
+    assert refused(path).channel == "pressure"
+    assert one(path, units={"pressure": "bar"})["pressure"] == pytest.approx(P)
 
 
-@pytest.mark.parametrize("rest", [0.0, 3.0])
-def test_zeros_that_were_measured_are_read_raw(put: Put, rest: float) -> None:
-    on = (np.arange(N) + 25) % 50 < 42
-    noise = 0.01 * np.random.default_rng(0).standard_normal((2, N))
-    pressure, moved = np.where(on, 4 + noise[0], 0.0), np.where(on, 20.0 + noise[1], rest)
-    path = put("t_s,pressure_bar,displacement_mm", T, pressure, moved)
-    assert "--gaps raw" in refused(path).remedy
-    found = one(path, gaps="raw")
-    assert found["pressure"] == pytest.approx(pressure)
-    assert found["displacement"] == pytest.approx(moved)
+@pytest.mark.parametrize("after", ["_cm_filtered", " cm 1", "_ft_1", "_adc", "_raw", "_x_inc"])
+def test_a_unit_within_a_header_is_never_replaced_by_the_default(
+    tmp_path: Path, after: str
+) -> None:
+    named = {"displacement": f"displacement{after}"}
+    path = table(tmp_path, f"pressure_bar,displacement{after}")
+    assert refused(path, columns=named).channel == "displacement"
+    recording = one(path, columns=named, units={"displacement": "cm"})
+    assert recording["displacement"] == pytest.approx(10 * Y)
 
 
-def test_levels_are_no_codes(put: Put) -> None:
-    force = np.array([200.0, 500.0, 999.0])[np.arange(N) * 3 // N]
-    assert len(one(put("t_s,p_bar,force_gf", T, P, force))) == N
-    assert len(one(put("t_s,p_bar,x_mm,status", T, P, Y, np.where(T < 1, 0, 999)))) == N
-    within = 400 * P + 20
-    within[[70, 150]] = -999.0
-    assert refused(put("t_s,pressure_mbar,x_mm", T, within, Y)).row == 72
+ABSOLUTE = ["bara", "psia", "kPa abs", "bar(a)", "kPaA", "bar abs"]
 
 
-def test_a_calibration_is_of_the_column_that_is_described(put: Put) -> None:
-    path = put("t_s,pressure_bar,displacement_mm", T, P, Y)
-    toml = '[channels.pressure]\ncolumn="A0"\ngain=2.5\noffset=-0.5\nunit="bar"\n'
-    path.with_name("channels.toml").write_text(toml)
-    assert one(path)["pressure"] == pytest.approx(P)
+@pytest.mark.parametrize("unit", [*ABSOLUTE, "barg", "kPa(g)"])
+def test_absolute_pressure_is_noted_and_never_mixed(tmp_path: Path, unit: str) -> None:
+    absolute = unit in ABSOLUTE
+    recording = one(table(tmp_path, f"p [{unit}],displacement_mm", P + 1, Y))
+    assert recording.meta["pressure_reference"]["pressure"] == ("absolute" if absolute else "gauge")
+    assert any("absolute" in note for note in recording.notes) == absolute
+    if absolute:
+        gauge = one(table(tmp_path, "p [barg],displacement_mm"))
+        with pytest.raises(DataError) as caught:
+            mckibben.compare(recording, gauge, models=["pi"], jobs=1)
+        assert caught.value.channel == "pressure"
+
+
+def test_what_is_calibrated_again_is_neither_absolute_nor_calibrated_twice(tmp_path: Path) -> None:
+    path = table(tmp_path, "p [bara],displacement_mm", P + 1, Y)
+    again = path.with_name("again.csv")
+    mckibben.write(one(path, calibration={"displacement": (2.0, 0.0)}), again)
+    found = one(again, calibration={"pressure": (1.0, -1.0)}, units={"pressure": "bar"})
+    assert found["pressure"] == pytest.approx(P)
+    assert found["displacement"] == pytest.approx(2 * Y)
+    assert "pressure" not in found.meta["pressure_reference"]
+    assert set(found.meta["calibration"]) == {"pressure", "displacement"}
+
+
+def test_flaws_of_columns_not_asked_for_do_not_matter(tmp_path: Path) -> None:
+    header = "pressure_bar,displacement_mm,force_parsec,force 2_N,force_2_N"
+    path = table(tmp_path, header, P, Y, P, P, P)
+    assert refused(path).channel in ("force", "force_2")
+    asked = one(path, columns={"pressure": "pressure", "displacement": "displacement"})
+    assert asked["displacement"].tolist() == Y.tolist()
 
 
 # The condition of signals ------------------------------------------------------------------------
@@ -262,13 +240,9 @@ def test_an_early_output_is_compared_only_where_that_is_allowed() -> None:
     with pytest.raises(DataError) as caught:
         mckibben.compare(recording, models=["pi"], jobs=1)
     assert caught.value.channel == "displacement"
-    board = mckibben.compare(recording, models=["pi"], jobs=1, allow_early=True)
-    assert board.rows
+    assert mckibben.compare(recording, models=["pi"], jobs=1, allow_early=True).rows
 
 
 def test_condition_counts_what_is_saturated_and_stuck() -> None:
-    clipped = np.minimum(Y, 20.0)
-    assert condition(clipped)["saturated"] == pytest.approx(np.mean(Y >= 20), abs=0.01)
-    stuck = Y.copy()
-    stuck[110:170] = stuck[110]
-    assert condition(stuck)["stuck"] == 60
+    assert condition(np.minimum(Y, 20.0)).saturated == pytest.approx(np.mean(Y >= 20), abs=0.01)
+    assert condition(changed(Y, slice(110, 170), Y[110])).stuck == 60

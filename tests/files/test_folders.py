@@ -153,18 +153,22 @@ def test_a_gap_of_the_faster_channel_is_not_bridged_unasked(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("read", [several, roles])
-def test_files_that_may_belong_together_are_asked_about(tmp_path: Path, read: Any) -> None:
-    for name in ("1_pressure", "1_stroke", "2_pressure"):
-        signal(tmp_path / f"{name}.csv", T, P)
+@pytest.mark.parametrize("names", ["a b", "1_pressure 1_stroke 2_pressure"])
+def test_files_that_may_belong_together_are_asked_about(
+    tmp_path: Path, names: str, read: Any
+) -> None:
+    for name in names.split():
+        signal(tmp_path / f"{name}.csv", T, P, f"time_s,{name if name in 'ab' else 'value'}")
     with pytest.raises(DataError) as caught:
         read(tmp_path)
     assert "join = [" in caught.value.remedy
 
 
 def test_join_names_those_that_belong_together(tmp_path: Path) -> None:
+    dates = [f"2026-01-31 12:00:{t:05.2f}" for t in T]
     for run in (1, 2):
-        signal(tmp_path / f"{run}_pressure.csv", T, run * P, "time_s,value [bar]")
-        signal(tmp_path / f"{run}_stroke.csv", T, X, "time_s,value [mm]")
+        signal(tmp_path / f"{run}_pressure.csv", dates, run * P, "time,value [bar]")
+        signal(tmp_path / f"{run}_stroke.csv", dates, X, "time,value [mm]")
     (tmp_path / NAME).write_text('[[files]]\njoin = ["*_pressure.csv", "*_stroke.csv"]\n')
     first, second = several(tmp_path)
     assert second["pressure"].tolist() == (2 * first["pressure"]).tolist()

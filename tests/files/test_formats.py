@@ -186,15 +186,12 @@ def records(path: Path, content: list[Any]) -> Path:
     ids=["columns", "with units", "in meta", "records", "measured", "a rate"],
 )
 def test_json_of_columns(tmp_path: Path, content: Any, units: bool) -> None:
-    path = tmp_path / "a.jsonl"
-    if isinstance(content, dict):
-        path = tmp_path / "a.json"
-        path.write_text(json.dumps({**content, "load": 2.5, "note": "new"}))
-    else:
-        records(path, content)
+    whole = isinstance(content, dict)
+    lines = [{**content, "load": 2.5, "note": "new"}] if whole else content
+    path = records(tmp_path / ("a.json" if whole else "a.jsonl"), lines)
     recording = one(path, units={} if units else {"pressure": "kPa", "displacement": "cm"})
     check(recording)
-    if isinstance(content, dict):
+    if whole:
         assert (recording.meta["load"], recording.meta["note"]) == (2.5, "new")
     put(tmp_path / "run.csv", "t_s,p_bar", range(20), range(20))
     assert one(tmp_path).name == "run"  # as JSON beside recordings describes them

@@ -18,22 +18,17 @@ pytestmark = pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 
 FORMS = {
     "pressure_bar": ("pressure", "bar"), "Pressure (kPa)": ("pressure", "kPa"),
-    "p [MPa]": ("pressure", "MPa"), "length/mm": ("length", "mm"), "force N": ("force", "N"),
-    "t (ms)": ("time", "ms"), "Timestamp": ("time", ""), "valve_voltage_V": ("voltage", "V"),
+    "force N": ("force", "N"), "Timestamp": ("time", ""), "valve_voltage_V": ("voltage", "V"),
     "u": ("voltage", ""), "y1_cm": ("displacement_1", "cm"), "PRESSURE_BAR": ("pressure", "BAR"),
     "Weg [mm]": ("displacement", "mm"), "Länge in cm": ("length", "cm"),
     "load (N)": ("force", "N"), "load [kg]": ("load", "kg"), "input_V": ("voltage", "V"),
-    "angle (°)": ("angle", "°"), "temperature_C": ("temperature", "C"), "x": ("x", ""),
-    "TipPosition": ("tip_position", ""), "f [Hz]": ("f", "Hz"),
+    "temperature_C": ("temperature", "C"), "x": ("x", ""), "TipPosition": ("tip_position", ""),
     "position (V)": ("position", "V"),
     # languages
     "圧力 (kPa)": ("pressure", "kPa"), "圧力２（ｋＰａ）": ("pressure_2", "kPa"),
     "变形量/mm": ("displacement", "mm"), "变位（ｍｍ）": ("变位", "mm"),
     "時間[秒]": ("time", "秒"), "目標変位 (mm)": ("reference_displacement", "mm"),
-    "设定压力": ("command_pressure", ""), "힘 (N)": ("force", "N"),
-    "pression [bar]": ("pressure", "bar"), "forza N": ("force", "N"),
-    "spostamento_mm": ("displacement", "mm"), "tiempo (s)": ("time", "s"),
-    "posição_cm": ("displacement", "cm"), "consigne pression (bar)": ("command_pressure", "bar"),
+    "设定压力": ("command_pressure", ""), "consigne pression (bar)": ("command_pressure", "bar"),
     "ref_mm": ("reference_displacement", "mm"), "p_cmd_kPa": ("command_pressure", "kPa"),
     "setpoint": ("reference_displacement", ""), "目標圧力": ("command_pressure", ""),
     # references of pressures
@@ -47,9 +42,8 @@ FORMS = {
     "speed_in/s": ("velocity", "in/s"), "velocity_m·s^-1": ("velocity", "m·s^-1"),
     "flow_l/min": ("flow", "l/min"), "flow_Nl/min": ("flow_nl_min", ""),
     "flow_l_min": ("flow_l_min", ""), "q_deg/s": ("q", "deg/s"), "q_deg_s": ("q", "deg_s"),
-    "rate_1/s": ("rate_1_s", ""), "rate_bar/s": ("rate", "bar/s"),
-    "torque_N*m": ("torque", "N*m"), "torque_N_m": ("torque", "N_m"),
-    "Drehmoment [mN·m]": ("torque", "mN·m"), "k_N/mm": ("k", "N/mm"),
+    "rate_1/s": ("rate_1_s", ""), "rate_bar/s": ("rate", "bar/s"), "torque_N*m": ("torque", "N*m"),
+    "torque_N_m": ("torque", "N_m"), "k_N/mm": ("k", "N/mm"),
     "gain_mm_per_bar": ("gain_mm_per_bar", ""), "pressure_N/mm^2": ("pressure", "N/mm^2"),
     "p_kgf/cm2": ("pressure", "kgf/cm2"),
     # names that end like units, and units that do not suit

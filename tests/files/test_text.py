@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -115,9 +116,7 @@ def test_text_of_no_known_word_is_read_with_a_note(tmp_path: Path) -> None:
     assert any("cp1252" in note for note in recording.notes)
 
 
-def test_words_that_end_a_file_are_left_out_with_a_note_and_averages_refused(
-    tmp_path: Path,
-) -> None:
+def test_words_that_end_a_file_are_left_out_and_averages_refused(tmp_path: Path) -> None:
     recording = one(file(tmp_path, PLAIN + "\nEnd of file\n"))
     assert recording["pressure"].tolist() == P
     assert any("row 43" in note for note in recording.notes)
@@ -247,11 +246,7 @@ def labview(clocks: str, mark: str, separator: str) -> str:
     """Return a file of LabVIEW with one segment; its first sample has a comment."""
     named = {"\t": "Tab", ",": "Comma", ";": "Semicolon"}[separator]
     names = ["X_Value", "pressure", *(["X_Value"] if clocks == "Multi" else []), "disp", "Comment"]
-    cells: dict[str, tuple[Sequence[object], ...]] = {
-        "One": (T, P, X),
-        "Multi": (T, P, T, X),
-        "No": ([""] * N, P, X),
-    }
+    cells: dict[str, Any] = {"One": (T, P, X), "Multi": (T, P, T, X), "No": ([""] * N, P, X)}
     head = [
         *("LabVIEW Measurement|", f"Separator|{named}", f"Decimal_Separator|{mark}"),
         *(f"X_Columns|{clocks}", "Time_Pref|Relative", "***End_of_Header***|", "|"),

@@ -22,6 +22,7 @@ FACTORS = {
     "angle": {"deg": np.pi / 180, "°": np.pi / 180, "rev": 2 * np.pi, "rad": 1.0},
     "voltage": {"mV": 0.001, "V": 1.0},
     "velocity": {"m/s": 1000.0, "mm s^-1": 1.0, "cm/min": 1 / 6, "mm/s": 1.0},
+    "time": {"ms": 0.001, "min": 60.0, "h": 3600.0},
     "contraction": {"%": 0.01, "mm/mm": 1.0},
     "torque": {"Nm": 1.0, "mN·m": 0.001, "N*m": 1.0},
     "angular_velocity": {"rpm": np.pi / 30, "°/s": np.pi / 180, "rad/s": 1.0},
@@ -35,27 +36,18 @@ RIGHT = np.linspace(0.01, 0.3, 20)
 )
 def test_factor(tmp_path: Path, channel: str, unit: str) -> None:
     factor = FACTORS[channel][unit]
-    path = put(tmp_path / "a.csv", channel, (RIGHT if factor == 1 else RIGHT / factor))
-    found = one(path, units={channel: unit})[channel]
+    cells = RIGHT if factor == 1 else RIGHT / factor
+    recording = one(put(tmp_path / "a.csv", f"x,{channel}", RIGHT, cells), units={channel: unit})
+    found = recording.time if channel == "time" else recording[channel]
     assert found == pytest.approx(RIGHT)
     assert (found.tolist() == RIGHT.tolist()) or factor != 1  # what is converted to itself is equal
 
 
-@pytest.mark.parametrize(
-    ("channel", "unit", "gain", "zero"),
-    [
-        ("temperature", "K", 1, -273.15), ("temperature", "°F", 5 / 9, -160 / 9),
-        ("time", "ms", 0.001, 0), ("time", "min", 60, 0), ("time", "h", 3600, 0),
-    ],
-)  # fmt: skip
-def test_temperatures_and_times(
-    tmp_path: Path, channel: str, unit: str, gain: float, zero: float
-) -> None:
+@pytest.mark.parametrize(("unit", "gain", "zero"), [("K", 1, -273.15), ("°F", 5 / 9, -160 / 9)])
+def test_temperatures_have_an_offset(tmp_path: Path, unit: str, gain: float, zero: float) -> None:
     cells = 300 + np.arange(20)
-    path = put(tmp_path / "a.csv", f"x,{channel}", RIGHT, cells)
-    recording = one(path, units={channel: unit})
-    found = recording.time if channel == "time" else recording[channel]
-    assert found == pytest.approx(gain * cells + zero)
+    found = one(put(tmp_path / "a.csv", "temperature", cells), units={"temperature": unit})
+    assert found["temperature"] == pytest.approx(gain * cells + zero)
 
 
 NONE = ["foo", "NM", "9**9**9", "10^10^10", "__import__", "bar;", "a" * 1000, "(", "1e9"]

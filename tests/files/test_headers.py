@@ -36,7 +36,7 @@ FORMS = {
     "p [psia]": ("pressure", "psia"), "pressure kPa abs": ("pressure", "kPa abs"),
     "Druck kPaA": ("pressure", "kPaA"), "pressure_bar_abs": ("pressure", "bar_abs"),
     "p_abs [bar]": ("pressure", "bar abs"), "gauge pressure (kPa)": ("pressure", "kPa gauge"),
-    "absolute pressure [barg]": ("absolute_pressure", "barg"), "p_abs": ("p_abs", None),
+    "absolute pressure [barg]": ("absolute_pressure", "barg"), "p_abs": ("p_abs", ""),
     # units of several parts
     "velocity_mm_s": ("velocity", "mm_s"), "velocity/(mm/s)": ("velocity", "mm/s"),
     "speed_in/s": ("velocity", "in/s"), "velocity_m·s^-1": ("velocity", "m·s^-1"),

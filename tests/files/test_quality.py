@@ -134,7 +134,6 @@ LEGITIMATE: dict[str, tuple[str, *tuple[Cells, ...]]] = {
     "a status": ("p_bar,x_mm,status", P, Y, np.where(T < 1, 0, 999)),
     "8 bits": ("p_bar,displacement_um", P, np.minimum(np.rint(Y / 30 * 640), 2**8 - 1)),
     "16 bits": ("p_bar,displacement_um", P, np.minimum(np.rint(Y / 30 * 163840), 2**16 - 1)),
-    "zeros at which another moves": ("pressure_bar,displacement_mm", NOISY, MOVED),
 }
 
 
@@ -143,6 +142,24 @@ def test_what_was_measured_is_read(tmp_path: Path, name: str) -> None:
     recording = one(table(tmp_path, *LEGITIMATE[name]))
     assert recording.n_samples == N
     assert not recording.bridged.any()
+
+
+def test_zeros_that_were_measured_are_read_raw(tmp_path: Path) -> None:
+    path = table(tmp_path, "pressure_bar,displacement_mm", NOISY, MOVED)
+    assert "--gaps raw" in refused(path).remedy
+    recording = one(path, gaps="raw")
+    assert recording["pressure"] == pytest.approx(NOISY)
+    assert recording["displacement"] == pytest.approx(MOVED)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.05])
+def test_lost_rows_do_not_change_the_sample_time(tmp_path: Path, jitter: float) -> None:
+    time = T + jitter * 0.02 * np.random.default_rng(0).standard_normal(N)
+    kept = np.delete(K, [50, 51, 200, 310])
+    cells = "\n".join(f"{time[k]:.6f},{P[k]:.4f},{Y[k]:.4f}" for k in kept)
+    path = tmp_path / "run.csv"
+    path.write_text(f"time_s,pressure_bar,displacement_mm\n{cells}\n")
+    assert one(path, gaps="interpolate").sample_time == pytest.approx(T[1] - T[0], rel=1e-4)
 
 
 @pytest.mark.parametrize("length", [1, 3, 4])
@@ -244,5 +261,5 @@ def test_an_early_output_is_compared_only_where_that_is_allowed() -> None:
 
 
 def test_condition_counts_what_is_saturated_and_stuck() -> None:
-    assert condition(np.minimum(Y, 20.0)).saturated == pytest.approx(np.mean(Y >= 20), abs=0.01)
-    assert condition(changed(Y, slice(110, 170), Y[110])).stuck == 60
+    assert condition(np.minimum(Y, 20.0))["saturated"] == pytest.approx(np.mean(Y >= 20), abs=0.01)
+    assert condition(changed(Y, slice(110, 170), Y[110]))["stuck"] == 60

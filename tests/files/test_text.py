@@ -53,6 +53,7 @@ def tables(draw: st.DrawFn) -> tuple[bytes, list[str], list[list[float]]]:
     return text.encode(coding), names, samples
 
 
+@pytest.mark.filterwarnings("ignore:.*lines are left out")
 @settings(deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
 @given(tables())
 def test_a_table_in_any_form_is_read_to_the_last_bit(
@@ -190,7 +191,7 @@ def test_marks_of_thousands_are_not_read_as_anything(
     if mark == "." and more:  # every number has three digits after the mark: decimals
         recording = one(file(tmp_path, content))
         assert recording["pressure"] == pytest.approx((np.array(SIZES) + more) / 1e6)
-        assert any("'pressure (mbar)'" in note for note in recording.notes)
+        assert not recording.notes  # the column of times shows which mark is of decimals
     else:
         assert place(file(tmp_path, content)) == ("pressure", 2 if more else 12)
 

@@ -7,8 +7,8 @@ let nothing but names and numbers into that.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import partial
 from io import BufferedReader
@@ -73,13 +73,14 @@ class _Topic:
         # differences of whole numbers: floats of seconds since 1970 are 0.2 us apart
         instants = np.array(self.stamps if by_stamp else self.recorded, dtype=np.int64)
         times = (instants - began) / 1e9
-        of_topic = self.name.rpartition("/")[2]
         for header, (at, values) in self.columns.items():
             place = header.removeprefix(f"/{self.name.strip('/')}/")
-            unit, last = _UNITS.get(self.kind, {}).get(place), place.rpartition("/")[2]
-            words = [of_topic] if last in ("data", "value") or unit == "Pa" else [last]
-            words += ["pressure"] if unit == "Pa" else []
-            says = next(filter(_is_standard, words), _indexed(header))
+            unit, word = _UNITS.get(self.kind, {}).get(place), place.rpartition("/")[2]
+            if word in ("data", "value") or unit == "Pa":
+                word = self.name.rpartition("/")[2]
+            says = "pressure" if unit == "Pa" else _indexed(header)
+            if is_standard(word) and not is_time(word):
+                says = word
             samples, held = np.array(values, dtype=np.float64), not isinstance(values[0], float)
             yield Column(header, samples, unit, says=says, times=times[at], held=held)
 
@@ -101,10 +102,8 @@ def folder(path: Path) -> list[Table]:
             file=path,
             remedy="mend it with rosbag reindex, ros2 bag reindex or mcap recover, or record it again",
         ) from None
-    try:
+    with closing(reader):
         topics, unread = _topics(reader)
-    finally:
-        reader.close()
     if not topics:
         raise DataError(
             f"no topic in it has numbers that can be read; its topics are {listed([*unread], 10)}",
@@ -114,15 +113,12 @@ def folder(path: Path) -> list[Table]:
     by_stamp = all(min(topic.stamps) > 0 for topic in topics)
     began = min(min(topic.stamps if by_stamp else topic.recorded) for topic in topics)
     columns = [column for topic in topics for column in topic.timed(began, by_stamp)]
-    channels = Counter(channel_of(parse(column.label)) for column in columns)
-    distinct = (  # the caller has to choose among several of one channel
-        column
-        if channels[channel_of(parse(column.label))] == 1
-        else replace(column, says=_indexed(column.header))
-        for column in columns
-    )
+    channels = [channel_of(parse(column.label)) for column in columns]
+    for i, column in enumerate(columns):  # the caller has to choose among several of one channel
+        if channels.count(channels[i]) > 1:
+            columns[i] = replace(column, says=_indexed(column.header))
     source = "header stamps" if by_stamp else "recording times"
-    return [Table(tuple(distinct), meta={"time_source": source}, unread=unread)]
+    return [Table(tuple(columns), meta={"time_source": source}, unread=unread)]
 
 
 def _reader(path: Path) -> Any:
@@ -134,13 +130,12 @@ def _reader(path: Path) -> Any:
         """Return the reader of a database; for SQLite, # % ? are signs in its address."""
         return Sqlite3Reader(Path(quote(str(at), safe="/\\:")))
 
-    storages = rosbag2.Reader.STORAGE_PLUGINS
+    readers: dict[str, Any] = {**rosbag2.Reader.STORAGE_PLUGINS, ".bag": rosbag1.Reader}
     if path.is_dir():
-        found: Any = storages["dir"](path)
+        found = readers["dir"](path)
         found.STORAGE_PLUGINS = {**found.STORAGE_PLUGINS, "sqlite3": database}
         return found
-    readers: dict[str, Any] = {".bag": rosbag1.Reader, ".db3": database, ".mcap": storages[".mcap"]}
-    return readers[path.suffix.casefold()](path)
+    return (readers | {".db3": database})[path.suffix.casefold()](path)
 
 
 def _topics(reader: Any) -> tuple[list[_Topic], dict[str, str]]:
@@ -219,10 +214,6 @@ def _numbers(
 
 def _is_instant(value: Any) -> bool:
     return getattr(value, "__msgtype__", "").startswith("builtin_interfaces/msg/")
-
-
-def _is_standard(word: str) -> bool:
-    return is_standard(word) and not is_time(word)
 
 
 def _indexed(header: str) -> str:

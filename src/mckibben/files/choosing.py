@@ -142,6 +142,7 @@ def find_column(wanted: str, channel: str, source: Source) -> Column:
         lambda column: column.header.casefold().strip() == wanted.casefold().strip(),
         lambda column: snake_case(parse(column.header).name) == snake_case(wanted),
         lambda column: column.label == wanted,
+        lambda column: column.place == wanted,
     )
     for reading in readings:
         matches = [column for column in table.columns if reading(column)]
@@ -162,7 +163,7 @@ def find_column(wanted: str, channel: str, source: Source) -> Column:
 
 def matrix_hint(table: Table, *, time: bool) -> str:
     """Return what to add to a remedy where columns are those of a matrix, whose names mean nothing."""
-    columns = [column for column in table.columns if column.matrix is not None]
+    columns = [column for column in table.columns if column.matrix]
     if not columns:
         return ""
     hint = f", one of {listed([column.header for column in columns])}"

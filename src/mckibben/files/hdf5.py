@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mckibben.errors import DataError
 from mckibben.files import tree
 from mckibben.files.table import Table, plain_meta
-from mckibben.files.tree import ATTRIBUTES, Node, Unread
+from mckibben.files.tree import INFO, Node, Unread
 from mckibben.system.extras import demand
 
 _PACKING = {"scale_factor": 1.0, "add_offset": 0.0}
@@ -53,7 +53,6 @@ class _Tree:
 
         self._seen.add(h5py.h5o.get_info(group.id).addr)
         found: dict[str, Node] = {}
-        units: dict[str, Node] = {}
         for name in group:
             link = group.get(name, getlink=True)
             if isinstance(link, h5py.ExternalLink):
@@ -67,8 +66,9 @@ class _Tree:
                 found[name] = self._node(item)
                 about = {key.casefold(): each for key, each in _attributes(item).items()}
                 unit = about.get("unit") or about.get("units")
-                units |= {name: unit} if isinstance(unit, str) else {}
-        return found | {ATTRIBUTES: units}
+                if isinstance(unit, str) and name + INFO not in group:
+                    found[name + INFO] = {"unit": unit}
+        return found
 
     def _node(self, item: Any) -> Node:
         import h5py
@@ -101,10 +101,10 @@ class _Tree:
                 file=self._path,
                 remedy="save all samples in this file",
             )
-        about = _attributes(data)
-        kind = about.get("MATLAB_class") if self._matlab else None
         if data.shape is None or "MATLAB_empty" in data.attrs:
             return ""
+        about = _attributes(data)
+        kind = about.get("MATLAB_class") if self._matlab else None
         if "MATLAB_object_decode" in data.attrs:
             return Unread(f"an object of class {kind}")
         if h5py.check_string_dtype(data.dtype) is not None:
@@ -120,10 +120,12 @@ class _Tree:
             return texts[0] if len(texts) == 1 else texts
         samples = _fields(np.asarray(data[()]))
         packed = {name: about.get(name, "") for name in _PACKING if name in data.attrs}
-        if not packed or isinstance(samples, list):
+        if not packed or not isinstance(samples, np.ndarray):
             return samples
-        words = any(isinstance(number, str) for number in packed.values())
-        if words or not isinstance(samples, np.ndarray) or samples.dtype.kind not in "iuf":
+        if (
+            any(isinstance(number, str) for number in packed.values())
+            or samples.dtype.kind not in "iuf"
+        ):
             return Unread("packed by a scale_factor or add_offset that is no number")
         gain, offset = (float(packed.get(name, one)) for name, one in _PACKING.items())
         return np.asarray(samples * gain + offset)

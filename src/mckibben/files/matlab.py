@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import struct
-import warnings
 import zlib
+from collections.abc import Iterable, Iterator
 from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import Any
@@ -29,50 +29,49 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     if file.peek(10).startswith((b"MATLAB 7.3", b"\x89HDF")):
         return hdf5.read(file, path)
     data = file.read()
-    _refuse_unknown_types(data)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        variables: dict[str, Any] = loadmat(BytesIO(data))  # type: ignore[arg-type]  # the stubs take no files
-    # SciPy names all objects "None", and returns the last of one name
-    doubled = [each for each in caught if str(each.message).startswith("Duplicate variable name")]
-    objects = sum('"None"' in str(each.message) for each in doubled)
-    if objects < len(doubled):
-        raise ValueError("two variables have one name")
+    if data[126:128] not in (b"IM", b"MI"):  # version 4
+        parts: Iterable[bytes] = [data]
+    else:  # each variable alone, as SciPy returns the last of one name, and objects have none there
+        elements = _checked(data[128:], "<" if data[126:128] == b"IM" else ">")
+        parts = (data[:128] + element for element in elements)
     found: dict[str, Node] = {}
-    for name, value in variables.items():
+    variables = (loadmat(BytesIO(part)) for part in parts)  # type: ignore[arg-type]  # stubs without files
+    for name, value in (item for each in variables for item in each.items()):
         if isinstance(value, MatlabOpaque):
             last = value.reshape(-1)[0]
-            kind = f"an object of class {last['s2'].decode('latin-1')}"
-            more = f", and {objects} more object(s)" if objects else ""
-            found[last["s0"].decode("latin-1")] = Unread(kind + more)
-        elif not name.startswith("__"):  # a str is SciPy's reason why it cannot read a variable
-            found[name] = Unread(value) if isinstance(value, str) else _node(value)
+            name, kind = (last[field].decode("latin-1") for field in ("s0", "s2"))
+            node: Node = Unread(f"an object of class {kind}")
+        elif name.startswith("__"):
+            continue
+        else:  # a str is SciPy's reason why it cannot read a variable
+            node = Unread(value) if isinstance(value, str) else _node(value)
+        if name in found:
+            raise ValueError("two variables have one name")
+        found[name] = node
     return [tree.table(found, path)]
 
 
-def _refuse_unknown_types(data: bytes) -> None:
-    """Refuse version 5 with elements of unknown types, by which SciPy indexes a C array unchecked.
+def _checked(data: bytes, order: str) -> Iterator[bytes]:
+    """Yield the elements of version 5, unless one in them has an unknown type.
 
-    A received file could make it follow a pointer of its choice; see scipy/scipy#25829.
+    SciPy indexes a C array by the type unchecked, so that a received file could make it follow a pointer
+    of its choice; see scipy/scipy#25829.
     """
-    order = "<" if data[126:128] == b"IM" else ">"
-    if data[126:128] not in (b"IM", b"MI"):
-        return  # version 4, which has no such elements
-    waiting = [(memoryview(data), 128)]
-    while waiting:
-        content, at = waiting.pop()
-        while at + 8 <= len(content):
-            kind, size = struct.unpack_from(f"{order}II", content, at)
-            start, at = at + 8, at + 8 + size + (-size % 8 if kind != _COMPRESSED else 0)
-            if kind >> 16:  # a small element, whose few bytes are in its tag
-                kind, size, at = kind & 0xFFFF, 0, start
-            if kind not in _TYPES:
-                raise ValueError(f"it has an element of the unknown type {kind}")
-            inside = content[start : start + size]
-            if kind == _COMPRESSED:
-                waiting.append((memoryview(zlib.decompressobj().decompress(inside)), 0))
-            elif kind == _MATRIX:
-                waiting.append((inside, 0))
+    at = 0
+    while at < len(data):
+        kind, size = struct.unpack_from(f"{order}II", data, at)
+        start, end = at + 8, at + 8 + size + (-size % 8 if kind != _COMPRESSED else 0)
+        if kind >> 16:  # a small element, whose few bytes are in its tag
+            kind, size, end = kind & 0xFFFF, 0, start
+        if kind not in _TYPES:
+            raise ValueError(f"it has an element of the unknown type {kind}")
+        inside = data[start : start + size]
+        if kind == _COMPRESSED:
+            inside = zlib.decompressobj().decompress(inside)
+        if kind in (_MATRIX, _COMPRESSED):
+            list(_checked(inside, order))
+        yield data[at:end]
+        at = end
 
 
 def _node(value: Any) -> Node:

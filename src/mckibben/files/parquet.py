@@ -24,6 +24,7 @@ _KEY = b"mckibben"
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the one table of a Parquet file: its numbers, times and text."""
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
     frame = pq.ParquetFile(file).read()
@@ -33,12 +34,19 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         return [described]
     columns: list[Column] = []
     unread: dict[str, str] = {}
-    for field, cells in zip(frame.schema, frame.columns, strict=True):
-        found = _column(field.name, cells)
-        if found is None:
-            unread[field.name] = f"a column of type {field.type}"
+    is_a = pa.types
+    for name, cells in zip(frame.column_names, frame.columns, strict=True):
+        if is_a.is_dictionary(cells.type):
+            cells = cells.cast(cells.type.value_type)
+        kind = cells.type
+        if is_a.is_string(kind) or is_a.is_large_string(kind) or is_a.is_string_view(kind):
+            columns.append(Column(name, None, texts=[text or "" for text in cells.to_pylist()]))
+        elif is_a.is_boolean(kind) or is_a.is_decimal(kind):
+            columns.append(column(name, cells.cast(pa.float64()).to_numpy()))
+        elif is_a.is_integer(kind) or is_a.is_floating(kind) or is_a.is_temporal(kind):
+            columns.append(column(name, cells.to_numpy()))
         else:
-            columns.append(found)
+            unread[name] = f"a column of type {kind}"
     if not columns:
         raise without_numbers(unread, path)
     return [Table(tuple(columns), unread=unread)]
@@ -69,23 +77,6 @@ def _own(frame: Any, text: bytes, path: Path) -> Table | None:
                 return description.table(values)
     warn(path, f"{problem}; it is ignored, and units are taken from the names of the columns")
     return None
-
-
-def _column(name: str, cells: Any) -> Column | None:
-    """Return a column of numbers, times or text, or None if it is of another type."""
-    import pyarrow as pa
-
-    is_a = pa.types
-    if is_a.is_dictionary(cells.type):
-        cells = cells.cast(cells.type.value_type)
-    kind = cells.type
-    if is_a.is_string(kind) or is_a.is_large_string(kind) or is_a.is_string_view(kind):
-        return Column(name, None, texts=[text or "" for text in cells.to_pylist()])
-    if is_a.is_boolean(kind) or is_a.is_decimal(kind):
-        cells = cells.cast(pa.float64())
-    elif not (is_a.is_integer(kind) or is_a.is_floating(kind) or is_a.is_temporal(kind)):
-        return None
-    return column(name, cells.to_numpy())
 
 
 def _samples(channels: Any) -> bytes:

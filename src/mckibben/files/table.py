@@ -61,8 +61,10 @@ class Column:
         Times of the samples [s], where not all columns were sampled together.
     held : bool
         Whether the last sample holds until the next, as with counts and switches.
-    matrix : str, optional
-        The place of the matrix that it is a column of.
+    place : str, optional
+        The names that lead to it in the file, where the header is less.
+    matrix : bool
+        Whether it is a column of a matrix, whose names mean nothing.
     """
 
     header: str
@@ -73,7 +75,8 @@ class Column:
     says: str | None = None
     times: Array | None = None
     held: bool = False
-    matrix: str | None = None
+    place: str | None = None
+    matrix: bool = False
 
     @property
     def label(self) -> str:
@@ -182,7 +185,7 @@ def printable(table: Table) -> Table:
             header=plain(column.header),
             unit=column.unit and plain(column.unit),
             says=column.says and plain(column.says),
-            matrix=column.matrix and plain(column.matrix),
+            place=column.place and plain(column.place),
         )
         for column in table.columns
     )

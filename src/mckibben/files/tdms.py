@@ -44,22 +44,16 @@ def _table(group: Any, meta: Mapping[str, Any], name: str | None) -> Table:
     clocks: dict[str, tuple[float, float, Any]] = {}
     unread: dict[str, str] = {}
     for channel in group.channels():
-        place, kind = channel.name, channel.dtype.kind
+        place, kind, about = channel.name, channel.dtype.kind, channel.properties
         if not len(channel):
             unread[place] = "no samples"
         elif kind not in "biufmM" and not is_time(place):
             unread[place] = "complex numbers" if kind == "c" else "text"
         else:
-            columns[place] = column(
-                place, channel[:], channel.properties.get("unit_string") or None
-            )
-            step = channel.properties.get("wf_increment")
+            columns[place] = column(place, channel[:], about.get("unit_string") or None)
+            step, offset = about.get("wf_increment"), about.get("wf_start_offset", 0.0)
             if isinstance(step, (int, float)) and 0 < step < math.inf:
-                clocks[place] = (
-                    float(step),
-                    float(channel.properties.get("wf_start_offset", 0.0)),
-                    channel.properties.get("wf_start_time"),
-                )
+                clocks[place] = (float(step), float(offset), about.get("wf_start_time"))
     meta = {**meta, **plain_meta(group.properties)}
     if len(set(clocks.values())) <= 1:
         step, offset, _ = next(iter(clocks.values()), (None, 0.0, None))

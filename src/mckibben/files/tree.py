@@ -1,15 +1,17 @@
 """The vectors in a tree of groups, as MATLAB, Simulink, dSPACE, HDF5 and JSON files hold them.
 
 Readers make a plain tree of a file: groups and structs are dicts, struct arrays and cells are lists,
-numbers are arrays, text is str or a list of it. What follows is where those programs put signals, their
-names, their units and their times in such a tree.
+numbers are arrays, text is str or a list of it. Each array of numbers is a vector, or a matrix of a few,
+at its place: the names that lead to it. A text called ``name`` or ``unit`` describes the group that it
+is in, a text in a group beside (``units.p``) what has its name, and the time of a vector is the nearest
+above it that has as many samples.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -26,16 +28,16 @@ from mckibben.files.table import Column, Table, column, is_matrix
 from mckibben.files.units import convert, find
 
 DATA = {"data", "samples", "signal", "value", "values", "y"}
-"""Fields with the samples of a struct that is one signal: the only one of their length but times."""
+"""Fields with the samples of a struct that is one signal: its only vector of their length but times."""
 
 NAMES = {"name", "names", "label", "labels", "channels", "columns", "headers"}
 """Fields with the name of such a signal, or with those of the columns of a matrix."""
 
 UNITS = {"unit", "units"}
-"""Fields with the unit of such a signal, or with those of the vectors beside it."""
+"""Fields with the unit of such a signal, or with those of ``NAMES``."""
 
-ATTRIBUTES = ""
-"""Entry of a group that maps the names of its vectors to their units, if these are attributes."""
+INFO = "Info"
+"""Ending of a group that describes what is beside it, as ``DataInfo`` does ``Data``."""
 
 
 @dataclass(frozen=True)
@@ -46,36 +48,11 @@ class Unread:
 
 
 Node: TypeAlias = "Mapping[str, Node] | Sequence[Node] | NDArray[Any] | str | Unread"
-Group: TypeAlias = Mapping[str, Node]
-
-
-@dataclass(frozen=True)
-class _Vector:
-    """A vector or a column of a matrix, and what is written about it.
-
-    Its ``home`` are the groups around it: it shares the times in the innermost that has some. Its
-    ``name`` is that of the channel, its ``header`` what a user calls it where that is unique.
-    """
-
-    place: str
-    home: tuple[str, ...]
-    name: str
-    header: str
-    values: NDArray[Any]
-    unit: str | None
-    matrix: str | None = None
-
-    @property
-    def seconds(self) -> Array | None:
-        """The samples [s], if these are times."""
-        unit = find(self.unit or parse(self.name).unit or "s")
-        if not is_time(self.name) or unit is None or unit.target != "s":
-            return None
-        return convert(np.asarray(self.values, dtype=np.float64), unit.name, "s")
+Place: TypeAlias = tuple[str, ...]
 
 
 def table(
-    tree: Group, path: Path, *, dot: str = ".", meta: Mapping[str, Any] | None = None
+    tree: Mapping[str, Node], path: Path, *, dot: str = ".", meta: Mapping[str, Any] | None = None
 ) -> Table:
     """Return the table of the vectors in a tree.
 
@@ -89,23 +66,54 @@ def table(
     meta : mapping, optional
         What else the file holds.
     """
-    walk = _Walk(dot)
-    walk.group(tree, ())
-    unread, texts = walk.unread, walk.texts
-    vectors, times = _clocks([walk.with_unit(each) for each in walk.vectors])
-    if times:
-        without = sorted(each.place for each in vectors if each.place not in times)
-        unread |= dict.fromkeys(without, "it has no times, and others have their own")
-        vectors = [each for each in vectors if each.place in times]
-    lengths = set() if times else {each.values.size for each in vectors}
-    unread |= {place: "text" for place, lines in texts.items() if len(lines) not in lengths}
-    if not vectors:
+    leaves = dict(_leaves(tree, ()))
+    unread: dict[str, str] = {}
+    arrays: dict[Place, NDArray[Any]] = {}
+    rates: dict[str, float] = {}
+    for place, leaf in leaves.items():
+        where = dot.join(place)
+        if isinstance(leaf, Unread):
+            unread[where] = leaf.reason
+        if not isinstance(leaf, np.ndarray) or not leaf.size:
+            continue
+        values = np.squeeze(leaf)
+        if values.ndim == 0:
+            if values.dtype.kind in "biuf" and timebase.is_rate(place[-1]):
+                rates[where] = float(values)
+        elif values.dtype.kind not in "biuf":
+            complex_ = values.dtype.kind == "c"
+            unread[where] = "complex numbers" if complex_ else f"values of type {values.dtype}"
+        elif values.ndim > 1 and not is_matrix(values.shape):
+            unread[where] = f"an array of {' x '.join(map(str, leaf.shape))}"
+        else:
+            arrays[place] = values
+    columns, own = _vectors(arrays, leaves, dot)
+    for place, stated in _units(columns, own, leaves).items():
+        if len(stated) > 1:
+            unread[dot.join(place)] = f"its units are {listed(sorted(stated))}"
+            del columns[place]
+        elif stated:
+            columns[place] = replace(columns[place], unit=min(stated))
+    columns = _timed(columns, own, unread, dot)
+    lengths = {each.size for each in columns.values() if each.times is None}
+    texts: list[Column] = []
+    for place, lines in leaves.items():
+        if isinstance(lines, list) and lines and place[-1].casefold() not in NAMES | UNITS:
+            if len(lines) in lengths:
+                texts.append(Column(place[-1], None, texts=lines, place=dot.join(place)))
+            else:
+                unread[dot.join(place)] = "text"
+    if not columns:
         raise without_numbers(unread, path)
-    columns = _columns(vectors, times)
-    for place, lines in texts.items():
-        if len(lines) in lengths:
-            columns.append(Column(place.rpartition(dot)[2], None, texts=lines))
-    return Table(tuple(columns), meta=meta or {}, rates=walk.rates, unread=unread)
+    labels = Counter(each.label for each in columns.values())
+    for place, each in columns.items():
+        full = dot.join(place)
+        columns[place] = replace(each, place=full)
+        if labels[each.label] > 1:
+            says = each.label if is_standard(each.label) else re.sub(r"\W+", "_", full).strip("_")
+            columns[place] = replace(each, header=full, says=says, place=full)
+    found = (*columns.values(), *texts)
+    return Table(found, meta=meta or {}, rates=rates, unread=unread)
 
 
 def without_numbers(unread: Mapping[str, str], path: Path) -> DataError:
@@ -118,197 +126,154 @@ def without_numbers(unread: Mapping[str, str], path: Path) -> DataError:
     )
 
 
-class _Walk:
-    """What was found in a tree, by its place; ``legends`` are units by name, each with its group."""
-
-    def __init__(self, dot: str) -> None:
-        self.dot = dot
-        self.vectors: list[_Vector] = []
-        self.texts: dict[str, Sequence[Any]] = {}
-        self.rates: dict[str, float] = {}
-        self.unread: dict[str, str] = {}
-        self.legends: list[tuple[tuple[str, ...], dict[str, str]]] = []
-
-    def group(self, group: Group, home: tuple[str, ...]) -> None:
-        """Add what is in a group."""
-        nodes = {
-            name: node
-            for field, entry in group.items()
-            if field != ATTRIBUTES
-            for name, node in _spread(field, entry).items()
-        }
-        signal = _signal(nodes)
-        names, units = _field(nodes, NAMES), _field(nodes, UNITS)
-        attributes: Any = group.get(ATTRIBUTES, {})
-        if isinstance(units, list) and isinstance(names, list) and len(names) == len(units):
-            attributes = dict(zip(names, units, strict=True)) | attributes
-        elif isinstance(units, list) and len(set(units) - {""}) == 1:  # one for each sample
-            units = max(units)
-        for field, node in nodes.items():
-            place = self.dot.join((*home, field))
-            if isinstance(node, Mapping):
-                if legend := _legend(node, named=field.casefold() in UNITS):
-                    self.legends.append((home, legend))
-                self.group(node, (*home, field))
-            elif isinstance(node, list):
-                if node and field.casefold() not in NAMES | UNITS:
-                    self.texts[place] = node
-            elif isinstance(node, np.ndarray) and np.squeeze(node).ndim == 0:
-                if node.dtype.kind in "biuf" and timebase.is_rate(field):
-                    self.rates[place] = float(node.reshape(-1)[0])
-            elif reason := _unreadable(node):
-                self.unread[place] = reason
-            elif isinstance(node, np.ndarray) and node.size:
-                unit = attributes.get(field) or _field(nodes.get(f"{field}Info"), UNITS)
-                if field == signal and unit is None:
-                    unit = units
-                if isinstance(unit, list) and len(unit) == node.size:
-                    self.unread[place] = "its unit changes"
-                    continue
-                name, header, above, values = field, field, home, np.squeeze(node)
-                if field == signal and home and field.casefold() in DATA:
-                    if isinstance(names, str) and names.strip():
-                        name = header = names
-                    elif values.ndim == 1:
-                        name, header = home[-1], place
-                    above = home[:-1] if is_time(name) else home
-                unit = unit if isinstance(unit, str) and unit else None
-                if values.ndim == 1:
-                    self.vectors.append(_Vector(place, above, name, header, values, unit))
-                    continue
-                rows = values if values.shape[0] < values.shape[1] else values.T
-                named = isinstance(names, list) and len(names) == len(rows)
-                for i, row in enumerate(rows, start=1):
-                    one = str(names[i - 1]) if named else f"{parse(name).name}_{i}"
-                    its = attributes.get(one) or unit or parse(name).unit
-                    called = one if named else f"{header}[{i}]"
-                    self.vectors.append(
-                        _Vector(f"{place}[{i}]", above, one, called, row, its, place)
-                    )
-
-    def with_unit(self, vector: _Vector) -> _Vector:
-        """Return a vector with the unit in a struct beside it or beside a group around it."""
-        for i in range(len(vector.home), -1, -1) if vector.unit is None else ():
-            found = {
-                legend[vector.name]
-                for at, legend in self.legends
-                if at == vector.home[:i] and vector.name in legend
-            }
-            if found:
-                return replace(vector, unit=found.pop() if len(found) == 1 else None)
-        return vector
+def _leaves(node: Any, place: Place) -> Iterator[tuple[Place, Node]]:
+    """Yield the arrays and texts in a tree; elements of lists that are not one leaf are numbered."""
+    while isinstance(node, list) and len(node) == 1:
+        node = node[0]
+    if isinstance(node, list):
+        node = node if (merged := _merged(node)) is None else merged
+    if isinstance(node, Mapping):
+        for name, each in node.items():
+            yield from _leaves(each, (*place, name))
+    elif not isinstance(node, list) or all(isinstance(each, str) for each in node):
+        yield place, node
+    else:
+        form = "{}({})" if all(isinstance(each, Mapping) for each in node) else "{}{{{}}}"
+        for i, each in enumerate(node, start=1):
+            yield from _leaves(each, (*place[:-1], form.format(place[-1], i)))
 
 
-def _unreadable(node: Node) -> str | None:
-    """Return why what is no scalar is no vector or matrix of channels, or None if it is."""
-    if not isinstance(node, np.ndarray) or node.size == 0:
-        return node.reason if isinstance(node, Unread) else None
-    if node.dtype.kind not in "biuf":
-        return "complex numbers" if node.dtype.kind == "c" else f"values of type {node.dtype}"
-    shape = np.squeeze(node).shape
-    fits = len(shape) == 1 or is_matrix(shape)
-    return None if fits else f"an array of {' x '.join(map(str, node.shape))}"
-
-
-def _spread(name: str, node: Node) -> dict[str, Node]:
-    """Return the elements of a struct array or a cell by their places; anything else as it is."""
-    if not isinstance(node, list) or not node:
-        return {name: node}
-    if len(node) == 1:
-        return _spread(name, node[0])
-    if (together := _together(node)) is not None:
-        return {name: together}
-    if all(
-        isinstance(each, str) or (isinstance(each, np.ndarray) and each.size < 2) for each in node
-    ):
-        return {name: Unread("a cell of text and numbers")}
-    form = "{}({})" if all(isinstance(each, Mapping) for each in node) else "{}{{{}}}"
-    return {
-        inner: one
-        for i, each in enumerate(node, start=1)
-        for inner, one in _spread(form.format(name, i), each).items()
-    }
-
-
-def _together(nodes: Sequence[Any]) -> Node | None:
+def _merged(nodes: Sequence[Any]) -> Node | None:
     """Return the vector of scalars, the texts, or the struct of such of a struct array, or None."""
-    if all(isinstance(each, str) for each in nodes):
+    words = [isinstance(each, str) for each in nodes]
+    scalars = [isinstance(each, np.ndarray) and each.size == 1 for each in nodes]
+    if all(words):
         return list(nodes)
-    if all(isinstance(each, np.ndarray) and each.size == 1 for each in nodes):
+    if all(scalars):
         return np.array([each.reshape(-1)[0] for each in nodes])
-    if not all(isinstance(each, Mapping) and each.keys() == nodes[0].keys() for each in nodes):
-        return None
-    fields = {name: _together([each[name] for each in nodes]) for name in nodes[0]}
-    found = {name: node for name, node in fields.items() if node is not None}
-    return found if len(found) == len(fields) else None
+    if all(isinstance(each, Mapping) and each.keys() == nodes[0].keys() for each in nodes):
+        fields = {name: _merged([each[name] for each in nodes]) for name in nodes[0]}
+        found = {name: node for name, node in fields.items() if node is not None}
+        return found if len(found) == len(fields) else None
+    mixed = all(word or scalar for word, scalar in zip(words, scalars, strict=True))
+    return Unread("a cell of text and numbers") if mixed else None
 
 
-def _signal(nodes: Group) -> str | None:
-    """Return the longest vector or matrix beside times, or None if several are as long."""
-    lengths = [
-        (max(node.shape), name)
-        for name, node in nodes.items()
-        if isinstance(node, np.ndarray) and node.size > 1 and not is_time(name)
-    ]
-    longest = [name for length, name in lengths if length == max(lengths)[0]]
-    return longest[0] if len(longest) == 1 else None
+def _vectors(
+    arrays: Mapping[Place, NDArray[Any]], leaves: Mapping[Place, Node], dot: str
+) -> tuple[dict[Place, Column], dict[Place, tuple[Place, ...]]]:
+    """Return the vectors and columns of matrices by place, and the places that units of them may have.
 
-
-def _field(nodes: Node | None, names: set[str]) -> Any:
-    group = nodes if isinstance(nodes, Mapping) else {}
-    return next((node for name, node in group.items() if name.casefold() in names), None)
-
-
-def _legend(group: Group, *, named: bool) -> dict[str, str]:
-    """Return units by name from a struct of texts, or of structs with a field for the unit.
-
-    Unless its name is that of units, it has to hold one that is known. Structs with ten samples or more
-    are signals themselves, other arrays in them are ranges and the like.
+    The first of these is the group that a vector stands for, or itself.
     """
-    units = {
-        name: node if isinstance(node, str) else _field(node, UNITS)
-        for name, node in group.items()
-        if not isinstance(node, Mapping)
-        or not any(isinstance(each, np.ndarray) and each.size > 9 for each in node.values())
+    names, units = (
+        {at[:-1]: leaf for at, leaf in leaves.items() if at[-1].casefold() in fields}
+        for fields in (NAMES, UNITS)
+    )
+    alike = Counter((at[:-1], max(a.shape)) for at, a in arrays.items() if not is_time(at[-1]))
+    columns: dict[Place, Column] = {}
+    own: dict[Place, tuple[Place, ...]] = {}
+    for place, values in arrays.items():
+        home, field = place[:-1], place[-1]
+        header = name = field
+        own[place] = (place,)
+        if alike[home, max(values.shape)] == 1 and not is_time(field):
+            own[place] = (place, home)
+            if home and field.casefold() in DATA:
+                own[place] = (home, place)
+                title = names.get(home)
+                if isinstance(title, str) and title.strip():
+                    header = name = title
+                elif values.ndim == 1:
+                    header, name = dot.join(place), home[-1]
+        if values.ndim == 1:
+            columns[place] = _column(header, name, values)
+            continue
+        rows = values if values.shape[0] < values.shape[1] else values.T
+        titles, stated = (
+            lines
+            if isinstance(lines := texts.get(home), list) and len(lines) == len(rows)
+            else None
+            for texts in (names, units)
+        )
+        plain = parse(header)
+        for i, row in enumerate(rows):
+            number = f"[{i + 1}]"
+            named = titles[i] if titles else header + number
+            name = f"{plain.name}_{i + 1}" + (f" [{plain.unit}]" if plain.unit else "")
+            at = (*home, field + number)
+            each = _column(named, named if titles else name, row)
+            columns[at] = replace(each, unit=stated[i] if stated else None, matrix=True)
+            own[at] = ((*home, named), *(() if stated else own[place]))
+    return columns, own
+
+
+def _column(header: str, name: str, values: NDArray[Any]) -> Column:
+    found = column(header, np.ascontiguousarray(values))
+    return replace(found, says=None if name == header else name)
+
+
+def _units(
+    columns: Mapping[Place, Column],
+    own: Mapping[Place, tuple[Place, ...]],
+    leaves: Mapping[Place, Node],
+) -> dict[Place, set[str]]:
+    """Return the units stated for vectors, or else for their names in a group beside."""
+    groups = {at[:-1] for at, leaf in leaves.items() if isinstance(leaf, str) and find(leaf)}
+    signals = {*own, *(places[0] for places in own.values())}
+    units: dict[Place, set[str]] = {}
+    beside: dict[Place, set[str]] = {}
+    for place, leaf in leaves.items():
+        home = place[:-1]
+        if place[-1].casefold() in UNITS and isinstance(leaf, (str, list)):
+            place = (*home[:-1], home[-1].removesuffix(INFO)) if home else ()
+        elif not isinstance(leaf, str) or not (
+            home in groups or (home and home[-1].casefold() in UNITS)
+        ):
+            continue
+        stated = {leaf} if isinstance(leaf, str) else set(leaf)
+        units.setdefault(place, set()).update(stated - {""})
+        if len(place) > 1 and place not in signals:
+            beside.setdefault((*place[:-2], place[-1]), set()).update(stated - {""})
+    found: dict[Place, set[str]] = {}
+    for place, each in columns.items():
+        above = [(*place[:i], each.label) for i in range(len(place) - 1, -1, -1)]
+        texts = [units.get(at) for at in own[place]] + [beside.get(at) for at in above]
+        found[place] = set() if each.unit else next(filter(None, texts), set())
+    return found
+
+
+def _timed(
+    columns: Mapping[Place, Column],
+    own: Mapping[Place, tuple[Place, ...]],
+    unread: dict[str, str],
+    dot: str,
+) -> dict[Place, Column]:
+    """Return the columns without repeated times, each with its times [s] where clocks differ."""
+    seconds = {
+        place: times for place, each in columns.items() if (times := _seconds(each)) is not None
     }
-    found = {name: unit for name, unit in units.items() if isinstance(unit, str) and unit}
-    return found if named or any(map(find, found.values())) else {}
-
-
-def _clocks(vectors: Sequence[_Vector]) -> tuple[list[_Vector], dict[str, Array]]:
-    """Return the vectors without repeated times, and the times [s] by place where clocks differ."""
-    seconds = {each.place: times for each in vectors if (times := each.seconds) is not None}
-    clocks: dict[str, str] = {}
-    for each in vectors:
+    clocks: dict[Place, Place] = {}
+    for place, each in columns.items():
         shared = [
-            time
-            for time in vectors
-            if time.place in seconds
-            and time.values.size == each.values.size
-            and each.home[: len(time.home)] == time.home
+            (len(own[time][0]), time)
+            for time in seconds
+            if columns[time].size == each.size
+            and place[: len(own[time][0]) - 1] == own[time][0][:-1]
         ]
-        depth = max((len(time.home) for time in shared), default=0)
-        nearest = [time.place for time in shared if len(time.home) == depth]
-        if len(nearest) == 1 and each.place not in seconds:
-            clocks[each.place] = nearest[0]
-    first, *others = dict.fromkeys(clocks.values()) or [""]
-    alike = all(np.array_equal(seconds[first], seconds[other], equal_nan=True) for other in others)
-    dropped = others if alike else [first, *others]
-    rest = [each for each in vectors if each.place not in dropped]
-    return rest, {} if alike else {place: seconds[time] for place, time in clocks.items()}
+        nearest = [time for depth, time in shared if depth == max(shared)[0]]
+        if len(nearest) == 1 and place not in seconds:
+            clocks[place] = nearest[0]
+    first, *others = dict.fromkeys(clocks.values()) or [()]
+    if all(np.array_equal(seconds[first], seconds[time], equal_nan=True) for time in others):
+        return {place: each for place, each in columns.items() if place not in others}
+    rest = [place for place in columns if place not in {first, *others, *clocks}]
+    unread |= {dot.join(at): "it has no times, and others have their own" for at in sorted(rest)}
+    return {place: replace(columns[place], times=seconds[time]) for place, time in clocks.items()}
 
 
-def _columns(vectors: Sequence[_Vector], times: Mapping[str, Array]) -> list[Column]:
-    """Return the columns of vectors; where a name is not unique, the place is the header."""
-    names = Counter(each.name for each in vectors)
-    columns: list[Column] = []
-    for each in vectors:
-        name, header = each.name, each.header
-        if names[name] > 1:
-            header = each.place
-            if not is_standard(name):
-                name = re.sub(r"\W+", "_", each.place).strip("_")
-        own = column(header, np.ascontiguousarray(each.values), each.unit)
-        says = None if name == header else name
-        columns.append(replace(own, says=says, times=times.get(each.place), matrix=each.matrix))
-    return columns
+def _seconds(column: Column) -> Array | None:
+    unit = find(column.unit or parse(column.label).unit or "s")
+    if column.values is None or not is_time(column.label) or unit is None or unit.target != "s":
+        return None
+    return convert(column.values, unit.name, "s")

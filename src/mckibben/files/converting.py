@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ from mckibben.errors import DataError
 from mckibben.files import clocks, instants, quality, timebase
 from mckibben.files.channels import NAME, Channel, Time
 from mckibben.files.choosing import assign
-from mckibben.files.headers import parse, snake_case, unit_of
+from mckibben.files.headers import parse, snake_case, unit_of, unknown_ending
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column
@@ -245,15 +244,13 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> Uni
     expected = unit_of(channel)
     if expected is None:
         return Unit("", "")
-    for word in re.findall(r"[^\W\d_]+", column.label)[1:] if expected else ():
-        unit = find(word)
-        if word.casefold() in COUNTS or (len(word) > 1 and unit and unit.target == expected):
-            raise source.error(
-                f"its unit is not certain: {column.label!r} has {word!r}",
-                f"name its unit, as in --unit {channel}={expected}, or calibrate it, as in "
-                f"{_option(channel, column, expected)}",
-                channel,
-            )
+    if expected and (ending := unknown_ending(column.label)):
+        raise source.error(
+            f"its unit is not certain: {column.label!r} has {ending!r}",
+            f"name its unit, as in --unit {channel}={expected}, or calibrate it, as in "
+            f"{_option(channel, column, expected)}",
+            channel,
+        )
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     plausible = quality.PLAUSIBLE[expected]
     if 0 < largest < plausible.least or largest > plausible.most:

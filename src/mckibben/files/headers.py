@@ -187,6 +187,18 @@ def foreign_words(text: str) -> int:
     return sum(text.count(word) * len(word) for word in words)
 
 
+def unknown_ending(text: str) -> str:
+    """Return the first word behind a channel's name that may be a unit nobody knows; empty if none.
+
+    >>> unknown_ending("pressure_mmH2O"), unknown_ending("Inlet pressure 2"), unknown_ending("data")
+    ('mmh', '', '')
+    """
+    known = {part for word in (*_CHANNELS, *_ROLES) for part in word.split("_")} | _EXTENSOR
+    words = re.findall(r"[^\W\d_]+", snake_case(text.rpartition("/")[2]))  # not of a topic
+    named = next((k for k, word in enumerate(words) if word in known), len(words))
+    return next((word for word in words[named:] if word not in known), "")
+
+
 def _plain(text: str) -> str:
     """Return text with one sign for each of those that Unicode has in several widths and forms."""
     return text if text.isascii() else unicodedata.normalize("NFKC", text.replace("º", "°"))

@@ -23,6 +23,7 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
         "length": "mm",
         "contraction": "",
         "force": "N",
+        "torque": "N*m",
         "velocity": "mm/s",
         "angle": "rad",
         "temperature": "degC",

@@ -279,17 +279,6 @@ def _checked(
     training_data(recordings, *names, one_rate=channels.single)
     if others:
         training_data([*recordings, *others], *names, one_rate=channels.single)
-    for name in (*channels.inputs, *channels.outputs):
-        kinds = [one.meta.get("pressure_reference", {}).get(name) for one in (*recordings, *others)]
-        if len({kind == "absolute" for kind in kinds}) > 1:
-            absolute = (*recordings, *others)[kinds.index("absolute")]
-            raise DataError(
-                "it is absolute here, and gauge in another recording",
-                file=absolute.source,
-                channel=name,
-                remedy="subtract the atmosphere, as in "
-                f"--calibrate {name}=COLUMN:GAIN:-1.01325:bar, with a GAIN of 1 for bar, 0.01 for kPa",
-            )
     units = {name: recordings[0].units[name] for name in channels.outputs}
     if len(set(units.values())) > 1:
         raise DataError(

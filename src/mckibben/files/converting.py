@@ -254,11 +254,11 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> Uni
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     plausible = quality.PLAUSIBLE[expected]
     if 0 < largest < plausible.least or largest > plausible.most:
-        fitting = quality.fitting_units(largest, expected, expected)[0]
+        units = quality.fitting_units(largest, expected, expected)
+        options = " or ".join(f"--unit {channel}={unit}" for unit in units)
         raise source.error(
-            f"it has no unit, and reaches {largest:.3g}: is it in {fitting}?",
-            f"name its unit, as in --unit {channel}={fitting}, or --unit {channel}={expected or 1} "
-            "where that is right",
+            f"it has no unit, and reaches {largest:.3g}: is it in {' or '.join(units)}?",
+            f"name its unit, as in {options}, or --unit {channel}={expected or 1} where that is right",
             channel,
         )
     return Unit(expected, expected)

@@ -161,8 +161,7 @@ def _judged_step(
     """Return the step in seconds; refuse one of a doubtful unit, and note jitter."""
     seconds = times.seconds(size)
     if seconds > 5.0 and not times.certain:
-        problem = f"its steps are {seconds:.6g} s: is time in ms?"
-        raise source.error(problem, timebase.UNIT_OF_TIME, "time", 0)
+        raise timebase.doubtful_unit(f"its steps are {seconds:.6g} s", seconds, source)
     if jitter is not None:
         rms, worst = (f"{times.seconds(x):.3g} s ({100 * x / size:.3g} %)" for x in jitter)
         source.warn(

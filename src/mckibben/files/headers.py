@@ -72,6 +72,8 @@ def parse(text: str) -> Header:
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
         name, unit = bracketed["name"], bracketed["unit"].strip()
+        if GAUGE.fullmatch(f"{_last(name)} {unit}") and find(unit) is None:  # Pressure kPa(a)
+            return Header(name.removesuffix(_last(name)).rstrip(" _,"), f"{_last(name)} {unit}")
         if unit.isdecimal() and not (unit == "1" and _expected(name) == ""):  # but contraction [1]
             inner = parse(name)  # the second of several alike: pos (2)
             return Header(f"{inner.name} {unit}", inner.unit)
@@ -223,8 +225,7 @@ def _standard(name: str) -> str | None:
 
 def _expected(name: str) -> str | None:
     """Return the unit of the package for what a header names, None where there is none."""
-    channel = _standard(snake_case(name)) or snake_case(name)
-    return "N*m" if channel.startswith("torque") else unit_of(channel)
+    return unit_of(_standard(snake_case(name)) or snake_case(name))
 
 
 def _is_unit(text: str, name: str) -> bool:

@@ -35,6 +35,7 @@ PLAUSIBLE = {
     "bar": Plausible(-1.1, 60.0, 5.0, 0.6, 12.0),
     "mm": Plausible(-2e4, 2e4, 30.0, 0.5, 3e3),
     "N": Plausible(-1e6, 1e6, 300.0),
+    "N*m": Plausible(-1e6, 1e6),
     "s": Plausible(-1e11, 1e11, 1.7e9),  # since 1970
     "rad": Plausible(-1e4, 1e4, 1.0, 0.0, 7.0),
     "V": Plausible(-1e3, 1e3, 5.0),
@@ -47,11 +48,11 @@ PLAUSIBLE = {
 TOO_SMALL = {"bar": (1e-12, 1e-7)}
 """By the package's unit: largest values that are in another unit, and more than the rounding of 0."""
 
-_SIZES = (0.0, *(10.0**k - 1 for k in range(3, 8)), 2.0**15 - 1, 2.0**16 - 1)
-CODES = tuple({sign * size for size in _SIZES for sign in (1.0, -1.0)})
-"""What instruments write for a missing sample."""
+_SIZES = (0.0, *(10.0**k - 1 for k in range(3, 8)), *(2.0**k - 1 for k in (15, 16)), 2.0**15)
+CODES = np.array([sign * size for size in _SIZES for sign in (1.0, -1.0)])
+"""What instruments write for a missing sample, be it a single one."""
 
-WRAPS = (2.0**8, 2.0**16, 2.0**32)
+WRAPS = (2.0**8, 2.0**10, 2.0**12, 2.0**16, 2.0**32)
 """Range of integer counters, which begin anew beyond it."""
 
 
@@ -98,10 +99,13 @@ def refuse_wraps(channel: str, recorded: Array, source: Source) -> None:
 def without_codes(channel: str, values: Array, recorded: Array, source: Source) -> Array:
     """Return samples, NaN where the file has a code for a missing one, with a note.
 
-    Codes are round numbers as ``recorded`` in the file, not in the package's unit.
+    Codes are whole numbers as ``recorded`` in the file, not in the package's unit.
     """
     known = recorded[np.isfinite(recorded)]
-    coded = np.isin(recorded, [code for code in CODES if _is_code(code, known)])
+    whole, times = np.unique(known[known == np.rint(known)], return_counts=True)
+    recurring = whole[times >= 3]
+    asked = {*CODES, *recurring[:2], *recurring[-2:]}  # others are within the range of these
+    coded = np.isin(recorded, [code for code in asked if _is_code(code, known)])
     huge = (np.abs(recorded) > 1e30) & np.isfinite(recorded)
     if not huge.all():  # SCPI's for not a number, and for beyond the range
         coded |= huge
@@ -164,8 +168,8 @@ def refuse_impossible(channel: str, values: Array, read_in: str, source: Source)
     excess = np.maximum(known - high, low - known)
     at = int(np.flatnonzero(finite)[np.argmax(excess if excess.max() > 0 else np.abs(known))])
     units = fitting_units(values[at], read_in, target)
-    options = " or ".join(f"--unit {channel}={unit}" for unit in units[:2])
-    problem = f"{values[at]:.6g} {target} is impossible: is it in {units[0]}?"
+    options = " or ".join(f"--unit {channel}={unit}" for unit in units)
+    problem = f"{values[at]:.6g} {target} is impossible: is it in {' or '.join(units)}?"
     remedy = f"name its unit, as in {options}, or correct that cell"
     raise source.error(problem, remedy, channel, at)
 

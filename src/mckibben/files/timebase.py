@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
+from mckibben.errors import DataError
 from mckibben.files.headers import snake_case
 from mckibben.files.notices import listed
 from mckibben.files.quality import wraps
@@ -26,8 +27,6 @@ RATES = ("fs", "Fs", "sample_rate", "sampling_frequency")
 STEPS = ("Ts", "dt", "sample_time")
 """Names of seconds per sample."""
 
-UNIT_OF_TIME = "name its unit, as in --unit time=ms, or --unit time=s where that is right"
-"""Remedy of times whose unit is in doubt."""
 
 _SINCE_1970 = {"ms": (1e12, 4.2e12), "us": (1e15, 4.2e15), "ns": (1e18, 4.2e18)}
 """Unit -> counts of it since 1970 in the years 2001 to 2103."""
@@ -147,10 +146,19 @@ def unit_by_size(time: Array, source: Source) -> str | None:
                 "use --unit time=UNIT where that is wrong"
             )
             return unit
-    if np.median(steps) >= 1 and np.array_equal(time, np.rint(time)):
-        problem = "it has no unit and counts in whole numbers: is it in ms?"
-        raise source.error(problem, UNIT_OF_TIME, "time", 0)
+    step = float(np.median(steps))
+    if step >= 1 and np.array_equal(time, np.rint(time)):
+        raise doubtful_unit("it has no unit and counts in whole numbers", step, source)
     return None
+
+
+def doubtful_unit(problem: str, step: float, source: Source) -> DataError:
+    """Return the error for times in an uncertain unit, with those that make steps of 0.1 ms to 5 s."""
+    shares = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+    fitting = [unit for unit, share in shares.items() if 1e-4 <= share * step <= 5.0] or ["ms"]
+    options = " or ".join(f"--unit time={unit}" for unit in fitting)
+    remedy = f"name its unit, as in {options}, or --unit time=s where that is right"
+    return source.error(f"{problem}: is it in {' or '.join(fitting)}?", remedy, "time", 0)
 
 
 def resolution(time: Array) -> float:

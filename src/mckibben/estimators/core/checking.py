@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -118,6 +118,15 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
                 channel=name,
                 remedy="convert one of the recordings, or name its unit with --unit",
             )
+        absolute = [_is_absolute(one, name) for one in (recording, first)]
+        if absolute[0] != absolute[1]:
+            raise DataError(
+                "it is absolute in one recording, and gauge in another",
+                file=(recording if absolute[0] else first).source,
+                channel=name,
+                remedy="subtract the atmosphere, as in "
+                f"--calibrate {name}=COLUMN:GAIN:-1.01325:bar, with a GAIN of 1 for bar, 0.01 for kPa",
+            )
     ours, theirs = recording.sample_time, first.sample_time
     if (ours is None) != (theirs is None):
         raise DataError(
@@ -131,3 +140,8 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
             file=recording.source,
             remedy=f"say --resample {max(ours, theirs):.3g}, or use mckibben.signals.resample",
         )
+
+
+def _is_absolute(recording: Recording, channel: str) -> bool:
+    references = recording.meta.get("pressure_reference")
+    return isinstance(references, Mapping) and references.get(channel) == "absolute"

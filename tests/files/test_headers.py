@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from mckibben.files.names import CHANNELS, ROLES, words_of
 from mckibben.files.reading import columns_of
 from mckibben.files.units import RARE, SPELLINGS
+from tests.files.made import refused
 
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 
@@ -113,3 +114,13 @@ def test_every_spelling_of_a_unit_is_found_in_every_form(tmp_path: Path, form: s
 @given(st.text(max_size=30))
 def test_any_text_is_some_header(tmp_path: Path, text: str) -> None:
     assert seen(tmp_path, text)
+
+
+@pytest.mark.parametrize("ending", ["mmH2O", "V", "kgcm2", "qux", "oz", "mba"])
+def test_an_unknown_ending_is_asked_about(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / "run.csv"
+    rows = [f"{k / 50},{2.5 + k % 7 / 3},{k % 9}" for k in range(100)]
+    path.write_text("\n".join([f"time_s,pressure_{ending},displacement_mm", *rows]))
+    error = refused(path, channels=["pressure"], columns={"pressure": f"pressure_{ending}"})
+    assert error.channel == "pressure"
+    assert "--unit pressure=" in error.remedy or "--calibrate" in error.remedy

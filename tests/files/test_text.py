@@ -279,3 +279,19 @@ def test_segments_of_labview_are_recordings(tmp_path: Path) -> None:
     assert first["pressure"].tolist() == second["pressure"].tolist() == P
     assert (first.name, second.name) == ("run[1]", "run[2]")
     assert refused(file(tmp_path, content[:at], "cut.lvm"))
+
+
+def test_units_of_a_labview_file_are_those_of_their_columns(tmp_path: Path) -> None:
+    head = ["LabVIEW Measurement", "Separator|Tab", "X_Columns|Multi", "***End_of_Header***", ""]
+    head += ["Channels|2", "Samples|40||40", "Y_Unit_Label|bar||cm", "X_Dimension|Time||Time"]
+    head += [
+        "X0|0||0",
+        "Delta_X|0.01||0.01",
+        "***End_of_Header***",
+        "X_Value|pressure|X_Value|x|Comment",
+    ]
+    lines = [f"{t}|{p}|{t}|{x}" for t, p, x in zip(T, P, X, strict=True)]
+    content = "\n".join([*head, *lines]).replace("|", "\t")
+    recording = one(file(tmp_path, content, "run.lvm"), columns={"displacement": "x"})
+    assert recording["pressure"] == pytest.approx(P)
+    assert recording["displacement"] == pytest.approx(10 * np.array(X))

@@ -179,3 +179,19 @@ def test_steps_of_many_seconds_ask_for_the_unit(tmp_path: Path, header: str) -> 
     assert refused(path).channel == "time"
     assert one(path, units={"time": "ms"}).sample_time == pytest.approx(0.02)
     assert one(path, units={"time": "s"}).sample_time == 20
+
+
+@pytest.mark.parametrize("second", ["time_2", "time.1", "Time 2 (s)", "time_s"])
+@pytest.mark.parametrize("late", [0.0, 0.25])
+def test_columns_have_the_clock_before_them(tmp_path: Path, second: str, late: float) -> None:
+    t = np.arange(400) * 0.02
+    p, x = 2.5 + 2 * np.sin(t), 10 + 5 * np.cos(t)
+    rows = [f"{a:.3f},{b:.6f},{a + late:.3f},{c:.6f}" for a, b, c in zip(t, p, x, strict=True)]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join([f"time_s,pressure_bar,{second},displacement_mm", *rows]))
+    recording = one(path)
+    assert late <= recording.time[0] < late + 0.02
+    assert recording["pressure"] == pytest.approx(2.5 + 2 * np.sin(recording.time), abs=1e-3)
+    assert recording["displacement"] == pytest.approx(
+        10 + 5 * np.cos(recording.time - late), abs=1e-3
+    )

@@ -191,8 +191,8 @@ def _lag(recording: Recording) -> int | None:
     from mckibben.files.condition import DRIVEN, DRIVING, lag
 
     inputs, outputs = (
-        [name for name in recording.channels if name.partition("_")[0] in kinds]
-        for kinds in (DRIVING, DRIVEN)
+        [name for name in recording.channels if recording.units[name] in units]
+        for units in (DRIVING, DRIVEN)
     )
     if len(inputs) != 1 or len(outputs) != 1:
         return None

@@ -26,7 +26,7 @@ from mckibben.files.table import WIDEST, Column, Table
 from mckibben.system.extras import demand
 
 _UNITS = {
-    "sensor_msgs/msg/FluidPressure": {"fluid_pressure": "Pa"},
+    "sensor_msgs/msg/FluidPressure": {"fluid_pressure": "Pa abs"},
     "sensor_msgs/msg/Temperature": {"temperature": "degC"},
     "sensor_msgs/msg/Range": {"range": "m"},
     "geometry_msgs/msg/Wrench": {f"force/{axis}": "N" for axis in "xyz"},
@@ -76,9 +76,9 @@ class _Topic:
         for header, (at, values) in self.columns.items():
             place = header.removeprefix(f"/{self.name.strip('/')}/")
             unit, word = _UNITS.get(self.kind, {}).get(place), place.rpartition("/")[2]
-            if word in ("data", "value") or unit == "Pa":
+            if word in ("data", "value") or unit == "Pa abs":
                 word = self.name.rpartition("/")[2]
-            says = "pressure" if unit == "Pa" else _indexed(header)
+            says = "pressure" if unit == "Pa abs" else _indexed(header)
             if is_standard(word) and not is_time(word):
                 says = word
             samples, held = np.array(values, dtype=np.float64), not isinstance(values[0], float)

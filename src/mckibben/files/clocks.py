@@ -17,8 +17,8 @@ from mckibben.files.timebase import GAP
 def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Column], list[str]]:
     """Return columns of one length, with one of times, and the headers of those left out.
 
-    The clock suits the channels asked for, or else those that have a meaning (a temperature that nobody
-    asks for does not slow the rest down), or all. Between its samples a column is linear, or holds the
+    The clock suits the channels asked for and those that have a meaning (a temperature that nobody asks
+    for does not slow the rest down), or all. Between its samples a column is linear, or holds the
     last where it is one of counts; where it has a gap, or another one needed has not begun or is over,
     samples are missing. Columns that were sampled together do not change.
 
@@ -34,8 +34,8 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     long = {name: times for name, times in clocks.items() if times.size > 1}
     meant = {*request.columns, *request.described.channels}
     meant |= {name for name in long if unit_of(name) not in (None, "degC")}
-    asked = {name: times for name, times in long.items() if request.asks_for(name)}
-    needed = asked or {name: times for name, times in long.items() if name in meant} or long
+    meant |= {name for name in long if request.asks_for(name)}
+    needed = {name: times for name, times in long.items() if name in meant} or long
     if not needed:
         raise source.error("no channel in it has two samples", "give a longer recording")
     for name, times in needed.items():

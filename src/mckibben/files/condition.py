@@ -9,8 +9,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.recording import Recording
 
-DRIVING, DRIVEN = {"pressure", "voltage"}, {"displacement", "length", "contraction", "angle"}
-"""Channels that move others, and those that they move, never before they do."""
+DRIVING, DRIVEN = {"bar", "V"}, {"mm", "rad"}
+"""Units of channels that move others, and of those that they move, never before they do."""
 
 
 def condition(samples: Array) -> dict[str, float]:
@@ -57,7 +57,8 @@ def early(recordings: Sequence[Recording], input_: str, output: str) -> int | No
 
     Only motion by pressure or voltage is judged.
     """
-    if not (input_.partition("_")[0] in DRIVING and output.partition("_")[0] in DRIVEN):
+    units = recordings[0].units
+    if not (units[input_] in DRIVING and units[output] in DRIVEN):
         return None
     lags = [lag(recording, input_, output) for recording in recordings]
     known = sorted(found for found in lags if found is not None)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from mckibben.errors import DataError
 from mckibben.files import clocks, instants, quality, timebase
 from mckibben.files.channels import NAME, Channel, Time
 from mckibben.files.choosing import assign
-from mckibben.files.headers import parse, snake_case, unit_of, unknown_ending
+from mckibben.files.headers import is_clock, parse, snake_case, unit_of, unknown_ending
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column
@@ -64,10 +65,10 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         If a channel asked for is missing, two columns are one channel, a cell is no number, a unit is
         unknown, contradicted or of the wrong dimension, or a value is impossible.
     """
-    request = source.request
+    request, source = source.request, _with_clocks(source)
     columns, left_out = assign(source)
     columns, dropped = clocks.on_one(columns, source)
-    left_out |= dict.fromkeys(dropped, "no samples at the others' times")
+    left_out |= dict.fromkeys(dropped, "it does not cover the times of the others")
     clock = columns.pop("time", None)
     if clock is not None and clock.values is None and request.rate is not None:
         left_out[clock.header], clock = "the rate is given", None
@@ -106,6 +107,33 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         reasons = [f"{header} ({why})" for header, why in left_out.items()]
         source.warn(f"not read: {listed(reasons)}")
     return signals, times, {name: found for name, found in meta.items() if found}
+
+
+def _with_clocks(source: Source) -> Source:
+    """Return a table whose columns have the clock before them, where several are among them."""
+    table = source.table
+    if table.own or table.has_clocks or "time" in source.request.columns:
+        return source
+    clocks: list[Column] = []
+    groups: list[list[Column]] = [[]]
+    for column in table.columns:
+        if is_clock(column.label):
+            clocks.append(column)
+            groups.append([])
+        elif column.values is not None:
+            groups[-1].append(column)
+    if sum(map(bool, groups[1:])) < 2:
+        return source
+    groups[:2] = [groups[0] + groups[1]]  # what is before the first clock has that one
+    columns = []
+    for clock, group in zip(clocks, groups, strict=True):
+        times = _times(clock, source)
+        seconds = convert(times.values, times.unit, "s")
+        known = np.isfinite(seconds)
+        for column in group:
+            values = None if column.values is None else column.values[known]
+            columns.append(replace(column, values=values, times=seconds[known]))
+    return replace(source, table=replace(table, columns=tuple(columns), lines=None))
 
 
 def _times(column: Column, source: Source) -> Times:
@@ -211,7 +239,7 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
 
 
 def _option(channel: str, column: Column, unit: str) -> str:
-    return f"--calibrate {channel}={column.header}:GAIN:OFFSET:{unit}"
+    return f"--calibrate {shlex.quote(f'{channel}={column.header}:GAIN:OFFSET:{unit}')}"
 
 
 def _stated(channel: str, column: Column, source: Source) -> str | None:

@@ -119,6 +119,9 @@ class _Tree:
             texts = [line.decode("utf-16-le", "replace") for line in lines]
             return texts[0] if len(texts) == 1 else texts
         samples = _fields(np.asarray(data[()]))
+        missing = about.get("_FillValue", about.get("missing_value"))
+        if isinstance(samples, np.ndarray) and isinstance(missing, int | float):
+            samples = np.where(samples == missing, np.nan, samples)
         packed = {name: about.get(name, "") for name in _PACKING if name in data.attrs}
         if not packed or not isinstance(samples, np.ndarray):
             return samples

@@ -169,6 +169,18 @@ def is_time(text: str) -> bool:
     return channel_of(parse(text)) == "time"
 
 
+def is_clock(text: str) -> bool:
+    """Return whether a header names times, perhaps one of several.
+
+    >>> is_clock("Time 2 (s)"), is_clock("time.1"), is_clock("T2 [°C]")
+    (True, True, False)
+    """
+    header = parse(text)
+    unit = None if header.unit is None else find(header.unit)
+    timed = header.unit is None or (unit is not None and unit.target == "s")
+    return timed and _CHANNELS.get(re.sub(r"_?\d+$", "", snake_case(header.name))) == "time"
+
+
 def snake_case(name: str) -> str:
     """Return a name in lower snake case.
 

@@ -43,8 +43,11 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         if key == _X and n_headers > 1:
             names = [key, *(value or f"Untitled {i}" for i, value in enumerate(values, start=1))]
             names[-1] = names[-1].replace("Comment", "")  # lines may end before what has no name
-            labels = iter(about.get("Y_Unit_Label", ()))  # of the channels alone
-            units = [None if name == _X else next(labels, "") or None for name in names]
+            labels = list(about.get("Y_Unit_Label", ()))
+            if len(labels) <= sum(name not in (_X, "") for name in names):  # of the channels alone
+                rest = iter(labels)
+                labels = ["" if name == _X else next(rest, "") for name in names][1:]
+            units = [unit or None for _, unit in zip_longest(names, ["", *labels][: len(names)])]
             table = block(data, Layout(dialect, names, units, line + 1), path, stop)
             found.append(_timed(table, names, about, dialect.decimal))
         n_headers += key == _END

@@ -8,9 +8,9 @@ from __future__ import annotations
 CHANNELS: dict[str, dict[str, str]] = {
     "time": {
         "en": "t time timestamp time_stamp datetime elapsed elapsed_time millis micros",
-        "de": "zeit zeitstempel",
-        "fr": "temps horodatage", "it pt": "tempo", "es": "tiempo", "ja": "時間 時刻 経過時間",
-        "zh": "时间 时刻 時間", "ko": "시간 시각"},
+        "de": "zeit zeitstempel uhrzeit",
+        "fr": "temps horodatage heure", "it": "tempo ora", "pt": "tempo", "es": "tiempo hora",
+        "ja": "時間 時刻 経過時間", "zh": "时间 时刻 時間", "ko": "시간 시각"},
     "pressure": {
         "en": "p press pressure", "de": "druck", "fr": "pression", "it": "pressione",
         "es": "presión presion", "pt": "pressão pressao", "ja": "圧力 圧 空気圧 空気圧力",

@@ -103,7 +103,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     absolute = [name for name, kind in references.items() if kind == "absolute"]
     if absolute:
         source.warn(f"absolute pressure, not gauge: {listed(absolute)}; no offset was removed")
-    if left_out and not (source.table.own or request.names_channels):
+    if left_out and not source.table.own:
         reasons = [f"{header} ({why})" for header, why in left_out.items()]
         source.warn(f"not read: {listed(reasons)}")
     return signals, times, {name: found for name, found in meta.items() if found}

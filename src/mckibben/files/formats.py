@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 
 from mckibben.errors import DataError, MckibbenError, TooLargeError
-from mckibben.files.table import Table, printable
+from mckibben.files.table import Table, distinct, printable
 from mckibben.system.ordinary import opened
 
 MOST_BYTES = 2**31
@@ -83,7 +83,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         text = READERS[path.suffix.casefold()] == "text"
         if text and file.peek(64).lstrip(BOM).startswith(LABVIEW):
             module = import_module("mckibben.files.lvm")
-        return [printable(table) for table in module.read(file, path)]
+        return [distinct(printable(table)) for table in module.read(file, path)]
 
 
 def bag(folder: Path) -> list[Table]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -197,6 +198,18 @@ def printable(table: Table) -> Table:
         rates={plain(place): value for place, value in table.rates.items()},
         unread={plain(place): plain(why) for place, why in table.unread.items()},
     )
+
+
+def distinct(table: Table) -> Table:
+    """Return a table in which the second column of one header is called ``header (2)``, and so on."""
+    seen: Counter[str] = Counter()
+    columns = []
+    for column in table.columns:
+        seen[column.header] += 1
+        n = seen[column.header]
+        header = column.header if n == 1 or table.own else f"{column.header} ({n})"
+        columns.append(column if n == 1 else replace(column, header=header))
+    return replace(table, columns=tuple(columns)) if len(seen) < len(columns) else table
 
 
 def plain(text: str) -> str:

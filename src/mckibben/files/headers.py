@@ -72,7 +72,7 @@ def parse(text: str) -> Header:
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
         name, unit = bracketed["name"], bracketed["unit"].strip()
-        if GAUGE.fullmatch(f"{_last(name)} {unit}") and find(unit) is None:  # Pressure kPa(a)
+        if GAUGE.fullmatch(f"{_last(name)} {unit}"):  # Pressure kPa(a)
             return Header(name.removesuffix(_last(name)).rstrip(" _,"), f"{_last(name)} {unit}")
         if unit.isdecimal() and not (unit == "1" and _expected(name) == ""):  # but contraction [1]
             inner = parse(name)  # the second of several alike: pos (2)

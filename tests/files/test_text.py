@@ -295,3 +295,11 @@ def test_units_of_a_labview_file_are_those_of_their_columns(tmp_path: Path) -> N
     recording = one(file(tmp_path, content, "run.lvm"), columns={"displacement": "x"})
     assert recording["pressure"] == pytest.approx(P)
     assert recording["displacement"] == pytest.approx(10 * np.array(X))
+
+
+@pytest.mark.parametrize("below", ["Maximum;5,1;30", "Mean;2;3\nStd;1;1", "Prüfer: A. Muster"])
+def test_what_is_below_a_table_is_left_out(tmp_path: Path, below: str) -> None:
+    samples = rows(T, P, X, separator=";", mark=",")
+    recording = one(file(tmp_path, f"Zeit (s);Druck (bar);Weg (mm)\n{samples}\n\n{below}\n"))
+    assert recording.n_samples == N
+    assert any(below[:4] in note for note in recording.notes)

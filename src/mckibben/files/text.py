@@ -185,6 +185,16 @@ def _samples(data: bytes, layout: Layout, path: Path, stop: int | None) -> tuple
         counts = np.array([len(line.split()) for line in bare])
     else:
         counts = np.array([line.count(separator) + 1 for line in bare])
+    named = re.compile(
+        rb"[%s\"]*[A-Za-z\x80-\xff]" % blanks
+    ).match  # as "Maximum" behind a blank line
+    if not named(lines[0]):
+        behind = np.flatnonzero(np.diff(numbers) > 1) + 1
+        at = next((int(k) for k in behind if named(lines[k])), len(numbers))
+        if at < len(numbers):
+            rest = lines[at].decode("utf-8", "replace")
+            warn(path, f"from row {numbers[at]} on it is no table, left out: {rest[:60]!r}")
+            numbers, lines, counts = numbers[:at], lines[:at], counts[:at]
     wrong = np.flatnonzero((counts > len(headers)) | (counts < len(headers) - (not headers[-1])))
     if wrong.size:
         at = int(wrong[0])

@@ -82,6 +82,31 @@ def test_a_description_goes_before_headers_and_is_of_the_columns_that_it_names(
     assert one(tmp_path / "made.csv") == made
 
 
+@pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
+def test_what_was_calibrated_and_then_edited_is_not_calibrated_again(
+    tmp_path: Path, name: str
+) -> None:
+    path = folder(tmp_path, "[channels.pressure]\ngain=2.0\nunit='bar'", "time_ms,p,position_mm")
+    recording = one(path, channels=["pressure"])
+    mckibben.write(recording, tmp_path / name)
+    assert one(tmp_path / name)["pressure"].tolist() == (2 * RAW).tolist()
+    if name.endswith("csv"):
+        path.write_text("\n".join(path.read_text().splitlines()[:-10]))
+    else:
+        import pyarrow.parquet as pq
+
+        pq.write_table(pq.read_table(tmp_path / name)[:-10], tmp_path / name)
+    error = refused(tmp_path / name)
+    assert (error.channel, "calibrated before" in error.problem) == ("pressure", True)
+    edited = one(tmp_path / name, calibration={"pressure": (1.0, 0.0)})
+    assert edited["pressure"].tolist() == (2 * RAW[:-10]).tolist()
+    for text in ("[channels.pressure]\nunit='psi'", "[time]\nunit='ms'"):
+        (tmp_path / NAME).write_text(text)  # as of the raw file
+        assert "contradicted" in refused(tmp_path / name).problem
+    (tmp_path / NAME).unlink()
+    assert one(tmp_path / name)["pressure"].tolist() == (2 * RAW[:-10]).tolist()
+
+
 def test_a_column_that_is_missing(tmp_path: Path) -> None:
     path = folder(tmp_path, header="stamp,A0,B1")
     error = refused(path, channels=["pressure", "displacement"])
@@ -140,6 +165,15 @@ def test_what_the_documentation_shows_is_understood(tmp_path: Path) -> None:
 
 def signal(path: Path, time: Cells, samples: Cells, header: str = "time_s,value") -> Path:
     return put(path, header, time, samples)
+
+
+def test_files_that_this_package_wrote_are_put_on_one_clock(tmp_path: Path) -> None:
+    mckibben.write(Recording({"pressure": P}, 0.02), tmp_path / "pressure.csv")
+    mckibben.write(Recording({"displacement": X[5:]}, 0.02, start_time=0.1), tmp_path / "x.csv")
+    recording = one(tmp_path)
+    assert recording.start_time == pytest.approx(0.1)
+    assert recording["pressure"] == pytest.approx(P[5:])
+    assert recording["displacement"] == pytest.approx(X[5:])
 
 
 def test_a_gap_of_the_faster_channel_is_not_bridged_unasked(tmp_path: Path) -> None:

@@ -72,7 +72,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     clock = columns.pop("time", None)
     if clock is not None and clock.values is None and request.rate is not None:
         left_out[clock.header], clock = "the rate is given", None
-    times = None if clock is None else _times(clock, source)
+    times = None if clock is None else times_of(clock, source)
     signals: dict[str, Signal] = {}
     for name, column in columns.items():
         try:
@@ -127,7 +127,7 @@ def _with_clocks(source: Source) -> Source:
     groups[:2] = [groups[0] + groups[1]]  # what is before the first clock has that one
     columns = []
     for clock, group in zip(clocks, groups, strict=True):
-        times = _times(clock, source)
+        times = times_of(clock, source)
         seconds = convert(times.values, times.unit, "s")
         known = np.isfinite(seconds)
         for column in group:
@@ -136,7 +136,7 @@ def _with_clocks(source: Source) -> Source:
     return replace(source, table=replace(table, columns=tuple(columns), lines=None))
 
 
-def _times(column: Column, source: Source) -> Times:
+def times_of(column: Column, source: Source) -> Times:
     """Return the times in a column of numbers or dates."""
     if column.values is None:
         return Times(instants.seconds(column.texts, source))

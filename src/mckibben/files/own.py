@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,10 +12,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files.formats import READERS, tables, writer
+from mckibben.files.formats import READERS, reason, tables, writer
+from mckibben.files.notices import warn
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
 from mckibben.system import manifest, ordinary
+
+STILL = ("calibration", "pressure_reference")
+"""What of a recording's meta applies to samples that were edited since."""
 
 
 class Stored(BaseModel):
@@ -36,17 +41,19 @@ class Stored(BaseModel):
 
     def table(self, values: dict[str, Array]) -> Table:
         """Return the table of the samples described, by channel."""
-        return Table(
-            tuple(Column(name, values[name], unit) for name, unit in self.units.items()),
-            sample_time=self.sample_time,
-            start_time=self.start_time,
-            meta=self.meta,
-            own=True,
-        )
+        columns = tuple(Column(name, values[name], unit) for name, unit in self.units.items())
+        return Table(columns, None, self.sample_time, self.start_time, self.meta, own=True)
+
+    def edited(self, table: Table) -> Table:
+        """Return a table of samples that were changed since, with the units and calibrations."""
+        units = {"time": "s", **self.units}
+        columns = (replace(c, unit=c.unit or units.get(c.header) or None) for c in table.columns)
+        meta = {key: self.meta[key] for key in STILL if key in self.meta}
+        return replace(table, columns=tuple(columns), meta=meta)
 
 
 def write(recording: Recording, path: str | Path) -> None:
-    """Write a recording to a file, which `read` turns into an equal one; a file there is replaced.
+    """Write a recording to a file, from which `read` returns an equal one; a file there is replaced.
 
     Parameters
     ----------
@@ -69,8 +76,11 @@ def write(recording: Recording, path: str | Path) -> None:
 def describe(recording: Recording, samples: bytes, path: Path) -> str:
     """Return the description, in JSON, of a recording whose samples are these bytes on disk.
 
-    `DataError` if a channel is named ``time``, which the grid is, or in a way no header can hold; or if
-    ``meta`` holds what JSON cannot.
+    Raises
+    ------
+    DataError
+        If a channel is named ``time``, which the grid is, or as no header can be; or if ``meta`` holds
+        what JSON cannot.
     """
     for name, unit in recording.units.items():
         if name == "time" or not name.strip() or not (name + unit).isprintable():
@@ -78,7 +88,7 @@ def describe(recording: Recording, samples: bytes, path: Path) -> str:
                 f"no column can be named {name!r} with the unit {unit[:40]!r}",
                 file=path,
                 channel=name,
-                remedy="rename the channel and give its unit in plain letters; the time is written "
+                remedy="rename the channel and write its unit in plain letters; the time is written "
                 "from the sample time",
             )
     step = recording.sample_time
@@ -98,15 +108,22 @@ def describe(recording: Recording, samples: bytes, path: Path) -> str:
 
 
 def parse(text: str | bytes) -> Stored | str:
-    """Return what the JSON describes, or in words why it does not."""
+    """Return the description in a JSON text, or why it is none."""
     try:
         found = Stored.model_validate_json(text)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        return f"{where[:60]}: {first['msg'][:200]}".removeprefix(": ")
+        return reason(error)
     words = (*found.units, *found.units.values())
     return found if all(map(str.isprintable, words)) else "its names cannot be printed"
+
+
+def noted(found: Stored | str, problem: str, path: Path) -> Stored | None:
+    """Warn that a description is not of the samples as they are; None if it is no description."""
+    if isinstance(found, str):
+        warn(path, f"{problem}; it is ignored, and units are taken from the header")
+        return None
+    warn(path, f"{problem}; its units and calibrations are used, and nothing else of it")
+    return found
 
 
 def sidecar(path: Path) -> Path:
@@ -125,26 +142,20 @@ def description(path: Path) -> Path | None:
 
 def describes(path: Path) -> bool:
     """Return whether a file is a description by this package."""
-    return _described(path) is not None
+    try:
+        return isinstance(parse(ordinary.read_bytes(path, most=ordinary.DESCRIPTION)), Stored)
+    except MckibbenError:
+        return False
 
 
 def is_own(path: Path) -> bool:
     """Return whether a file is a recording by this package, as it was written."""
     beside = description(path)
-    if beside is not None:
-        found = _described(beside)
-        return found is not None and manifest.holds(path, {found.sha256})
+    if path.is_symlink() or (beside is not None and not describes(beside)):
+        return False
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return all(table.own for table in tables(path))
     except MckibbenError:
         return False
-
-
-def _described(path: Path) -> Stored | None:
-    try:
-        found = parse(ordinary.read_bytes(path, most=ordinary.DESCRIPTION))
-    except MckibbenError:
-        return None
-    return None if isinstance(found, str) else found

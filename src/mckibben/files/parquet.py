@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from mckibben.files import own
-from mckibben.files.notices import warn
 from mckibben.files.table import Column, Table, column
 from mckibben.files.tree import without_numbers
 from mckibben.recording import Recording
@@ -30,7 +29,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     frame = pq.ParquetFile(file).read()
     text = (frame.schema.metadata or {}).get(_KEY)
     described = None if text is None else _own(frame, text, path)
-    if described is not None:
+    if isinstance(described, Table):
         return [described]
     columns: list[Column] = []
     unread: dict[str, str] = {}
@@ -49,7 +48,8 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             unread[name] = f"a column of type {kind}"
     if not columns:
         raise without_numbers(unread, path)
-    return [Table(tuple(columns), unread=unread)]
+    table = Table(tuple(columns), unread=unread)
+    return [table if described is None else described.edited(table)]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -65,7 +65,8 @@ def write(recording: Recording, path: Path) -> None:
         pq.write_table(frame, new)
 
 
-def _own(frame: Any, text: bytes, path: Path) -> Table | None:
+def _own(frame: Any, text: bytes, path: Path) -> Table | own.Stored | None:
+    """Return the table that the description in a file is of, or the description of another."""
     description = own.parse(text)
     if isinstance(description, str):
         problem = f"the description in it is not by this package ({description})"
@@ -75,8 +76,7 @@ def _own(frame: Any, text: bytes, path: Path) -> Table | None:
             values = {name: frame[name].to_numpy() for name in description.units}
             if digest(_samples(values)) == description.sha256:
                 return description.table(values)
-    warn(path, f"{problem}; it is ignored, and units are taken from the names of the columns")
-    return None
+    return own.noted(description, problem, path)
 
 
 def _samples(channels: Any) -> bytes:

@@ -1,18 +1,18 @@
-"""What the caller of `read` asked for, and the table that it is asked of."""
+"""The options of `read`, and a table to which they apply."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, get_args
 
-import numpy as np
-
 from mckibben.errors import DataError
-from mckibben.files.channels import Channel, Described, Time
+from mckibben.files.channels import NAME, Channel, Described, Time
 from mckibben.files.formats import MOST_BYTES
+from mckibben.files.headers import parse, snake_case
 from mckibben.files.notices import warn
 from mckibben.files.table import Table
 
@@ -24,13 +24,7 @@ Gaps = Literal["error", "split", "interpolate", "raw"]
 
 @dataclass(frozen=True)
 class Request:
-    """The options of `mckibben.read`, and what the folder states of the file.
-
-    Parameters
-    ----------
-    described : Described
-        Goes behind what the caller asked for.
-    """
+    """The options of `mckibben.read`, and behind them the settings of ``channels.toml``."""
 
     columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
@@ -58,55 +52,62 @@ class Request:
         return channel in (self.channels or ()) or channel in self.columns
 
     def needs(self, channel: str) -> bool:
-        """Return whether a channel with flaws is an error rather than left out.
-
-        Those that the caller named are needed, or all where none is named.
-        """
+        """Return whether a flaw of a channel is an error: it is named, or none is."""
         return not self.names_channels or channel == "time" or self.asks_for(channel)
 
     def of(self, table: Table, path: Path) -> Source:
         """Return a table with this request, in which constants are among what is described.
 
         What this package wrote was described when it was first read, and is not calibrated twice.
+
+        Raises
+        ------
+        DataError
+            If its samples were changed since, so that it is not certain whether they are calibrated.
         """
         channels, time = dict(self.described.channels), self.described.time
+        done = table.calibration
         if table.own:
-            done = table.meta.get("calibration")
-            done = done if isinstance(done, Mapping) else {}
-            headers = {column.header for column in table.columns}
-            channels = {
-                name: given
-                for name, given in channels.items()
-                if name not in done and given.is_calibrated and (given.column or name) in headers
-            }
-            time = Time()
+            time, every = Time(), channels.items()
+            channels = {c: one for c, one in every if one.is_calibrated and c not in done}
+        headers = {snake_case(parse(column.header).name) for column in table.columns}
+        for name, one in channels.items():
+            here = one.column is None or snake_case(parse(one.column).name) in headers
+            if one.is_calibrated and here and name in done and name not in self.calibration:
+                raise DataError(
+                    f"it was calibrated before, and is again by {NAME}",
+                    file=path,
+                    channel=name,
+                    remedy=f"remove it from {NAME}; or, if the values are raw ones, use --calibrate "
+                    f"{name}=COLUMN:GAIN:OFFSET:UNIT",
+                )
         for name, (value, unit) in self.constants.items():
             channels[name] = Channel(value=value, unit=unit.strip() or None)
         described = self.described.model_copy(update={"channels": channels, "time": time})
         return Source(table, replace(self, described=described), path)
 
     def check(self, path: Path) -> None:
-        """Refuse what cannot be done with any file."""
+        """Refuse options that are impossible for any file."""
         error = partial(DataError, file=path)
         if self.gaps not in get_args(Gaps):
             problem = f"there is no way {self.gaps!r} to treat gaps"
             raise error(problem, remedy=f"use one of {', '.join(get_args(Gaps))}")
-        if self.rate is not None and not 0 < self.rate < np.inf:
+        if self.rate is not None and not 0 < self.rate < math.inf:
             problem = f"a rate of {self.rate:g} samples per second is impossible"
             raise error(problem, remedy="give a positive number with --rate")
         for channel, (value, _) in self.constants.items():
-            if not np.isfinite(value) or channel in ("", "time", *self.columns):
+            if not math.isfinite(value) or channel in ("", "time", *self.columns):
                 remedy = "give a finite number, to a channel that is no column and not time"
                 raise error(f"it cannot be the constant {value:g}", channel=channel, remedy=remedy)
         for channel, (gain, offset) in self.calibration.items():
-            if not (np.isfinite(gain) and np.isfinite(offset) and gain):
+            if not (math.isfinite(gain) and math.isfinite(offset) and gain):
                 problem = f"it cannot be {gain:g} times a column plus {offset:g}"
                 raise error(problem, channel=channel, remedy="give finite numbers, the gain not 0")
 
 
 @dataclass(frozen=True)
 class Source:
-    """A table, the file it is from, and what is asked of it."""
+    """A table, the file it is from, and the request for it."""
 
     table: Table
     request: Request

@@ -1,220 +1,282 @@
-"""What a path stands for: a file, files with one signal each, a bag's folder, or several recordings."""
+"""The files of a recording: one, several with one signal each, or those in the folder of a bag."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+import warnings
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
 from io import BufferedReader
 from pathlib import Path
 
+import numpy as np
+
+from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import formats, signals
-from mckibben.files.channels import NAME, described
+from mckibben.files import formats, timebase
+from mckibben.files.channels import NAME, about, described
+from mckibben.files.converting import times_of
+from mckibben.files.headers import channel_of, is_standard, is_time, parse, unit_of
 from mckibben.files.own import description
-from mckibben.files.request import Request
-from mckibben.files.table import Table
+from mckibben.files.request import Request, Source
+from mckibben.files.table import Column, Table
+from mckibben.files.units import convert
 from mckibben.system.ordinary import DESCRIPTION, opened, read_text
 
 BAG = "metadata.yaml"
 """In the folder of a bag of ROS 2."""
 
-PACKED = ".zstd"
-"""Ending of the files of a bag that were packed as a whole."""
-
 PROTOCOL = "protocol.json"
-"""Tells in a folder what each recording in it is for."""
+"""Has the role of each recording in its folder."""
+
+ROLES = ("train", "validation", "test")
+
+JOIN = (
+    "name the files as channels, such as pressure.csv and displacement.csv; or write in "
+    f'{NAME} which belong together, as in join = ["*_pressure.csv", "*_displacement.csv"]; or give '
+    "files instead of the folder, where each is a recording"
+)
 
 
 def is_bag(path: Path) -> bool:
-    """Tell whether a folder is a bag of ROS 2."""
+    """Return whether a folder is a bag of ROS 2."""
     return path.is_dir() and (path / BAG).is_file()
 
 
 def inside(path: Path) -> list[Path]:
-    """Return what to read the recordings of a path from: itself, unless it is a folder of several.
+    """Return the recordings of a path: itself, unless it is a folder of several.
 
-    Of files that are one recording, as ``channels.toml`` has it, the first stands for all.
+    Of files that are one recording by ``join`` in ``channels.toml``, the first represents all.
 
     Raises
     ------
     DataError
-        If it is a folder without recordings, or of files with one signal each that cannot be told.
+        If a folder has no recordings, or files with one signal each that may be one or several.
     """
     if not path.is_dir() or is_bag(path):
         return [path]
-    found = _files(path) + [each for each in _listed(path) if is_bag(each)]
+    bags = [each for each in _listed(path) if is_bag(each)]
+    found = _files(path) + bags
     if not found:
         raise DataError("there is no recording in the folder", file=path, remedy="name files")
     if os.path.lexists(path / PROTOCOL):
         return found
-    said = described(path)
-    firsts: dict[Path, None] = {}
-    for each in found:
-        together = said.joined(each.name)
-        firsts[path / next(iter(together.values())) if together else each] = None
-    if len(firsts) == len(found) and not any(map(is_bag, found)) and signals.are_one(found, said):
+    settings = described(path)
+    firsts = {path / next(iter(settings.parts(each.name))): None for each in found}
+    if len(firsts) == len(found) and not bags and _are_one(found):
         return [path]
     return list(firsts)
 
 
-def roles(folder: Path) -> dict[str, list[Path]]:
-    """Return the recordings of a folder by role, as its protocol.json has them, or all to train.
-
-    A folder that is one recording itself, as of files with one signal each, stands for that.
+def roles(path: Path) -> dict[str, list[Path]]:
+    """Return the recordings of a path by role, as its protocol.json has them, or all to train.
 
     Raises
     ------
     DataError
-        If there are none, or it cannot be told which files are one.
+        If there are none, or ``protocol.json`` cannot be read; else those of `inside`.
     """
-    protocol = folder / PROTOCOL
-    found = inside(folder)
-    if not os.path.lexists(protocol):
+    found = inside(path)
+    if not os.path.lexists(path / PROTOCOL):
         return {"train": found}
-    text = read_text(protocol, most=DESCRIPTION)
-    try:
-        given = {str(run["name"]): str(run["role"]) for run in json.loads(text)["runs"]}
-    except (ValueError, KeyError, TypeError, RecursionError):
-        raise DataError(
-            "its protocol.json is not readable", file=folder, remedy="repair or remove it"
-        ) from None
-    by_role: dict[str, list[Path]] = {}
-    for path in found:
-        by_role.setdefault(given.get(path.stem, "train"), []).append(path)
+    text = read_text(path / PROTOCOL, most=DESCRIPTION)
+    by_role: dict[str, list[Path]] = {role: [] for role in ROLES}
+    with formats.refusing(path / PROTOCOL):
+        given = {run["name"]: run["role"] for run in json.loads(text)["runs"]}
+        for each in found:
+            by_role[given.get(each.stem, "train")].append(each)
     return by_role
 
 
 def expanded(
     files: Sequence[Path], test: Sequence[Path]
 ) -> tuple[list[Path], list[Path], list[Path]]:
-    """Return files to train, to validate and to test on, folders replaced by what is in them.
+    """Return files to train, to validate and to test on, folders replaced by their recordings.
 
-    Parameters
-    ----------
-    files : sequence of Path
-        Files to train on; of folders, each recording has its own role.
-    test : sequence of Path
-        Files to test on; of folders, everything.
+    Recordings in a folder of ``files`` have their own roles; all of ``test`` are to test on. Errors are
+    those of `roles`.
+    """
+    by_role = [roles(file) for file in files]
+    train, validation, tests = ([p for one in by_role for p in one.get(role, [])] for role in ROLES)
+    return train, validation, tests + [path for file in test for path in inside(file)]
+
+
+def tables(path: Path, request: Request) -> tuple[list[Table], str]:
+    """Return the contents of a recording before they are interpreted, and the SHA-256 of its files.
 
     Raises
     ------
     DataError
-        On a folder without recordings.
+        If there are no files, or one changes while it is read; else those of
+        `mckibben.files.formats.read`.
     """
-    found: dict[str, list[Path]] = {"train": [], "validation": [], "test": []}
-    for file in files:
-        for role, paths in (roles(file) if file.is_dir() else {"train": [file]}).items():
-            found.setdefault(role, []).extend(paths)
-    for file in test:
-        several = roles(file).values() if file.is_dir() else [[file]]
-        found["test"] += [path for paths in several for path in paths]
-    return found["train"], found["validation"], found["test"]
-
-
-def tables(path: Path, request: Request) -> tuple[list[Table], str]:
-    """Return what is in a recording as it stands there, and the SHA-256 of its files.
-
-    Errors are those of `mckibben.files.formats.read` and `mckibben.files.signals.joined`.
-    """
-    if is_bag(path):
-        return _bag(path, request.most)
-    if path.is_dir():
-        parts = {each.stem: each for each in _files(path)}
-    else:
-        together = described(path.parent).joined(path.name)
-        parts = {name: path.with_name(file) for name, file in together.items()} or {"": path}
+    parts = _parts(path)
+    if not parts:
+        raise DataError("there is no recording in it", file=path, remedy="copy all of its files")
     found: dict[Path, list[Table]] = {}
-    digests: dict[Path, str] = {}
-    for each in parts.values():
-        with _unchanged(each, digests, request.most) as file:
-            found[each] = formats.read(file, each)
+    digests: list[str] = []
+    with ExitStack() as stack:
+        files = {each: stack.enter_context(opened(each, most=int(request.most))) for each in parts}
+        before = [_state(file) for file in files.values()]
+        if is_bag(path):
+            found[path] = formats.bag(path)
+        else:
+            found |= {each: formats.read(file, each) for each, file in files.items()}
+        for (each, file), state in zip(files.items(), before, strict=True):
+            file.seek(0)
+            digests.append(hashlib.file_digest(file, "sha256").hexdigest())
+            if _state(file) != state:
+                problem = "it changed while it was read"
+                remedy = "wait until whatever writes it is done, then read it again"
+                raise DataError(problem, file=each, remedy=remedy)
+    digest, *more = digests
+    if more:
+        digest = hashlib.sha256("".join(digests).encode()).hexdigest()
     if len(found) == 1:
-        return next(iter(found.values())), _one(digests.values())
+        return next(iter(found.values())), digest
     for each, several in found.items():
         if len(several) > 1:
-            raise DataError(
-                f"it holds {len(several)} recordings, where one signal is expected",
-                file=each,
-                remedy=f"leave it out of join in {NAME}",
-            )
-    one = signals.joined(
-        {each: several[0] for each, several in found.items()}, list(parts), request
-    )
-    return [one], _one(digests.values())
-
-
-def _bag(folder: Path, most: float) -> tuple[list[Table], str]:
-    parts = _files(folder)
-    if not parts:
-        raise DataError(
-            "there is no .db3 or .mcap file in it", file=folder, remedy="copy all of it"
-        )
-    digests: dict[Path, str] = {}
-    with ExitStack() as stack:
-        for each in parts:
-            stack.enter_context(_unchanged(each, digests, most))
-        found = formats.bag(folder)
-    return found, _one(digests[each] for each in parts)
-
-
-@contextmanager
-def _unchanged(path: Path, digests: dict[Path, str], most: float) -> Iterator[BufferedReader]:
-    """Open a file, note its SHA-256 at the end, and refuse it if it changed in between."""
-    with opened(path, most=int(most)) as file:
-        before = os.fstat(file.fileno())
-        yield file
-        file.seek(0)
-        digests[path] = hashlib.file_digest(file, "sha256").hexdigest()
-        after = os.fstat(file.fileno())
-    if (before.st_mtime_ns, before.st_size) != (after.st_mtime_ns, after.st_size):
-        raise DataError(
-            "it changed while it was read",
-            file=path,
-            remedy="wait until whatever writes it is done, then read it again",
-        )
-
-
-def _one(digests: Iterable[str]) -> str:
-    """Return the digest of a recording of those of its files."""
-    several = list(digests)
-    if len(several) == 1:
-        return several[0]
-    return hashlib.sha256("".join(several).encode()).hexdigest()
+            problem = f"it holds {len(several)} recordings, where one signal is expected"
+            raise DataError(problem, file=each, remedy=f"leave it out of join in {NAME}")
+    one = _joined({each: several[0] for each, several in found.items()}, parts, request)
+    return [one], digest
 
 
 def read_with(path: Path) -> list[Path]:
     """Return all files that are read where this one is, or this folder; some may be missing.
 
-    They are the parts of recordings and what describes them; a file of another kind stands alone.
+    They are the parts of recordings and what describes them.
     """
     if path.is_dir():
-        bags = (each for each in _listed(path) if is_bag(each))
-        parts = [*_files(path), *(file for bag in bags for file in _files(bag))]
-        about = [path / NAME, path / PROTOCOL, path / BAG]
-    elif path.suffix.casefold() in formats.READERS:
-        together = described(path.parent).joined(path.name)
-        parts = [path, *(path.with_name(name) for name in together.values())]
-        about = [path.with_name(NAME)]
+        parts = [file for each in (path, *filter(is_bag, _listed(path))) for file in _files(each)]
+        beside = [path / NAME, path / PROTOCOL, path / BAG]
     else:
-        return [path]
-    return [*parts, *filter(None, map(description, parts)), *about]
+        parts, beside = [*_parts(path)], [path.with_name(NAME)]
+    return [*parts, *filter(None, map(description, parts)), *beside]
+
+
+def _parts(path: Path) -> dict[Path, str]:
+    """Return the files of a recording -> the names of their signals, where they are several."""
+    if path.is_dir():
+        return {each: each.stem for each in _files(path)}
+    parts = described(path.parent).parts(path.name)
+    return {path.with_name(file): name for file, name in parts.items()}
+
+
+def _state(file: BufferedReader) -> tuple[int, int]:
+    found = os.fstat(file.fileno())
+    return found.st_mtime_ns, found.st_size
 
 
 def _files(folder: Path) -> list[Path]:
-    endings = {*formats.SOUGHT, *([PACKED] if is_bag(folder) else ())}
+    endings = (*formats.SOUGHT, ".zstd") if is_bag(folder) else formats.SOUGHT  # packed parts
     found = (each for each in _listed(folder) if each.suffix.casefold() in endings)
     return [each for each in found if each.is_file()]
 
 
 def _listed(folder: Path) -> list[Path]:
-    try:
+    with formats.refusing(folder):
         return sorted(folder.iterdir())
-    except OSError as error:
+
+
+def _are_one(paths: Sequence[Path]) -> bool:
+    """Return whether files are one recording: of one column each, all of different channels."""
+    channels: list[str] = []
+    for path in paths if len(paths) > 1 else ():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tables = formats.tables(path)
+        signals, _ = _split(tables[0], about(path).time.column)
+        if len(tables) > 1 or len(signals) != 1:
+            return False
+        channels.append(channel_of(parse(_named(signals[0], path.stem).label)))
+    if len(set(channels)) < 2:
+        return False
+    if len(set(channels)) < len(channels) or not any(map(unit_of, channels)):
         raise DataError(
-            f"it cannot be read ({(error.strerror or str(error)).lower()})",
-            file=folder,
-            remedy="check the folder and its rights",
-        ) from None
+            "its files hold one signal each, and neither their names nor their headers show which "
+            f"belong together: {', '.join(path.name for path in paths[:10])}",
+            file=paths[0].parent,
+            remedy=JOIN,
+        )
+    return True
+
+
+def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Request) -> Table:
+    """Return one table of files with one signal each, given the names of the signals."""
+    stamp = request.columns.get("time", request.described.time.column)
+    signals: list[Column] = []
+    clocks: list[Column] = []
+    split = {path: _split(table, stamp) for path, table in tables.items()}
+    timed = any(times for _, times in split.values())
+    for path, (found, times) in split.items():
+        channel = problem = None
+        if len(found) != 1:
+            problem = f"it has {len(found)} columns of numbers, where one signal is expected"
+        elif len(times) != timed:
+            channel = "time"
+            problem = f"it has {len(times)} columns of times, where another file has one"
+        if problem:
+            remedy = (
+                "save one signal in every file, and one column of times in all or in none, and "
+                f"use --rate; or leave the file out of join in {NAME}"
+            )
+            raise DataError(problem, file=path, channel=channel, remedy=remedy)
+        signals.append(_named(found[0], names[path]))
+        clocks += times
+    grids = {(table.sample_time, table.start_time) for table in tables.values()}
+    apart = timed or (len(grids) > 1 and all(step is not None for step, _ in grids))
+    lengths = {path.name: table.n_samples for path, table in tables.items()}
+    if not apart and len(set(lengths.values())) > 1:
+        listing = ", ".join(f"{name} {n}" for name, n in lengths.items())
+        problem = f"its files have no times and differ in length: {listing}"
+        raise DataError(problem, file=next(iter(tables)).parent, remedy=JOIN)
+    each = tables.items()
+    done = {name: one for _, table in each for name, one in table.calibration.items()}
+    step, start = grids.pop() if len(grids) == 1 else (None, 0.0)
+    together = Table(
+        (*clocks[:1], *signals),
+        next(iter(tables.values())).lines,
+        step,
+        start,
+        meta={"calibration": done} if done else {},
+        rates={f"{path.name}/{n}": rate for path, table in each for n, rate in table.rates.items()},
+        unread={f"{path.name}/{n}": why for path, table in each for n, why in table.unread.items()},
+    )
+    if not apart:
+        return together
+    seconds: list[Array] = []
+    for at, (path, table) in enumerate(each):
+        if timed:
+            source = Source(table, request, path)
+            clock = times_of(clocks[at], source)
+            seconds.append(convert(timebase.checked(clock.values, source), clock.unit, "s"))
+        else:
+            samples = np.arange(table.n_samples, dtype=np.float64)
+            seconds.append(table.start_time + (table.sample_time or 0.0) * samples)
+    if timed and all(np.array_equal(times, seconds[0]) for times in seconds):
+        return together
+    columns = (replace(one, times=times) for one, times in zip(signals, seconds, strict=True))
+    return replace(together, columns=tuple(columns), lines=None)
+
+
+def _split(table: Table, stamp: str | None) -> tuple[list[Column], list[Column]]:
+    """Return the signals of a table, and its times."""
+    signals: list[Column] = []
+    times: list[Column] = []
+    for column in table.columns:
+        if stamp in (column.header, parse(column.label).name) or is_time(column.label):
+            times.append(column)
+        elif column.values is not None:
+            signals.append(column)
+    return signals, times
+
+
+def _named(column: Column, name: str) -> Column:
+    """Return a column with the name of its file for the channel, or else with that of its header."""
+    if is_standard(column.header) and not is_standard(name):
+        return replace(column, header=name, says=column.header)
+    return replace(column, header=name, unit=column.unit or parse(column.header).unit)

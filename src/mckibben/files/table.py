@@ -13,27 +13,13 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 
-MOST_TEXT = 2**16
-"""Most characters of a text about the recording; longer ones are left out."""
-
 WIDEST = 64
 """Most columns of a matrix that are read as channels."""
-
-SLENDER = 10
-"""Fewest rows of such a matrix for each of its columns."""
 
 
 @dataclass(frozen=True)
 class Flaw:
-    """Why a column of numbers cannot be used.
-
-    Parameters
-    ----------
-    sample : int
-        The first that shows it, counted from 0.
-    problem, remedy : str
-        As in a `DataError`.
-    """
+    """Why a column of numbers cannot be used, as in a `DataError`, and the first sample of which."""
 
     sample: int
     problem: str
@@ -42,42 +28,18 @@ class Flaw:
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a file.
+    """One column of a file."""
 
-    Parameters
-    ----------
-    header : str
-        As written in the file.
-    values : numpy.ndarray, shape (n,), or None
-        The samples, NaN where a cell is blank; None for a column of text.
-    unit : str, optional
-        The unit where the file states it apart from the header.
-    texts : sequence of str, length n
-        The cells of a column of text; of a text file the first ones only, unless they are times.
-    flaw : Flaw, optional
-        Why the samples cannot be used, if they cannot.
-    says : str, optional
-        What names the channel and the unit in place of the header, as the name of a file does.
-    times : numpy.ndarray, shape (n,), optional
-        Times of the samples [s], where not all columns were sampled together.
-    held : bool
-        Whether the last sample holds until the next, as with counts and switches.
-    place : str, optional
-        The names that lead to it in the file, where the header is less.
-    matrix : bool
-        Whether it is a column of a matrix, whose names mean nothing.
-    """
-
-    header: str
-    values: Array | None
-    unit: str | None = None
-    texts: Sequence[str] = ()
+    header: str  # as written in the file
+    values: Array | None  # the samples, NaN where a cell is blank; None for a column of text
+    unit: str | None = None  # where the file states it apart from the header
+    texts: Sequence[str] = ()  # cells of text; of a text file the first ones, unless they are times
     flaw: Flaw | None = None
-    says: str | None = None
-    times: Array | None = None
-    held: bool = False
-    place: str | None = None
-    matrix: bool = False
+    says: str | None = None  # names channel and unit in place of the header, as a file's name does
+    times: Array | None = None  # of the samples [s], where not all columns were sampled together
+    held: bool = False  # whether each sample holds until the next, as with counts and switches
+    place: str | None = None  # the names that lead to it in the file, where the header is less
+    matrix: bool = False  # whether it is a column of a matrix, whose names mean nothing
 
     @property
     def label(self) -> str:
@@ -92,38 +54,20 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """The columns of one recording in a file.
+    """The columns of one recording in a file, and what else the file holds.
 
-    Parameters
-    ----------
-    columns : tuple of Column
-        In the order of the file; of unlike lengths where the file holds vectors of unlike lengths.
-    lines : numpy.ndarray of int, shape (n,), optional
-        The line of a text file that each sample is in; without it, samples count from 1.
-    sample_time, start_time : float
-        The time grid [s] where the file states it; ``sample_time`` is None otherwise.
-    meta : mapping
-        What else the file holds.
-    rates : mapping of str to float
-        Scalars named as rates or sample times are, by their places.
-    unread : mapping of str to str
-        What else holds data and became no column (a struct array, a sheet, a data set of three axes),
-        by its place, and the reason in a few words.
-    name : str, optional
-        The name of this recording among several in the file.
-    own : bool
-        Whether this package wrote it: names, units and meta then need no interpretation.
+    The columns are in the order of the file, and of unlike lengths where it holds such vectors.
     """
 
     columns: tuple[Column, ...]
-    lines: NDArray[np.int64] | None = None
-    sample_time: float | None = None
-    start_time: float = 0.0
+    lines: NDArray[np.int64] | None = None  # of each sample in a text file; without, count from 1
+    sample_time: float | None = None  # [s], where the file states it
+    start_time: float = 0.0  # [s]
     meta: Mapping[str, Any] = field(default_factory=dict)
-    rates: Mapping[str, float] = field(default_factory=dict)
-    unread: Mapping[str, str] = field(default_factory=dict)
-    name: str | None = None
-    own: bool = False
+    rates: Mapping[str, float] = field(default_factory=dict)  # place -> rate or sample time
+    unread: Mapping[str, str] = field(default_factory=dict)  # place -> why it became no column
+    name: str | None = None  # of this recording among several in the file
+    own: bool = False  # whether this package wrote it, so that nothing needs interpretation
 
     @property
     def n_samples(self) -> int:
@@ -137,8 +81,14 @@ class Table:
         """Whether columns have times of their own, so that none of them is the time."""
         return any(column.times is not None for column in self.columns)
 
+    @property
+    def calibration(self) -> Mapping[str, Any]:
+        """How channels were calibrated when this package wrote them, by their names."""
+        found = self.meta.get("calibration")
+        return found if isinstance(found, Mapping) else {}
+
     def row(self, sample: int) -> int:
-        """Return the row to name in an error for a sample counted from 0."""
+        """Return the row that an error names for a sample counted from 0."""
         return sample + 1 if self.lines is None else int(self.lines[sample])
 
 
@@ -161,72 +111,50 @@ def plain_meta(found: Mapping[str, Any]) -> dict[str, Any]:
             value = value.item()
         if isinstance(value, bytes):
             value = value.decode("utf-8", "replace")
-        if (isinstance(value, str) and len(value) <= MOST_TEXT) or (
-            isinstance(value, (int, float)) and math.isfinite(value)
-        ):
+        if isinstance(value, (int, float)):
+            usable = math.isfinite(value)
+        else:
+            usable = (
+                isinstance(value, str) and len(value) <= 2**16
+            )  # longer ones are not about the recording
+        if usable:
             meta[name] = value
     return meta
 
 
 def is_matrix(shape: Sequence[int]) -> bool:
-    """Tell whether the rows or the columns of a matrix are channels: few, and long."""
-    return len(shape) == 2 and 2 <= min(shape) <= WIDEST and max(shape) >= SLENDER * min(shape)
+    """Return whether the rows or the columns of a matrix are channels: few, and long."""
+    return len(shape) == 2 and 2 <= min(shape) <= WIDEST and max(shape) >= 10 * min(shape)
 
 
-def printable(table: Table) -> Table:
-    r"""Return a table of another program without control characters in its words.
+def printable(value: Any) -> Any:
+    r"""Return a table of another program, or what it holds, without control characters in its texts.
 
-    Blanks of any kind become plain ones; other signs that cannot be printed are written as ``\x1b``.
+    Blanks of any kind become plain ones; other characters that cannot be printed are written out.
+
+    >>> print(printable(["\x1b[31mpressure\xa0(bar)"])[0])
+    \x1b[31mpressure (bar)
     """
-    if table.own:
-        return table
-    columns = tuple(
-        replace(
-            column,
-            header=plain(column.header),
-            unit=column.unit and plain(column.unit),
-            says=column.says and plain(column.says),
-            place=column.place and plain(column.place),
-        )
-        for column in table.columns
-    )
-    return replace(
-        table,
-        columns=columns,
-        name=table.name and plain(table.name),
-        meta={plain(key): _plain_value(value) for key, value in table.meta.items()},
-        rates={plain(place): value for place, value in table.rates.items()},
-        unread={plain(place): plain(why) for place, why in table.unread.items()},
-    )
+    if isinstance(value, str):
+        if value.isprintable():
+            return value
+        written = (c if c.isprintable() else " " if c.isspace() else ascii(c)[1:-1] for c in value)
+        return "".join(written)
+    if isinstance(value, (list, tuple)):
+        return type(value)(map(printable, value))
+    if isinstance(value, Mapping):
+        return {printable(key): printable(each) for key, each in value.items()}
+    if isinstance(value, (Table, Column)) and not getattr(value, "own", False):
+        return replace(value, **{name: printable(each) for name, each in vars(value).items()})
+    return value
 
 
 def distinct(table: Table) -> Table:
     """Return a table in which the second column of one header is called ``header (2)``, and so on."""
     seen: Counter[str] = Counter()
     columns = []
-    for column in table.columns:
+    for column in () if table.own else table.columns:
         seen[column.header] += 1
         n = seen[column.header]
-        header = column.header if n == 1 or table.own else f"{column.header} ({n})"
-        columns.append(column if n == 1 else replace(column, header=header))
+        columns.append(column if n == 1 else replace(column, header=f"{column.header} ({n})"))
     return replace(table, columns=tuple(columns)) if len(seen) < len(columns) else table
-
-
-def plain(text: str) -> str:
-    r"""Return text with what cannot be printed written out.
-
-    >>> print(plain("\x1b[31mpressure\xa0(bar)"))
-    \x1b[31mpressure (bar)
-    """
-    if text.isprintable():
-        return text
-    return "".join(
-        sign if sign.isprintable() else " " if sign.isspace() else ascii(sign)[1:-1]
-        for sign in text
-    )
-
-
-def _plain_value(value: Any) -> Any:
-    if isinstance(value, str):
-        return plain(value)
-    return [_plain_value(item) for item in value] if isinstance(value, list) else value

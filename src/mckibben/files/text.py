@@ -36,8 +36,11 @@ _SNIFFED = 2**18  # bytes by which the layout of a table is recognised
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the table of a text file."""
     data = file.read()
-    table = _own(data, path) if os.path.lexists(own.sidecar(path)) else None
-    return [table or parsed(decoded(data, path), path)]
+    found = _own(data, path) if os.path.lexists(own.sidecar(path)) else None
+    if isinstance(found, Table):
+        return [found]
+    table = parsed(decoded(data, path), path)
+    return [table if found is None else found.edited(table)]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -56,8 +59,8 @@ def write(recording: Recording, path: Path) -> None:
         new.write_text(description, encoding="utf-8")
 
 
-def _own(data: bytes, path: Path) -> Table | None:
-    """Return the table that the description beside a file is of, or None with a note."""
+def _own(data: bytes, path: Path) -> Table | own.Stored | None:
+    """Return the table that the description beside a file is of, or the description of another."""
     try:
         description = own.parse(read_bytes(own.sidecar(path), most=DESCRIPTION))
     except DataError as error:
@@ -74,8 +77,7 @@ def _own(data: bytes, path: Path) -> Table | None:
     else:
         frame = _frame(data, dialect, names, skiprows=1, dtype=np.float64)
         return description.table({name: frame[name].to_numpy() for name in names})
-    warn(own.sidecar(path), f"it {problem}; it is ignored, and units are taken from the header")
-    return None
+    return own.noted(description, f"it {problem}", own.sidecar(path))
 
 
 def _frame(data: bytes, dialect: Dialect, names: Sequence[Any], **options: Any) -> Any:

@@ -17,47 +17,40 @@ from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt
-from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.core.block import Kernel
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
     StoredInitial,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import SLACK, kernel, step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Ranged, check_input_range
-from mckibben.blocks.play_type.memory import play_state
+from mckibben.blocks.core.solved_inverse import solved_start
 from mckibben.errors import ModelError
 
-Array = NDArray[np.float64]
 
-
-# --- A kernel is one pass over time: coefficients in, state changed in place, outputs filled. It
-# --- allocates nothing. simulate, stream and simulate_many all call it, so they agree to the bit.
-# --- Use summing_kernel instead where many weighted operators are added up: it vectorises.
-@kernel
-def elastic_plastic_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+# --- A kernel takes one sample: coefficients in, state changed in place, outputs filled. It allocates
+# --- nothing. simulate, stream, simulate_many and C are all made from it, so they agree to the bit: it
+# --- is written in a small part of Python, see docs/kernels.md.
+# --- Use summing_step instead where many weighted operators are added up: it vectorises.
+@step
+def elastic_plastic_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; coefficients are [gain, weight, r], the state is the play operator's output."""
     gain, weight, r = coefficients[0], coefficients[1], coefficients[2]
-    s = state[0]
-    for t in range(inputs.shape[0]):
-        u = inputs[t, 0]
-        s = min(max(s, u - r), u + r)
-        outputs[t, 0] = gain * u + weight * (u - s)
-    state[0] = s
+    u = inputs[0]
+    state[0] = min(max(state[0], u - r), u + r)
+    outputs[0] = gain * u + weight * (u - state[0])
 
 
-@kernel
-def elastic_plastic_inverse_kernel(
+@step
+def elastic_plastic_inverse_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Invert the model; coefficients are [forward ones, lowest, highest input].
@@ -66,20 +59,37 @@ def elastic_plastic_inverse_kernel(
     """
     gain, weight, r = coefficients[0], coefficients[1], coefficients[2]
     lowest, highest = coefficients[3], coefficients[4]
-    slack = 1e-9 * (highest - lowest)
-    for t in range(inputs.shape[0]):
-        y = inputs[t, 0]
-        s = state[0]
-        u = (y + weight * s) / (gain + weight)
-        if u > s + r:
-            u = (y - weight * r) / gain
-        elif u < s - r:
-            u = (y + weight * r) / gain
-        if u < lowest - slack or u > highest + slack:
-            state[1] += 1.0
-        u = min(max(u, lowest), highest)
-        state[0] = min(max(s, u - r), u + r)
-        outputs[t, 0] = u
+    slack = SLACK * (highest - lowest)
+    y, s = inputs[0], state[0]
+    u = (y + weight * s) / (gain + weight)
+    if u > s + r:
+        u = (y - weight * r) / gain
+    elif u < s - r:
+        u = (y + weight * r) / gain
+    if u < lowest - slack or u > highest + slack:
+        state[1] += 1.0
+    u = min(max(u, lowest), highest)
+    state[0] = min(max(s, u - r), u + r)
+    outputs[0] = u
+
+
+# --- Memory is always explicit: a rule by name, which a start fills in, or the state itself.
+@kernel
+def elastic_plastic_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as if the input had only risen to the first sample, or as if nothing had happened."""
+    u, r = inputs[0], coefficients[2]
+    state[0] = min(max(0.0, u - r), u + r) if virgin else u - r
+
+
+# --- That of the inverse seeks the input at which the block gives the first reference, by bisection. It
+# --- asks for the output that an input gives where the block has been started with it.
+@kernel
+def _first_output(u: float, memory: tuple[Array, Array]) -> float:
+    c, state = memory
+    return c[0] * u + c[1] * (u - state[0])
+
+
+elastic_plastic_inverse_start = solved_start(_first_output, elastic_plastic_start, 1)
 
 
 # --- A block is a frozen dataclass of its parameters. STRICT refuses unknown fields, numbers that are
@@ -106,8 +116,10 @@ class ElasticPlastic(Ranged):
 
     # --- The name in the registry and in saved files; it never changes once there are files.
     kind: ClassVar[str] = "elastic-plastic"
-    kernel: ClassVar[Kernel] = elastic_plastic_kernel
-    inverse_kernel: ClassVar[Kernel] = elastic_plastic_inverse_kernel
+    kernel: ClassVar[Kernel] = elastic_plastic_step
+    start_kernel: ClassVar[Start] = elastic_plastic_start
+    inverse_kernel: ClassVar[Kernel] = elastic_plastic_inverse_step
+    inverse_start_kernel: ClassVar[Start] = elastic_plastic_inverse_start
     # --- What the parameter vector is made of, and, as here it is all that the kernel reads, its
     # --- coefficients; else override coefficients().
     parameters: ClassVar[tuple[str, ...]] = ("gain", "weight", "threshold")
@@ -142,17 +154,11 @@ class ElasticPlastic(Ranged):
         """The play operator's output."""
         return 1
 
-    # --- Memory is always explicit: a rule by name, or the state itself. It is a new array each time.
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the play operator's output before the first sample, shape (1,)."""
-        start = self.initial if initial is None else initial
-        return play_state(self, np.array([self.threshold]), first[0], first[0], start)
-
     def peaks(self) -> Array:
         """Return the peak from which the operator just comes back to the lowest input."""
         return np.array([self.limits[0] + 2 * self.threshold])
 
-    # --- Without an exact inverse, leave out its kernel and what follows, and derive from SingleChannel
+    # --- Without an exact inverse, leave out its kernels and what follows, and derive from SingleChannel
     # --- and Primitive in place of Ranged: Block.inverse then says what to use instead. One to be
     # --- solved for in every sample derives from Solved; see blocks/play_type/eupi.py.
     # --- An error says which condition fails, and ends with the remedy.
@@ -166,8 +172,7 @@ class ElasticPlastic(Ranged):
             )
 
     # --- Its numbers are this model's, then the limits; its state is this model's, then the count of
-    # --- clipped samples; it starts where this model gives the first reference, sought by bisection.
-    # --- What differs is said by inverse_numbers, inverse_remembers and input_giving; see
+    # --- clipped samples. What differs is said by inverse_numbers and inverse_remembers; see
     # --- blocks/core/single_channel.py.
 
     # --- Contract tests run on the example: make it small and typical.

@@ -133,12 +133,13 @@ def test_plans_are_the_best_there_are(n: int) -> None:
             options={"maxiter": 500, "ftol": 1e-12},
         )
         found = nominal.copy()
-        given = (rows, before, slopes.reshape(-1), nominal, errors, found)
-        plan(*given, np.zeros(plan_scratch(6, n, len(rows))))
+        flat = (slopes.ravel(), nominal.ravel(), errors.ravel())
+        given = (rows.ravel(), before, *flat, found.reshape(-1))
+        plan(n, *given, np.zeros(plan_scratch(6, n, len(rows))))
         assert np.abs(found.ravel() - best.x).max() < 1e-4
         if n == 1:
             exact = nominal.copy()
-            plan_one(*given[:-1], exact, np.zeros(one_scratch(6)))
+            plan_one(*given[:-1], exact.reshape(-1), np.zeros(one_scratch(6)))
             assert np.abs(exact - found).max() < 1e-4
             assert lost(exact.ravel()) <= lost(best.x) + 1e-7
 
@@ -148,8 +149,9 @@ def test_plans_end_where_there_is_none() -> None:
     rows, before, slopes, nominal, errors = problem(2, 0)
     for slope, start, steps in ((np.nan, before, 0), (1.0, before + 50.0, MOST_STEPS)):
         found = nominal.copy()
-        given = (rows, start, slope * slopes.reshape(-1), nominal, errors, found)
-        assert plan(*given, np.zeros(plan_scratch(6, 2, len(rows)))) == steps
+        flat = (slope * slopes.ravel(), nominal.ravel(), errors.ravel())
+        given = (rows.ravel(), start, *flat, found.reshape(-1))
+        assert plan(2, *given, np.zeros(plan_scratch(6, 2, len(rows)))) == steps
         assert np.isfinite(found).all()
 
 
@@ -169,11 +171,11 @@ def test_a_derivative_above_zero_throughout_is_least_at_its_lowest(
 def test_the_supply_takes_from_all_in_one_share() -> None:
     rows = limit_rows(np.zeros(2), np.full(2, 5.0), np.inf, 6.0, 1.0, np.ones(2))
     p = np.array([3.0, 2.0])
-    assert not allowed(rows, np.array([1.0, 1.0]), p)
+    assert not allowed(rows.ravel(), np.array([1.0, 1.0]), p)
     assert p == pytest.approx([1.5, 1.5])
     falling = np.array([0.0, 2.0])
-    assert allowed(rows, np.array([4.0, 1.0]), falling)  # what vents gives nothing back
-    assert not allowed(rows, np.array([4.0, 0.5]), np.array([0.0, 2.0]))
+    assert allowed(rows.ravel(), np.array([4.0, 1.0]), falling)  # what vents gives nothing back
+    assert not allowed(rows.ravel(), np.array([4.0, 0.5]), np.array([0.0, 2.0]))
 
 
 @pytest.mark.kernel

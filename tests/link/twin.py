@@ -207,9 +207,9 @@ class Twin:
         if not self.started:
             state[:] = self.block.initial_state(self.inputs)
             self.started = True
-        outputs = np.empty((1, self.n_out))
-        type(self.block).kernel(coefficients, state, self.inputs[None, :].copy(), outputs)
-        self.outputs = np.clip(outputs[0], self.low[self.n_in :], self.high[self.n_in :])
+        outputs = np.empty(self.n_out)
+        self.block.kernel(coefficients, state, self.inputs, outputs)
+        self.outputs = np.clip(outputs, self.low[self.n_in :], self.high[self.n_in :])
         self.notes = 4 * bool((self.outputs != outputs[0]).any())
         self.steps = (self.steps + 1) % (1 << 32)
         self.since = (self.since + 1) % (1 << 16)

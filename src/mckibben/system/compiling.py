@@ -61,6 +61,10 @@ class Deferred:
         """What numba asks for where a compiled function calls this one."""
         return self.dispatcher._numba_type_  # type: ignore[attr-defined]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what it is made of, by which numba finds a function that calls it in its cache."""
+        return str, (made_of(self),)
+
     def __call__(self, *arguments: Any) -> Any:
         """Run it, compiled."""
         return self.dispatcher(*arguments)

@@ -1,7 +1,7 @@
 """What a block declares so that its inverse can learn while it runs.
 
 A family says which of its numbers are learnt, how far they may be off, and how the inverse runs while
-they move. The time loop is the family's own, a kernel that for every sample calls `learning.learn` with
+they move: a kernel that for every sample calls `learning.learn` with
 the slopes of what was measured, projects what was learnt onto the conditions of invertibility, takes
 it over, and undoes the reference with it, so that forward and inverse match at every step.
 """
@@ -16,7 +16,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.learning import SENSES
-from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.block import Block, Kernel, Start
 from mckibben.blocks.core.inverse import Invertible
 
 
@@ -37,47 +37,20 @@ class Group:
     less: str = "lower"
 
 
-@dataclass(frozen=True)
-class Learning:
-    """The numbers of a learner, as its kernel works on them in place: views of one state vector.
-
-    Parameters
-    ----------
-    settings : array, shape (3,)
-        [sample time / time, noise of the outputs, one by how many of them].
-    scales, widest : array, shape (p,)
-        Of every parameter, see `learning.learn`.
-    fresh : array, shape (p (p + 1) / 2,)
-        Covariance at the start.
-    theta : array, shape (p,)
-        Parameters as far as they are learnt.
-    used : array, shape (p,)
-        Parameters that the inverse runs with now.
-    root : array, shape (p (p + 1) / 2,)
-        Their covariance, in squares of the scales and of the noise, as U D U'.
-    senses : array, shape (m SENSES,)
-        What is remembered of every sensor.
-    work : array, shape (2 p,)
-        To compute in.
-    """
-
-    settings: Array
-    scales: Array
-    widest: Array
-    fresh: Array
-    theta: Array
-    used: Array
-    root: Array
-    senses: Array
-    work: Array
-
-
 class Adaptable(Invertible):
     """An invertible block whose linear parameters can be learnt while its inverse runs.
 
-    The state of the adaptive inverse is [inverse's own, theta, used, root, senses, direction]: see
-    `Learning`.
+    The state of the adaptive inverse is [inverse's own, `n_more_states`, theta, used, root, senses]: the
+    parameters as far as they are learnt, those that the inverse runs with now, the covariance as U D U',
+    and what is remembered of every sensor, see `mckibben.blocks.adaptive.learning`.
     """
+
+    adaptive_kernel: ClassVar[Kernel]
+    """Runs the inverse and learns. Inputs are the inverse's, then the outputs that answer those of the
+    step before, NaN where absent; it computes in scratch."""
+
+    adaptive_start_kernel: ClassVar[Start]
+    """Fills the state of the adaptive inverse."""
 
     groups: ClassVar[tuple[Group, ...]]
     """What drift is told of."""
@@ -113,23 +86,6 @@ class Adaptable(Invertible):
     def group_changes(self, theta: Array) -> Array:
         """Return the relative change of every group from the fitted one, shape (n_groups,)."""
 
-    @abstractmethod
-    def bind_adaptive(
-        self,
-        sample_time: float | None,
-        learning: Learning,
-        state: Array,
-        inputs: Array,
-        measured: Array,
-        outputs: Array,
-    ) -> Run:
-        """Return a function that runs the learning inverse in place.
-
-        ``state`` is the inverse's own, and ``n_more_states`` behind, as the direction of travel;
-        ``inputs`` are the inverse's, shape (n, n_inputs), ``measured`` the outputs that answer those of
-        the step before, shape (n, m), NaN where absent.
-        """
-
     @property
     def known_span(self) -> float:
         """Largest range of an output where it was fitted; 0 if unknown."""
@@ -154,8 +110,8 @@ class Adaptable(Invertible):
         return 0
 
     def adaptive_numbers(self, sample_time: float | None) -> Array:
-        """Return the numbers that C reads, behind those of the learner; the inverse's by default."""
-        return self.inverse_numbers(self.c_numbers(sample_time))
+        """Return the family's numbers behind those of the learner; the inverse's by default."""
+        return self.inverse_numbers(self.coefficients(sample_time))
 
     @property
     def n_learning_states(self) -> int:

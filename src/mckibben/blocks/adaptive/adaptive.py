@@ -10,9 +10,9 @@ exactly what was asked for, what it predicts is known from the inverse's own mem
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt
@@ -20,7 +20,7 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.adaptable import Adaptable, Learning
+from mckibben.blocks.adaptive.adaptable import Adaptable
 from mckibben.blocks.adaptive.drift import FIT_ERROR, Drift, alarm_limit, scatter
 from mckibben.blocks.adaptive.learning import (
     LARGEST,
@@ -31,10 +31,9 @@ from mckibben.blocks.adaptive.learning import (
     USUAL,
     covariance_of,
     start_root,
-    start_sense,
 )
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.block import Block, Run, fill
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector, vector
 from mckibben.blocks.core.inverse import Inverse
@@ -43,6 +42,7 @@ from mckibben.blocks.core.saving import nested
 from mckibben.blocks.feedback.pid import MEASURED
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
+from mckibben.system.compiling import bound
 
 TRUSTED = 1 / 3
 """Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
@@ -256,12 +256,14 @@ class Adaptive(Block):
             self._split(learnt)[4][READY::SENSES] = 0.0  # the next measurement answers nothing
             own = self.fixed.initial_state(asked, self.forward.start)
             return np.concatenate([own, np.zeros(learner.n_more_states), learnt])
-        theta = learner.taught
-        senses = np.tile(start_sense(self.noise), len(self.measured))
-        own = self.fixed.initial_state(asked, start)
-        return np.concatenate(
-            [own, np.zeros(learner.n_more_states), theta, theta, self._fresh, senses]
-        )
+        if isinstance(start, str):
+            state = np.zeros(self.n_states)
+            kernel = learner.adaptive_start_kernel
+            fill(kernel, self.c_numbers(1.0), state, self.n_scratch, first, start)
+            return state
+        state = self.initial_state(first, "first_sample")
+        state[: self.fixed.n_states] = self.fixed.initial_state(asked, start)
+        return state
 
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
         p = self.learner.taught.size
@@ -279,27 +281,13 @@ class Adaptive(Block):
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that learns and inverts in place."""
-        own, theta, used, root, senses = self._split(state)
-        learner, n = self.learner, len(self.inputs) - len(self.measured)
-        learning = Learning(
-            settings=self._settings(sample_time),
-            scales=learner.scales,
-            widest=np.diag(learner.spread).copy(),
-            fresh=self._fresh,
-            theta=theta,
-            used=used,
-            root=root,
-            senses=senses,
-            work=np.zeros(3 * theta.size),
-        )
-        asked, measured = inputs[:, :n], inputs[:, n:]
-        return learner.bind_adaptive(sample_time, learning, own, asked, measured, outputs)
+        numbers, scratch = self.c_numbers(sample_time), np.zeros(self.n_scratch)
+        return bound(self.learner.adaptive_kernel.batch, numbers, state, scratch, inputs, outputs)
 
     @property
-    def c_file(self) -> Path:
-        """The forward block's, which learns."""
-        own = self.forward.c_file
-        return own.with_name(f"{own.stem}_adaptive.c")
+    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
+        """Those of the family that learns."""
+        return self.learner.adaptive_kernel, self.learner.adaptive_start_kernel
 
     def c_numbers(self, sample_time: float | None) -> Array:
         """Return [number of parameters, settings, scales, widest, theta, root], then the family's."""

@@ -27,6 +27,8 @@ used lies between them, where late errors would have been least. Where nothing d
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mckibben.arrays import Array
@@ -45,6 +47,8 @@ GATE = 3.0
 """Usual errors beyond which an error teaches no more."""
 QUARTILE = 0.6745
 """Median of the sizes of errors of unit variance."""
+SINGLE = {"ABSURD": 1e-6, "STILL": 1e-9, "UNMOVED": 1e-12}
+"""Here the same in single precision."""
 NEAR = 0.1
 """How near to it an error counts for less: single precision is to go the same way."""
 ABSURD = 1e-6
@@ -123,7 +127,7 @@ def learn(
     p = theta.size
     f, g = work[:p], work[p : 2 * p]
     r = 0.0
-    told = usual * np.sqrt(fewer(sense))
+    told = usual * math.sqrt(fewer(sense))
     _stand_by(told * told, share, settings[2], root[: theta.size], sense)
     for j in range(p):
         f[j] = slopes[j] * scales[j] / told
@@ -133,7 +137,7 @@ def learn(
             f[j] += root[first + i] * f[i]
         g[j] = root[j] * f[j]
         r += f[j] * g[j]
-    expected = np.sqrt(usual * usual + r * told * told)
+    expected = math.sqrt(usual * usual + r * told * told)
     weight = 1.0
     if abs(error) > GATE * expected:
         weight = GATE * expected / abs(error)
@@ -150,8 +154,9 @@ def learn(
     gain = weight * error / told / (1.0 + r)
     for i in range(p):
         theta[i] += scales[i] * g[i] * gain
-    _bound(root, widest, int(sense[READY]) % p)
-    sense[READY] = sense[READY] % p + 1.0
+    turn = int(sense[READY]) % p
+    _bound(root, widest, turn)
+    sense[READY] = turn + 1.0
     return True
 
 
@@ -237,7 +242,7 @@ def _bound(root: Array, widest: Array, i: int) -> None:
         first += j
     if variance <= widest[i]:
         return
-    less = np.sqrt(widest[i] / variance)
+    less = math.sqrt(widest[i] / variance)
     root[i] *= less * less
     own = p + (i * (i - 1)) // 2
     for k in range(i):
@@ -269,10 +274,35 @@ def covariance_of(root: Array, p: int) -> Array:
     return np.asarray((upper * root[:p]) @ upper.T)
 
 
-def start_sense(noise: float) -> Array:
-    """Return what is remembered of a sensor before it is read."""
-    sense = np.zeros(SENSES)
-    sense[USUAL], sense[SURPRISE], sense[SQUARED], sense[RELATED] = 3.0 * noise, 1.0, 1.0, ALIKE
-    sense[STOOD] = (3.0 * noise) ** 2 * (1.0 + ALIKE) / (1.0 - ALIKE)
-    sense[APART] = noise**2
-    return sense
+@kernel
+def root_size(p: int) -> int:
+    """Return how many numbers a covariance of p parameters has."""
+    return (p * (p + 1)) // 2
+
+
+@kernel
+def family_at(c: Array) -> int:
+    """Return where the numbers of the family begin among the coefficients of a learner.
+
+    These are [p, settings (3), scales (p), widest (p), fitted parameters (p), covariance at the start],
+    then the family's.
+    """
+    p = int(c[0])
+    return 4 + 3 * p + root_size(p)
+
+
+@kernel
+def start_learning(c: Array, learnt: Array) -> None:
+    """Start what is learnt, [theta, used, root, senses], with the fitted parameters."""
+    p, noise = int(c[0]), c[2]
+    fitted, fresh = c[4 + 2 * p : 4 + 3 * p], c[4 + 3 * p : family_at(c)]
+    learnt[:p] = fitted
+    learnt[p : 2 * p] = fitted
+    learnt[2 * p : 2 * p + fresh.size] = fresh
+    senses = learnt[2 * p + fresh.size :]
+    senses[:] = 0.0
+    for first in range(0, senses.size, SENSES):
+        senses[first + USUAL], senses[first + SURPRISE] = 3.0 * noise, 1.0
+        senses[first + SQUARED], senses[first + RELATED] = 1.0, ALIKE
+        senses[first + STOOD] = (3.0 * noise) ** 2 * (1.0 + ALIKE) / (1.0 - ALIKE)
+        senses[first + APART] = noise**2

@@ -16,90 +16,85 @@ from typing import ClassVar
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.adaptable import Adaptable, Group, Learning, relative_spread
-from mckibben.blocks.adaptive.learning import GATE, USUAL, learn, trusted
-from mckibben.blocks.core.block import Run
+from mckibben.blocks.adaptive.adaptable import Adaptable, Group, relative_spread
+from mckibben.blocks.adaptive.learning import GATE, USUAL, family_at, learn, trusted
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.single_channel import Ranged
 from mckibben.blocks.play_type.memory import follow
-from mckibben.system.compiling import bound
 
 LEAST = 0.1
 """Share of a fitted partial sum of weights that is left, whatever is measured."""
 
 
 @kernel
+def inverse_at(c: Array) -> int:
+    """Return where the inverse's numbers begin among the coefficients, behind [limits, least]."""
+    return family_at(c) + 2 * int(c[0])
+
+
+@kernel
 def follow_learning(
-    settings: Array,
-    scales: Array,
-    widest: Array,
-    fresh: Array,
-    theta: Array,
-    used: Array,
-    root: Array,
-    sense: Array,
-    work: Array,
-    limits: Array,
+    c: Array,
     r: Array,
-    least: Array,
-    fitted: Array,
     s: Array,
     last: Array,
-    references: Array,
-    measured: Array,
-    z: Array,
-    direction: Array,
-) -> None:
-    """Learn, and find the operators' common input, for every reference.
+    learnt: Array,
+    scratch: Array,
+    y: float,
+    measured: float,
+) -> float:
+    """Learn, and find the operators' common input for a reference; return the direction it takes.
 
-    ``theta`` and ``used`` are [weights, offset]; ``limits`` [lowest, highest]; ``least`` [lowest
-    weights, lowest partial sums]; ``fitted`` is as ``theta``; ``s`` the operators; ``last`` is
-    [previous reference, samples clipped, direction of travel].
+    Parameters and weights in use are [weights, offset]; ``s`` are the operators; ``last`` is [previous
+    reference, samples clipped, direction of travel].
     """
-    n = r.size
-    slopes = work[2 * n + 2 : 3 * n + 3]
-    for t in range(references.shape[0]):
-        y = references[t, 0]
-        believed, asked, expected = theta[n], used[n], fitted[n]
-        for i in range(n):
-            slopes[i] = s[i]
-            believed += theta[i] * s[i]
-            asked += used[i] * s[i]
-            expected += fitted[i] * s[i]
-        slopes[n] = 1.0
-        if learn(
-            settings,
-            scales,
-            widest,
-            fresh,
-            theta,
-            root,
-            sense,
-            slopes,
-            work,
-            measured[t, 0],
-            believed,
-            asked,
-            expected,
-        ):
-            keep_rising(theta, least)
-        if y > last[0]:
-            last[2] = 1.0
-        elif y < last[0]:
-            last[2] = -1.0
-        share, aim = trusted(sense), slopes
-        for i in range(n + 1):
-            aim[i] = fitted[i] + share * (theta[i] - fitted[i])
-        take_over(aim, used, s, y, last[2], GATE * sense[USUAL])
-        total = 0.0
-        for i in range(n):
-            total += used[i] * s[i]
-        way, clipped = follow(y - used[n], total, limits[0], limits[1], r, used[:n], s)
-        if clipped:
-            last[1] += 1.0
-        last[0] = y
-        z[t] = s[0]
-        direction[t] = way
+    n, p = r.size, r.size + 1
+    limits = c[family_at(c) : family_at(c) + 2]
+    least = c[family_at(c) + 2 : inverse_at(c)]
+    fitted, fresh = c[4 + 2 * p : 4 + 3 * p], c[4 + 3 * p : family_at(c)]
+    theta, used, root = learnt[:p], learnt[p : 2 * p], learnt[2 * p : 2 * p + fresh.size]
+    sense = learnt[2 * p + fresh.size :]
+    work, slopes = scratch[: 2 * p], scratch[2 * p : 3 * p]
+    believed, asked, expected = theta[n], used[n], fitted[n]
+    for i in range(n):
+        slopes[i] = s[i]
+        believed += theta[i] * s[i]
+        asked += used[i] * s[i]
+        expected += fitted[i] * s[i]
+    slopes[n] = 1.0
+    taught = learn(
+        c[1:4],
+        c[4 : 4 + p],
+        c[4 + p : 4 + 2 * p],
+        fresh,
+        theta,
+        root,
+        sense,
+        slopes,
+        work,
+        measured,
+        believed,
+        asked,
+        expected,
+    )
+    if taught:
+        keep_rising(theta, least)
+    if y > last[0]:
+        last[2] = 1.0
+    elif y < last[0]:
+        last[2] = -1.0
+    share = trusted(sense)
+    for i in range(p):
+        slopes[i] = fitted[i] + share * (theta[i] - fitted[i])
+    take_over(slopes, used, s, y, last[2], GATE * sense[USUAL])
+    total = 0.0
+    for i in range(n):
+        total += used[i] * s[i]
+    way, clipped = follow(y - used[n], total, limits[0], limits[1], r, used[:n], s)
+    if clipped:
+        last[1] += 1.0
+    last[0] = y
+    return way
 
 
 @kernel
@@ -191,22 +186,3 @@ class LearntOperators(Ranged, Adaptable):
         friction = width_new / width_old - 1 if width_old > 0 else 0.0
         shift = (theta[-1] - self.taught[-1]) / self.span
         return np.array([new.sum() / old.sum() - 1, friction, shift])
-
-    def _bind_operators(
-        self,
-        learning: Learning,
-        s: Array,
-        last: Array,
-        references: Array,
-        measured: Array,
-        z: Array,
-        direction: Array,
-    ) -> Run:
-        numbers = (np.array(self.learnt_limits), np.array(self.thresholds), self.least, self.taught)
-        one = learning
-        rest = (one.theta, one.used, one.root, one.senses, one.work)
-        return bound(
-            follow_learning,
-            *(one.settings, one.scales, one.widest, one.fresh, *rest, *numbers),
-            *(s, last, references, measured, z, direction),
-        )

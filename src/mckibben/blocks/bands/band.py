@@ -18,11 +18,11 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands.state_of_motion import look
-from mckibben.blocks.core.block import Kernel, Primitive
-from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Rows, Vector
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.block import Kernel, Primitive, Start
+from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.errors import ModelError
 from mckibben.numerals import numeral
 
@@ -35,8 +35,10 @@ FARTHEST = 3.0
 HEAD = 6
 
 
-@kernel
-def band_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def band_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
     """Give, for every modelled output, its value, its lower and its upper end."""
     c = coefficients
     n_driving, n_given = int(c[0]), int(c[1])
@@ -64,34 +66,41 @@ def band_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array
     limits = c[at : at + 4 * n_given]
     at += 4 * n_given
     quantile = c[at : at + n_given]
-    at += n_given
-    seen = c[at : at + n_seen]
-    at += n_seen
-    terms = c[at : at + n_terms]
-    for t in range(inputs.shape[0]):
-        beyond = look(inputs[t], ends, widths, keeps, n_driving, state, seen)
-        terms[0] = 1.0
+    seen, terms = scratch[:n_seen], scratch[n_seen : n_seen + n_terms]
+    beyond = look(inputs, ends, widths, keeps, n_driving, state, seen)
+    terms[0] = 1.0
+    for i in range(n_seen):
+        far = (seen[i] - mean[i]) / spread[i]
+        terms[1 + i] = min(max(far, -FARTHEST), FARTHEST)
+    for k in range(n_bells):
+        distance = 0.0
         for i in range(n_seen):
-            far = (seen[i] - mean[i]) / spread[i]
-            terms[1 + i] = min(max(far, -FARTHEST), FARTHEST)
-        for k in range(n_bells):
-            distance = 0.0
-            for i in range(n_seen):
-                off = terms[1 + i] - bells[k * n_seen + i]
-                distance += off * off
-            terms[1 + n_seen + k] = np.exp(-sharpness * distance)
-        for g in range(n_given):
-            m, s = 0.0, 0.0
-            for i in range(n_terms):
-                m += shift[g * n_terms + i] * terms[i]
-                s += log_scale[g * n_terms + i] * terms[i]
-            m = min(max(m, limits[4 * g]), limits[4 * g + 1])
-            s = np.exp(min(max(s, limits[4 * g + 2]), limits[4 * g + 3]))
-            half = quantile[g] * s * (1.0 + beyond / WIDENS)
-            value = inputs[t, n_driving + g]
-            outputs[t, 3 * g] = value
-            outputs[t, 3 * g + 1] = min(value, value + m - half)
-            outputs[t, 3 * g + 2] = max(value, value + m + half)
+            off = terms[1 + i] - bells[k * n_seen + i]
+            distance += off * off
+        terms[1 + n_seen + k] = np.exp(-sharpness * distance)
+    for g in range(n_given):
+        m, s = 0.0, 0.0
+        for i in range(n_terms):
+            m += shift[g * n_terms + i] * terms[i]
+            s += log_scale[g * n_terms + i] * terms[i]
+        m = min(max(m, limits[4 * g]), limits[4 * g + 1])
+        s = np.exp(min(max(s, limits[4 * g + 2]), limits[4 * g + 3]))
+        half = quantile[g] * s * (1.0 + beyond / WIDENS)
+        value = inputs[n_driving + g]
+        outputs[3 * g] = value
+        outputs[3 * g + 1] = min(value, value + m - half)
+        outputs[3 * g + 2] = max(value, value + m + half)
+
+
+@kernel
+def band_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start plays and lags at rest at the first sample."""
+    c = coefficients
+    n_driving, n_x, per = int(c[0]), int(c[0]) + int(c[1]), int(c[2]) + int(c[3])
+    for j in range(n_driving):
+        low, high = c[HEAD + j], c[HEAD + n_x + j]
+        share = min(max((inputs[j] - low) / (high - low), 0.0), 1.0)
+        state[j * per : (j + 1) * per] = share
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -136,8 +145,8 @@ class Band(Primitive):
     """
 
     kind: ClassVar[str] = "band"
-    kernel: ClassVar[Kernel] = band_kernel
-    in_scratch: ClassVar[bool] = True
+    kernel: ClassVar[Kernel] = band_step
+    start_kernel: ClassVar[Start] = band_start
     parameters: ClassVar[tuple[str, ...]] = ("shift", "log_scale")
     notation: ClassVar[Notation] = Notation(
         r"y^{\pm} = \begin{cases} \max(y,\, y + m + q s w) \\ \min(y,\, y + m - q s w) \end{cases}",
@@ -247,15 +256,6 @@ class Band(Primitive):
                 [row[place] for row, place in zip(self.scores, places, strict=True)],
             ]
         )
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return plays and lags at rest at the first sample, whatever the rule is called."""
-        start = self.start if initial is None else initial
-        if start not in ("first_sample", "virgin"):
-            return explicit_state(self, start)
-        low, high = np.array(self.ends)[:, : len(self.driving)]
-        shares = (first[: len(self.driving)] - low) / (high - low)
-        return np.repeat(shares.clip(0.0, 1.0), len(self.widths) + len(self.times))
 
     @classmethod
     def example(cls) -> Self:

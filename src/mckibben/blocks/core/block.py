@@ -19,8 +19,10 @@ from mckibben.arrays import Array
 from mckibben.blocks.core import saving
 from mckibben.blocks.core.exportable import Exportable
 from mckibben.blocks.core.fields import Channel, Initial
+from mckibben.blocks.core.kernels import Step, in_scratch
 from mckibben.blocks.core.linear import HandsOver
 from mckibben.blocks.core.parametrised import Parametrised
+from mckibben.blocks.core.refusals import VIRGIN, explicit_state
 from mckibben.blocks.core.running import Stream, refuse_time, run_many
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
@@ -28,7 +30,8 @@ from mckibben.system.compiling import bound
 from mckibben.system.showing import DrawsItself
 
 Run = Callable[[], None]
-Kernel = Callable[..., None]
+Kernel = Step
+Start = Callable[..., None]
 
 
 class Block(DrawsItself, Exportable, Parametrised, HandsOver):
@@ -345,13 +348,33 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
 class Primitive(Block):
     """A block that is one kernel, ``kernel(coefficients, state, inputs, outputs)``.
 
-    Where it is `in_scratch`, `n_scratch` numbers to compute in stand behind the coefficients.
+    A kernel with a parameter ``scratch`` behind the state is given `n_scratch` numbers to compute in.
     """
 
     kernel: ClassVar[Kernel]
 
-    in_scratch: ClassVar[bool] = False
-    """Whether kernels of this class want scratch."""
+    start_kernel: ClassVar[Start | None] = None
+    """Fills the state, ``start_kernel(coefficients, state, first inputs, virgin)``, by a named rule."""
+
+    @property
+    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
+        """The kernel, and that of the start."""
+        return kernels_for_c(self.kernel, self.start_kernel, self.n_states)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state before the first sample: by a named rule, or given itself."""
+        start = self.start if initial is None else initial
+        if not isinstance(start, str) or start not in VIRGIN:
+            return explicit_state(self, start)
+        state = np.zeros(self.n_states)
+        kernel = self.start_kernel
+        if kernel is not None:
+            fill(kernel, self.start_numbers(), state, self.n_scratch, first, start)
+        return state
+
+    def start_numbers(self) -> Array:
+        """Return the coefficients as starts read them, which no sample time changes."""
+        return self.coefficients(self.sample_time or 1.0)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the numbers that the kernel reads, one-dimensional; by default the parameters."""
@@ -364,8 +387,28 @@ class Primitive(Block):
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs the kernel in place."""
-        numbers = self._with_scratch(self.coefficients(sample_time), self.n_scratch)
-        return bound(type(self).kernel, numbers, state, inputs, outputs)
+        numbers = self.coefficients(sample_time)
+        kernel = self.kernel
+        return bound(
+            kernel.batch, numbers, state, *scratch_of(kernel, self.n_scratch), inputs, outputs
+        )
 
-    def _with_scratch(self, numbers: Array, size: int) -> Array:
-        return np.concatenate([numbers, np.zeros(size)]) if self.in_scratch else numbers
+
+def scratch_of(kernel: Callable[..., Any], size: int) -> list[Array]:
+    """Return the scratch that a kernel computes in, as a list of one array, or of none."""
+    return [np.zeros(size)] if in_scratch(kernel) else []
+
+
+def fill(
+    start: Start, numbers: Array, state: Array, n_scratch: int, first: Array, rule: Initial
+) -> None:
+    """Fill a state by a start kernel and a named rule."""
+    given = np.ascontiguousarray(first, dtype=np.float64)
+    start(numbers, state, *scratch_of(start, n_scratch), given, VIRGIN[str(rule)])
+
+
+def kernels_for_c(step: Step, start: Start | None, n_states: int) -> tuple[Callable[..., Any], ...]:
+    """Return the kernels of a step and of its start; none where a start is wanted and has no kernel."""
+    if n_states == 0:
+        return (step,)
+    return () if start is None else (step, start)

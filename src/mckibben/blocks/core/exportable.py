@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.checked import Checked
@@ -78,10 +76,9 @@ class Exportable(metaclass=Checked):
         return 0
 
     @property
-    def c_file(self) -> Path:
-        """Its C, where that is no file of the package but beside the class; perhaps none is there."""
-        name = f"{self.kind.replace('-', '_')}.c"
-        return Path(inspect.getfile(type(self))).with_name(name)
+    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
+        """Kernels of a step, and of the start if it has memory, which C is translated from."""
+        return ()
 
     def c_numbers(self, sample_time: float | None) -> Array:
         """Return the numbers that its C reads.

@@ -7,16 +7,24 @@ driven inputs. Its state begins with the forward block's, unless it is shorter.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Annotated, ClassVar, Self
+from collections.abc import Callable, Iterator
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive, Run
+from mckibben.blocks.core.block import (
+    Block,
+    Kernel,
+    Primitive,
+    Run,
+    Start,
+    fill,
+    kernels_for_c,
+    scratch_of,
+)
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import STRICT, Channel, Initial, Rule
 from mckibben.blocks.core.notation import indexed, lettered
@@ -32,6 +40,9 @@ class Invertible(Primitive):
 
     inverse_kernel: ClassVar[Kernel]
     """Runs the inverse, as `kernel` runs the block."""
+
+    inverse_start_kernel: ClassVar[Start | None] = None
+    """Fills the inverse's state, as `start_kernel` fills the block's."""
 
     inverse_path_dependent: ClassVar[bool] = False
     """Whether it matters how a reference goes from one turning point to the next."""
@@ -73,7 +84,11 @@ class Invertible(Primitive):
         start : {"first_sample", "virgin"}
             The rule.
         """
-        raise NotImplementedError
+        state, kernel = np.zeros(self.n_inverse_states), self.inverse_start_kernel
+        if kernel is not None:
+            numbers = self.inverse_numbers(self.start_numbers())
+            fill(kernel, numbers, state, self.n_inverse_scratch, first, start)
+        return state
 
     def inverse_state(self, state: Array) -> Array:
         """Return the inverse's state that matches a state of this block, where that tells it."""
@@ -87,8 +102,9 @@ class Invertible(Primitive):
     ) -> Run:
         """Return a function that runs the inverse in place."""
         numbers = self.inverse_numbers(self.coefficients(sample_time))
-        numbers = self._with_scratch(numbers, self.n_inverse_scratch)
-        return bound(type(self).inverse_kernel, numbers, state, inputs, outputs)
+        kernel = self.inverse_kernel
+        scratch = scratch_of(kernel, self.n_inverse_scratch)
+        return bound(kernel.batch, numbers, state, *scratch, inputs, outputs)
 
     def inverse_reachable(self) -> tuple[Array, Array]:
         """Return the lowest and highest inputs that the inverse gives; infinite by default."""
@@ -195,9 +211,10 @@ class Inverse(Block):
         return self.forward.bind_inverse(sample_time, state, inputs, outputs)
 
     @property
-    def c_file(self) -> Path:
-        """The forward block's, which holds both directions."""
-        return self.forward.c_file
+    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
+        """Those of the forward block's inverse."""
+        own = self.forward
+        return kernels_for_c(own.inverse_kernel, own.inverse_start_kernel, self.n_states)
 
     def c_numbers(self, sample_time: float | None) -> Array:
         """Return the forward block's, as the inverse reads them."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import NOTHING, kernel
 
 USUAL_NEWTON, MOST_NEWTON = 3, 60
 """Steps of Newton's method, on smooth references and at worst."""
@@ -30,7 +30,7 @@ def eliminate(matrix: Array, right: Array) -> None:
             right[column], right[pivot] = right[pivot], right[column]
         scale = matrix[column, column]
         if scale == 0.0:
-            scale = 1e-300
+            scale = NOTHING
         for row in range(column + 1, n):
             factor = matrix[row, column] / scale
             for j in range(column, n):
@@ -40,4 +40,4 @@ def eliminate(matrix: Array, right: Array) -> None:
         for j in range(row + 1, n):
             right[row] -= matrix[row, j] * right[j]
         scale = matrix[row, row]
-        right[row] /= scale if scale != 0.0 else 1e-300
+        right[row] /= scale if scale != 0.0 else NOTHING

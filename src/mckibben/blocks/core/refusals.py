@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Initial
 from mckibben.errors import ModelError
+
+if TYPE_CHECKING:
+    from mckibben.blocks.core.block import Block
+
+VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
+"""Named starts, and whether a start kernel takes them as if nothing had happened before.
+
+"fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamic.linear_start`."""
 
 
 def explicit_state(block: Block, initial: Initial) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mckibben.blocks.core.kernels import inlined
+from mckibben.blocks.core.kernels import BRACKET, ROUNDING, SLACK, inlined
 
 MOST_STEPS = 200
 """Of closing the bracket, and of the walk each way: far more than either takes."""
@@ -21,9 +21,9 @@ def solve_near(
     and whether both limits were reached without a solution, by more than rounding; u is then the limit
     that came closest.
     """
-    tiny = 1e-15 * (highest - lowest)
+    tiny = BRACKET * (highest - lowest)
     error_start = evaluate(start, memory) - target
-    if abs(error_start) <= 1e-14 * abs(target):
+    if abs(error_start) <= ROUNDING * abs(target):
         return start, False
     above, error_above = start, error_start
     below, error_below = start, error_start
@@ -51,7 +51,7 @@ def solve_near(
         if direction * error_start < 0.0:
             step *= 1.5
     if (error_far > 0.0) == (error_start > 0.0):
-        slack = 1e-9 * abs(error_above - error_below)
+        slack = SLACK * abs(error_above - error_below)
         if abs(error_above) < abs(error_below):
             return above, abs(error_above) > slack
         return below, abs(error_below) > slack

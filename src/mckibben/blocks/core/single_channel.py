@@ -8,8 +8,9 @@ import numpy as np
 
 from mckibben.arrays import NARROWEST, Array
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, Rule
+from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.core.inverse import Invertible
+from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.stateless import Stateless
 from mckibben.errors import ModelError
 
@@ -53,6 +54,12 @@ class ScheduledChannel(Block):
     def scheduling(self) -> tuple[str, ...]:
         """Name of the one that schedules."""
         return (self.inputs[1].name,)
+
+
+@kernel
+def nothing_clipped(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with no samples clipped, where the inverse has no other memory."""
+    state[0] = 0.0
 
 
 class Memoryless(Stateless, SingleChannel):
@@ -104,41 +111,6 @@ class Ranged(SingleChannel, Invertible):
     def n_inverse_states(self) -> int:
         """Those of this block, what is remembered, and the count of samples clipped."""
         return self.n_states + (self.inverse_remembers is not None) + 1
-
-    def inverse_start(self, first: Array, start: Rule) -> Array:
-        """Return the inverse's state that matches this block started by a named rule."""
-        if self.n_inverse_states == 1:
-            return np.zeros(1)
-        output = float(first[0])
-        u = self.input_giving(output, start)
-        last = {"input": [u], "output": [output], None: []}[self.inverse_remembers]
-        return np.array([*self.initial_state(np.array([u]), start), *last, 0.0])
-
-    def input_giving(self, output: float, start: Rule) -> float:
-        """Return the first input, within the limits, that gives an output after a named start.
-
-        It is sought by bisection.
-        """
-        low, high = self.limits
-        inputs, outputs, state = np.empty((1, 1)), np.empty((1, 1)), np.empty(self.n_states)
-        run = self.bind(1.0, state, inputs, outputs)
-
-        def given(u: float) -> float:
-            inputs[0, 0] = u
-            state[:] = self.initial_state(inputs[0], start)
-            run()
-            return float(outputs[0, 0])
-
-        if given(low) >= output:
-            return low
-        if given(high) <= output:
-            return high
-        for _ in range(200):
-            middle = 0.5 * (low + high)
-            if middle in (low, high):
-                break
-            low, high = (middle, high) if given(middle) < output else (low, middle)
-        return 0.5 * (low + high)
 
     def inverse_state(self, state: Array) -> Array:
         """Return the inverse's state that matches a state of this block."""

@@ -10,31 +10,80 @@ nothing lies between its ends.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any
 
 from mckibben.arrays import Array
+from mckibben.blocks.core.block import Start
 from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.kernels import inlined
+from mckibben.blocks.core.kernels import inlined, kernel
 from mckibben.blocks.core.root import solve_near
 from mckibben.blocks.core.single_channel import Ranged
 from mckibben.errors import ModelError
 
+MOST_HALVED = 200
+"""Steps of bisection, far more than it takes."""
+
 
 @inlined
-def solve_samples(
-    trial: Any, advance: Any, coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
-    """Give the inputs for which the forward block follows the references."""
+def solve_input(trial: Any, coefficients: Array, state: Array, inputs: Array) -> float:
+    """Return the input for which the forward block follows the reference, and remember it."""
     n = state.size - 2
     lowest, highest = coefficients[-2], coefficients[-1]
     forward, own = coefficients[:-2], state[:n]
-    for t in range(inputs.shape[0]):
-        u, clipped = solve_near(trial, inputs[t, 0], state[n], lowest, highest, (forward, own))
-        advance(u, forward, own)
-        state[n] = u
-        if clipped:
-            state[n + 1] += 1.0
-        outputs[t, 0] = u
+    u, clipped = solve_near(trial, inputs[0], state[n], lowest, highest, (forward, own))
+    state[n] = u
+    if clipped:
+        state[n + 1] += 1.0
+    return u
+
+
+@inlined
+def solve_sample(
+    trial: Any, advance: Any, coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Give the input for which the forward block follows the reference, and take that step."""
+    u = solve_input(trial, coefficients, state, inputs)
+    advance(u, coefficients[:-2], state[:-2])
+    outputs[0] = u
+
+
+def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> Start:
+    """Return the start kernel of an inverse that is solved for: by bisection, the first input that fits.
+
+    ``start`` is that of the block, behind whose state the inverse has 2 numbers, the last input and the
+    count of samples clipped, or the count alone.
+    """
+
+    @kernel
+    def inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start with the input, within its limits, at which the block has the first reference."""
+        own, forward = state[: state.size - behind], coefficients[:-2]
+        u = state[state.size - behind :]
+        low, high = coefficients[-2], coefficients[-1]
+        u[0] = high
+        start(forward, own, u, virgin)
+        if trial(high, (forward, own)) <= inputs[0]:
+            low = high
+        u[0] = coefficients[-2]
+        start(forward, own, u, virgin)
+        if trial(u[0], (forward, own)) >= inputs[0]:
+            low, high = coefficients[-2], coefficients[-2]
+        for _ in range(MOST_HALVED):
+            middle = 0.5 * (low + high)
+            if middle in (low, high):
+                break
+            u[0] = middle
+            start(forward, own, u, virgin)
+            if trial(middle, (forward, own)) < inputs[0]:
+                low = middle
+            else:
+                high = middle
+        u[0] = 0.5 * (low + high)
+        start(forward, own, u, virgin)
+        state[-1] = 0.0
+
+    return inverse_start
 
 
 USUAL_TRIALS, MOST_TRIALS = 12, 600

@@ -26,57 +26,81 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import (
     STRICT,
     Channel,
     Channels,
-    Initial,
     Rows,
-    Rule,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.linear_system import newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
+from mckibben.blocks.coupled.balance_adapting import balance_adaptive_start, balance_adaptive_step
 from mckibben.blocks.coupled.balance_equations import balance_of_forces
 from mckibben.blocks.coupled.balance_fields import check_fields, number_name, tell_clipped
-from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, press, pressed, settle
+from mckibben.blocks.coupled.balance_law import (
+    NEARLY,
+    NEVER,
+    begin,
+    keep,
+    press,
+    settle,
+    start_balance,
+)
 from mckibben.blocks.coupled.balance_learning import LearntBalance
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 
 
-@kernel
-def balance_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def balance_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
     """Give pressures; the last state counts samples that muscles cannot reach."""
-    for t in range(inputs.shape[0]):
-        press(coefficients, state, inputs[t], outputs[t])
+    press(coefficients, state, scratch, inputs, outputs)
 
 
-@kernel
-def balance_inverse_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
+@step
+def balance_inverse_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Give displacements; the last state counts samples that were not solved."""
     c = coefficients
     n, n_x = int(c[0]), int(c[1]) + int(c[3])
-    scratch = c[c.size - n * (n + 6) :]
     y, tare = scratch[:n], state[state.size - 2 - n :]
-    for t in range(inputs.shape[0]):
-        p, x = inputs[t, :n], inputs[t, n : n + n_x]
+    p, x = inputs[:n], inputs[n : n + n_x]
+    for k in range(n):
+        y[k] = state[k]
+    way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
+    left = settle(c, state, way, y, x, p, scratch[2 * n :])
+    keep(c, state, way, y, p)
+    state[state.size - 2] = 0.0
+    for k in range(n):
+        outputs[k] = y[k] - tare[k]
+    if not left < NEARLY:
+        state[state.size - 1] += 1.0
+
+
+@kernel
+def balance_inverse_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start muscles at rest without pressure, or where the first pressures hold them."""
+    c = coefficients
+    n, n_x = int(c[0]), int(c[1]) + int(c[3])
+    p, x = inputs[:n], inputs[n : n + n_x]
+    begin(c, state, x, scratch[:n], scratch[n:])
+    if virgin:
+        y = scratch[:n]
         for k in range(n):
             y[k] = state[k]
-        way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
-        left = settle(c, state, way, y, x, p, scratch[2 * n :])
-        keep(c, state, way, y, p)
+        settle(c, state, AT_REST, y, x, p, scratch[2 * n :])
+        keep(c, state, AT_REST, y, p)
         state[state.size - 2] = 0.0
-        for k in range(n):
-            outputs[t, k] = y[k] - tare[k]
-        if not left < NEARLY:
-            state[state.size - 1] += 1.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -141,10 +165,13 @@ class Balance(ManyChannels, LearntBalance):
     """
 
     kind: ClassVar[str] = "balance"
-    kernel: ClassVar[Kernel] = balance_kernel
-    inverse_kernel: ClassVar[Kernel] = balance_inverse_kernel
+    kernel: ClassVar[Kernel] = balance_step
+    start_kernel: ClassVar[Start] = start_balance
+    inverse_kernel: ClassVar[Kernel] = balance_inverse_step
+    inverse_start_kernel: ClassVar[Start] = balance_inverse_start
+    adaptive_kernel: ClassVar[Kernel] = balance_adaptive_step
+    adaptive_start_kernel: ClassVar[Start] = balance_adaptive_start
     inverse_path_dependent: ClassVar[bool] = True
-    in_scratch: ClassVar[bool] = True
     increasing = ("limits",)
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
@@ -259,43 +286,6 @@ class Balance(ManyChannels, LearntBalance):
             for k in range(n)
         ]
         return np.concatenate([head, self.limits, decays, gains, *own])
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state of muscles at rest without pressure, from which they come all at once.
-
-        ``virgin``: already at the first displacements, with friction and all that relaxes unloaded.
-        """
-        start = self.start if initial is None else initial
-        if start not in ("first_sample", "virgin"):
-            return explicit_state(self, start)
-        c, state, scratch = self._rested(first)
-        if start == "virgin":
-            n = len(self.driven)
-            y, p = first[:n] + state[-2 - n : -2], np.empty(n)
-            for k in range(n):
-                p[k] = pressed(c, k, state, AT_REST, y, first[n:], scratch[:n])[0]
-            keep(c, state, AT_REST, y, np.clip(p, c[10], c[11]))
-            state[-2] = 0.0
-        return state
-
-    def inverse_start(self, first: Array, start: Rule) -> Array:
-        """Return the same for the first pressures."""
-        c, state, scratch = self._rested(first)
-        if start == "virgin":
-            n = len(self.driven)
-            y, p = state[:n].copy(), np.ascontiguousarray(first[:n])
-            settle(c, state, AT_REST, y, first[n:], p, scratch)
-            keep(c, state, AT_REST, y, p)
-            state[-2] = 0.0
-        return state
-
-    def _rested(self, first: Array) -> tuple[Array, Array, Array]:
-        """Return coefficients, the state without pressure, and scratch."""
-        n = len(self.driven)
-        c, state = self.coefficients(1.0), np.zeros(self.n_states)
-        scratch = np.zeros(self.n_scratch)
-        begin(c, state, first[n:], scratch[:n], scratch[n:])
-        return c, state, scratch
 
     def report(self, state: Array) -> None:
         """Warn of references that would need pressures out of range, or muscles that push."""

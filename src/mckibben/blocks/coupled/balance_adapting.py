@@ -14,13 +14,20 @@ as it is. Factors keep to bounds within which areas outweigh friction, and stiff
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import SENSES, learn, trusted
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.adaptive.learning import (
+    SENSES,
+    family_at,
+    learn,
+    root_size,
+    start_learning,
+    trusted,
+)
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.linear_system import eliminate
-from mckibben.blocks.coupled.balance_law import press
+from mckibben.blocks.coupled.balance_law import press, start_balance
 from mckibben.blocks.coupled.balance_terms import (
     OWN,
     area,
@@ -43,81 +50,93 @@ MOST_FORCE = 0.3
 HAIR = 1e-9
 """Slack that is none, relative to the scale."""
 
+SINGLE = {"HAIR": 1e-6}
+
+
+@step
+def balance_adaptive_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Learn, and give pressures.
+
+    The family's coefficients are [n, which parameters, bounds of `keep_balanced`, the balance's]. The
+    state is [the balance's, displacements, pressures and what scheduled of the last sample, what is
+    learnt]; scratch is [work of learning, slopes and matrices, coefficients now, a balance's].
+    """
+    learner, family = coefficients, coefficients[family_at(coefficients) :]
+    size, n = int(learner[0]), int(family[0])
+    which, bounds = family[1 : 1 + size], family[1 + size : 1 + size + 2 * n]
+    fitted = family[1 + size + 2 * n :]
+    scales, widest = learner[4 : 4 + size], learner[4 + size : 4 + 2 * size]
+    fresh = learner[4 + 3 * size : family_at(learner)]
+    n_x = int(fitted[1]) + int(fitted[3])
+    n_learnt = 2 * size + fresh.size + SENSES * n
+    n_own = state.size - n_learnt - 2 * n - n_x
+    own, was = state[:n_own], state[n_own : state.size - n_learnt]
+    learnt = state[state.size - n_learnt :]
+    y, p, x = was[:n], was[n : 2 * n], was[2 * n :]
+    tare = own[n_own - 2 - n :]
+    theta, used = learnt[:size], learnt[size : 2 * size]
+    root, senses = learnt[2 * size : 2 * size + fresh.size], learnt[2 * size + fresh.size :]
+    work, slopes, rest = scratch[: 2 * size], scratch[2 * size : 3 * size], scratch[3 * size :]
+    terms = rest[: n * size].reshape((n, size))
+    matrix = rest[n * size : n * size + n * n].reshape((n, n))
+    row = rest[n * size + n * n : n * size + 2 * n * n + n]
+    c = rest[n * size + 2 * n * n + n : n * size + 2 * n * n + n + fitted.size]
+    room = rest[n * size + 2 * n * n + n + fitted.size :]
+    c[:] = fitted
+    retune(fitted, which, used, c)
+    slopes_of(c, own, which, used, y, p, x, terms, matrix, row)
+    taught = False
+    for k in range(n):
+        answer(terms, matrix, n, k, row, slopes)
+        asked = y[k] - tare[k]
+        believed, expected = asked, asked
+        for i in range(size):
+            believed += slopes[i] * (theta[i] - used[i])
+            expected += slopes[i] * (as_fitted(which, i) - used[i])
+        one = learn(
+            learner[1:4],
+            scales,
+            widest,
+            fresh,
+            theta,
+            root,
+            senses[k * SENSES : (k + 1) * SENSES],
+            slopes,
+            work,
+            inputs[n + n_x + k],
+            believed,
+            asked,
+            expected,
+        )
+        taught = taught or one
+    if taught:
+        pull_back(learner[1], which, scales, widest, root, theta, slopes, work)
+        keep_balanced(which, bounds, scales, root, theta, slopes, work)
+        share = trusted(senses)
+        for i in range(size):
+            used[i] = as_fitted(which, i) + share * (theta[i] - as_fitted(which, i))
+        retune(fitted, which, used, c)
+    press(c, own, room, inputs, outputs)
+    for k in range(n):
+        y[k], p[k] = room[k], outputs[k]
+    for i in range(n_x):
+        x[i] = inputs[n + i]
+
 
 @kernel
-def adapt_balance(
-    settings: Array,
-    scales: Array,
-    widest: Array,
-    fresh: Array,
-    theta: Array,
-    used: Array,
-    root: Array,
-    senses: Array,
-    work: Array,
-    fitted: Array,
-    which: Array,
-    bounds: Array,
-    c: Array,
-    scratch: Array,
-    state: Array,
-    was: Array,
-    inputs: Array,
-    measured: Array,
-    outputs: Array,
+def balance_adaptive_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
 ) -> None:
-    """Learn, and give pressures, for every reference.
-
-    ``fitted`` are coefficients as they were, ``c`` those now, with scratch behind; ``which`` names the
-    parameters; ``bounds`` are those of `keep_balanced`; ``was`` is [displacements, pressures, what
-    scheduled] of the last sample; ``scratch`` has p n + 2 n n + n numbers.
-    """
-    n, n_x, size = int(c[0]), int(c[1]) + int(c[3]), theta.size
-    y, p, x = was[:n], was[n : 2 * n], was[2 * n :]
-    tare = state[state.size - 2 - n :]
-    terms = scratch[: n * size].reshape((n, size))
-    matrix = scratch[n * size : n * size + n * n].reshape((n, n))
-    row = scratch[n * size + n * n :]
-    slopes = work[2 * size :]
-    for t in range(inputs.shape[0]):
-        retune(fitted, which, used, c)
-        slopes_of(c, state, which, used, y, p, x, terms, matrix, row)
-        taught = False
-        for k in range(n):
-            answer(terms, matrix, k, row, slopes)
-            believed = expected = y[k] - tare[k]
-            for i in range(size):
-                believed += slopes[i] * (theta[i] - used[i])
-                expected += slopes[i] * (as_fitted(which, i) - used[i])
-            if learn(
-                settings,
-                scales,
-                widest,
-                fresh,
-                theta,
-                root,
-                senses[k * SENSES : (k + 1) * SENSES],
-                slopes,
-                work,
-                measured[t, k],
-                believed,
-                y[k] - tare[k],
-                expected,
-            ):
-                taught = True
-        if taught:
-            pull_back(settings[0], which, scales, widest, root, theta, slopes, work)
-            keep_balanced(which, bounds, scales, root, theta, slopes, work)
-            share = trusted(senses)
-            for i in range(size):
-                used[i] = as_fitted(which, i) + share * (theta[i] - as_fitted(which, i))
-            retune(fitted, which, used, c)
-        press(c, state, inputs[t], outputs[t])
-        first = c.size - n * (n + 6)
-        for k in range(n):
-            y[k], p[k] = c[first + k], outputs[t, k]
-        for i in range(n_x):
-            x[i] = inputs[t, n + i]
+    """Start as the balance does, with the parameters as fitted."""
+    family = coefficients[family_at(coefficients) :]
+    size, n = int(coefficients[0]), int(family[0])
+    n_more = inputs.size  # displacements, pressures and what schedules, of the last sample
+    n_own = state.size - 2 * size - root_size(size) - SENSES * n - n_more
+    start_balance(family[1 + size + 2 * n :], state[:n_own], scratch, inputs, virgin)
+    state[n_own : n_own + n_more] = 0.0
+    start_learning(coefficients, state[n_own + n_more :])
 
 
 @kernel
@@ -144,7 +163,7 @@ def retune(fitted: Array, which: Array, theta: Array, c: Array) -> None:
             c[springs] += factor
         elif kind == STIFFNESS:
             c[springs - OWN + 6] *= factor
-            shared = np.sqrt(factor)
+            shared = math.sqrt(factor)
             for q in range(n_powers):
                 for j in range(n):
                     c[springs + q * (1 + n) + 1 + j] *= shared
@@ -194,11 +213,11 @@ def slopes_of(
             matrix[k, k] += stiff - p[k] * a_slope
         relaxation = own + muscle_width(c) - int(c[3]) - n_l
         for i in range(which.size):
-            j, kind = int(which[i]) // KINDS, int(which[i]) % KINDS
+            muscle, kind = int(which[i]) // KINDS, int(which[i]) % KINDS
             force = 0.0
             if kind == STIFFNESS:
-                force = 0.5 * gradient[j] * y[j]
-            if j == k:
+                force = 0.5 * gradient[muscle] * y[muscle]
+            if muscle == k:
                 if kind == OFFSET:
                     force = 1.0
                 elif kind == STIFFNESS:
@@ -215,9 +234,8 @@ def slopes_of(
 
 
 @kernel
-def answer(terms: Array, matrix: Array, k: int, row: Array, slopes: Array) -> None:
+def answer(terms: Array, matrix: Array, n: int, k: int, row: Array, slopes: Array) -> None:
     """Fill the slopes of displacement k by the parameters; ``row`` has n n + n numbers."""
-    n = matrix.shape[0]
     right = row[:n]
     left = row[n : n + n * n].reshape((n, n))
     for i in range(n):

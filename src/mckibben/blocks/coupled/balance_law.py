@@ -42,6 +42,11 @@ BALANCED, NEARLY = 2e-15, 1e-9
 SURE = 1e-11
 """Residual from which one step more, be it not looked at, ends at an equilibrium."""
 
+HAIR = 1e-9
+"""Relative difference of pressures that is rounding."""
+
+SINGLE = {"BALANCED": 1e-6, "NEARLY": 1e-4, "SURE": 1e-5, "HAIR": 1e-6}
+
 
 @kernel
 def shortened(
@@ -118,7 +123,7 @@ def pressed(
     held = max(asked, -c[own + 3]) + elastic(c, own, y[k])[0]
     held += lagging(c, own, k, state, way, y[k])[0]
     a = area(c, own, y[k])[0]
-    low, high = -1e300, 1e300
+    low, high = -NEVER, NEVER
     p = held / a
     for _ in range(MOST_STEPS):
         force, _, by_p = rubbed(c, own, k, state, way, y[k], p)
@@ -250,13 +255,12 @@ def begin(c: Array, state: Array, x: Array, p: Array, scratch: Array) -> None:
 
 
 @kernel
-def press(c: Array, state: Array, given: Array, p: Array) -> None:
+def press(c: Array, state: Array, scratch: Array, given: Array, p: Array) -> None:
     """Give the pressures of a sample, and bring the state there; then scratch begins with where.
 
     The last state counts samples that muscles cannot reach.
     """
     n, n_x = int(c[0]), int(c[1]) + int(c[3])
-    scratch = c[c.size - n * (n + 6) :]
     y, gradient = scratch[:n], scratch[2 * n : 3 * n]
     tare, x = state[state.size - 2 - n :], given[n : n + n_x]
     way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
@@ -266,10 +270,29 @@ def press(c: Array, state: Array, given: Array, p: Array) -> None:
     for k in range(n):
         found, reached = pressed(c, k, state, way, y, x, gradient)
         p[k] = min(max(found, c[10]), c[11])
-        # a hair beyond is rounding
-        amiss = amiss or not (reached and abs(p[k] - found) <= 1e-9 * (1.0 + abs(found)))
+        amiss = amiss or not (reached and abs(p[k] - found) <= HAIR * (1.0 + abs(found)))
     if amiss:  # where the muscles go instead is what friction will remember
         settle(c, state, way, y, x, p, scratch[2 * n :])
         state[state.size - 1] += 1.0
     keep(c, state, way, y, p)
     state[state.size - 2] = 0.0
+
+
+@kernel
+def start_balance(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start muscles at rest without pressure, or at the first displacements, with nothing loaded."""
+    c = coefficients
+    n, n_x = int(c[0]), int(c[1]) + int(c[3])
+    x, p = inputs[n : n + n_x], scratch[:n]
+    begin(c, state, x, p, scratch[n:])
+    if virgin:
+        y, gradient = scratch[n : 2 * n], scratch[2 * n : 3 * n]
+        for k in range(n):
+            y[k] = inputs[k] + state[state.size - 2 - n + k]
+        for k in range(n):
+            found, _ = pressed(c, k, state, AT_REST, y, x, gradient)
+            p[k] = min(max(found, c[10]), c[11])
+        keep(c, state, AT_REST, y, p)
+        state[state.size - 2] = 0.0

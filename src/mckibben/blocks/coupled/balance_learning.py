@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.adaptable import Adaptable, Group, Learning
-from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.adaptive.adaptable import Adaptable, Group
+from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import rows, vector
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance_adapting import (
@@ -24,10 +24,7 @@ from mckibben.blocks.coupled.balance_adapting import (
     OFFSET,
     RELAXATION,
     STIFFNESS,
-    adapt_balance,
 )
-from mckibben.blocks.coupled.balance_terms import HEAD
-from mckibben.system.compiling import bound
 
 if TYPE_CHECKING:
     from mckibben.blocks.coupled.balance import Balance
@@ -187,48 +184,11 @@ class LearntBalance(Adaptable):
 
     @property
     def n_learning_scratch(self) -> int:
-        """Slopes of residuals, two matrices and a vector; then the muscles as they are now."""
-        own, n = self._own, len(self._own.driven)
-        shared = HEAD + len(own.limits) + 2 * len(own.lags)
-        return n * self.taught.size + 2 * n * n + n + own.coefficients(1.0).size - shared
-
-    def bind_adaptive(
-        self,
-        sample_time: float | None,
-        learning: Learning,
-        state: Array,
-        inputs: Array,
-        measured: Array,
-        outputs: Array,
-    ) -> Run:
-        """Return a function that learns, and gives pressures."""
-        own, one = self._own, learning
-        n = len(own.driven)
-        fitted = own.coefficients(sample_time)
-        working = np.concatenate([fitted, np.zeros(own.n_scratch)])
-        which = np.array([float(k * KINDS + kind) for k, kind in self.learnt])
-        scratch = np.zeros(n * which.size + 2 * n * n + n)
-        kept, was = state[: own.n_states], state[own.n_states :]
-        return bound(
-            adapt_balance,
-            *(one.settings, one.scales, one.widest, one.fresh, one.theta),
-            *(
-                one.used,
-                one.root,
-                one.senses,
-                one.work,
-                fitted,
-                which,
-                self.ratios,
-                working,
-                scratch,
-                kept,
-                was,
-            ),
-            *(inputs, measured, outputs),
-        )
+        """Slopes of residuals, two matrices and a vector; then the coefficients as they are now."""
+        n = len(self._own.driven)
+        return n * self.taught.size + 2 * n * n + n + self._own.coefficients(1.0).size
 
     def adaptive_numbers(self, sample_time: float | None) -> Array:
         """Return n, which parameters are learnt, their bounds, and the coefficients as fitted."""
         n, which = len(self._own.driven), [k * KINDS + kind for k, kind in self.learnt]
-        return np.concatenate([[n], which, self.ratios, self._own.c_numbers(sample_time)])
+        return np.concatenate([[n], which, self.ratios, self._own.coefficients(sample_time)])

@@ -17,56 +17,69 @@ from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive
-from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Rows, Vector
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
+from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.errors import ModelError
 
 
-@kernel
-def coupled_memory_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def coupled_memory_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run lags, then plays, then the readout.
 
     Coefficients are [lags, thresholds, degree, decays, thresholds (inputs by thresholds), readout].
     """
-    n, n_out = inputs.shape[1], outputs.shape[1]
+    n, n_out = inputs.size, outputs.size
     n_lags, m, degree = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
     decays = coefficients[3 : 3 + n_lags]
     radii = coefficients[3 + n_lags : 3 + n_lags + n * m]
     readout = coefficients[3 + n_lags + n * m :]
     width = readout.size // n_out
-    for t in range(inputs.shape[0]):
-        for lag in range(n_lags):
-            for i in range(n):
-                place = lag * n + i
-                state[place] += (1.0 - decays[lag]) * (inputs[t, i] - state[place])
-                x = state[place]
-                for k in range(m):
-                    own = n_lags * n + place * m + k
-                    r = radii[i * m + k]
-                    state[own] = min(max(state[own], x - r), x + r)
-        for j in range(n_out):
-            at = j * width
-            total = readout[at]
+    for lag in range(n_lags):
+        for i in range(n):
+            place = lag * n + i
+            state[place] += (1.0 - decays[lag]) * (inputs[i] - state[place])
+            x = state[place]
+            plays = state[n_lags * n + place * m :]
+            for k in range(m):
+                r = radii[i * m + k]
+                plays[k] = min(max(plays[k], x - r), x + r)
+    for j in range(n_out):
+        at = j * width
+        total = readout[at]
+        at += 1
+        for k in range(state.size):
+            total += readout[at] * state[k]
             at += 1
-            for place in range(n_lags * n * (1 + m)):
-                total += readout[at] * state[place]
-                at += 1
-            if degree >= 2:
-                for i in range(n):
-                    for k in range(i, n):
-                        total += readout[at] * state[i] * state[k]
+        if degree >= 2:
+            for i in range(n):
+                for k in range(i, n):
+                    total += readout[at] * state[i] * state[k]
+                    at += 1
+        if degree >= 3:
+            for i in range(n):
+                for k in range(i, n):
+                    for q in range(k, n):
+                        total += readout[at] * state[i] * state[k] * state[q]
                         at += 1
-            if degree >= 3:
-                for i in range(n):
-                    for k in range(i, n):
-                        for q in range(k, n):
-                            total += readout[at] * state[i] * state[k] * state[q]
-                            at += 1
-            outputs[t, j] = total
+        outputs[j] = total
+
+
+@kernel
+def coupled_memory_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at rest at the first inputs, reached from zero, or with all at zero."""
+    n, n_lags, m = inputs.size, int(coefficients[0]), int(coefficients[1])
+    radii = coefficients[3 + n_lags : 3 + n_lags + n * m]
+    for lag in range(n_lags):
+        for i in range(n):
+            x = 0.0 if virgin else inputs[i]
+            state[lag * n + i] = x
+            plays = state[n_lags * n + (lag * n + i) * m :]
+            for k in range(m):
+                plays[k] = min(max(0.0, x - radii[i * m + k]), x + radii[i * m + k])
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -89,7 +102,8 @@ class CoupledMemory(ManyChannels, Primitive):
     """
 
     kind: ClassVar[str] = "coupled-memory"
-    kernel: ClassVar[Kernel] = coupled_memory_kernel
+    kernel: ClassVar[Kernel] = coupled_memory_step
+    start_kernel: ClassVar[Start] = coupled_memory_start
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("readout",)
     notation: ClassVar[Notation] = Notation(
@@ -135,19 +149,6 @@ class CoupledMemory(ManyChannels, Primitive):
     def n_states(self) -> int:
         """Every lag of every input, and the plays of each."""
         return len(self.lags) * len(self.inputs) * (1 + len(self.thresholds[0]))
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state at rest at the first inputs, reached from zero.
-
-        ``virgin`` starts lags and plays at zero.
-        """
-        if initial is not None and not isinstance(initial, str):
-            return explicit_state(self, initial)
-        x = np.zeros(len(self.inputs)) if initial == "virgin" else np.asarray(first, np.float64)
-        r = np.array(self.thresholds)
-        plays = np.clip(0.0, x[:, np.newaxis] - r, x[:, np.newaxis] + r)
-        n = len(self.lags)
-        return np.concatenate([np.tile(x, n), np.tile(plays.ravel(), n)])
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return sizes, decays over a sample, thresholds and readout."""

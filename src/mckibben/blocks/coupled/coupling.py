@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, rows
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import step
 from mckibben.blocks.core.linear import LinearSystem
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.stateless import Stateless
@@ -27,16 +27,15 @@ WORST_CONDITION = 1e8
 """Beyond this condition number a coupling is taken for singular."""
 
 
-@kernel
-def coupling_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def coupling_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Multiply by a matrix; coefficients are the matrix, row after row, one row an output."""
-    n = inputs.shape[1]
-    for t in range(inputs.shape[0]):
-        for j in range(outputs.shape[1]):
-            total = 0.0
-            for i in range(n):
-                total += coefficients[j * n + i] * inputs[t, i]
-            outputs[t, j] = total
+    n = inputs.size
+    for j in range(outputs.size):
+        total = 0.0
+        for i in range(n):
+            total += coefficients[j * n + i] * inputs[i]
+        outputs[j] = total
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -53,7 +52,7 @@ class Coupling(Stateless, Primitive):
     """
 
     kind: ClassVar[str] = "coupling"
-    kernel: ClassVar[Kernel] = coupling_kernel
+    kernel: ClassVar[Kernel] = coupling_step
     parameters: ClassVar[tuple[str, ...]] = ("gains",)
     notation: ClassVar[Notation] = Notation(
         r"h_j = \sum_i G_{ij} v_i",

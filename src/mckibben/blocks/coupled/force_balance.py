@@ -24,26 +24,23 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import (
     STRICT,
     Channel,
     Channels,
-    Initial,
     Rows,
-    Rule,
     Vector,
     rows,
     vector,
 )
 from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.linear_system import eliminate, newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.parametrised import parameter_vector
-from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.coupled.balance_fields import tell_clipped
 from mckibben.errors import ModelError
 
@@ -56,8 +53,16 @@ HEAD = 7
 MOST_STEPS = 60
 """Of Newton's method."""
 
-NEARLY = 1e-13
-"""Residual that is an equilibrium, though not to the last digit."""
+BALANCED, NEARLY = 4e-16, 1e-13
+"""Residual that is an equilibrium, and that is one though not to the last digit."""
+
+HAIR = 1e-9
+"""Relative difference of pressures that is rounding."""
+
+SINGLE = {"BALANCED": 1e-6, "NEARLY": 1e-5, "HAIR": 1e-6}
+
+PATH = 40
+"""Steps from rest to the first pressures."""
 
 
 @kernel
@@ -129,87 +134,114 @@ def strain(c: Array, before: Array, last: Array, y: Array, stops: Array, slopes:
             stops[k, i] = min(max(value, -1.0), 1.0)
 
 
-@kernel
-def force_balance_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def force_balance_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
     """Give pressures; the state is [last y, stops, samples clipped]."""
     c = coefficients
     n, n_x, m, scale = int(c[0]), int(c[1]), int(c[3]), c[4]
-    scratch = c[c.size - 2 * n * (m + 1) :]
     stops, slopes = scratch[: n * m].reshape((n, m)), scratch[n * m : 2 * n * m].reshape((n, m))
     rest = scratch[2 * n * m :]
     y, gradient = rest[:n], rest[n : 2 * n]
-    for t in range(inputs.shape[0]):
-        for j in range(n):
-            y[j] = inputs[t, j] / scale
-        strain(c, state[n : n + n * m], state[:n], y, stops, slopes)
-        clipped = False
-        for k in range(n):
-            top, bottom, _ = balance(c, stops, y, inputs[t, n : n + n_x], k, gradient, slopes)
-            p = top / bottom
-            limited = min(max(p, c[5]), c[6])
-            # a hair beyond is rounding
-            clipped = clipped or abs(limited - p) > 1e-9 * (1.0 + abs(p))
-            outputs[t, k] = limited
-        for j in range(n):
-            state[j] = y[j]
-        state[n : n + n * m] = scratch[: n * m]
-        if clipped:
-            state[n + n * m] += 1.0
+    for j in range(n):
+        y[j] = inputs[j] / scale
+    strain(c, state[n : n + n * m], state[:n], y, stops, slopes)
+    clipped = False
+    for k in range(n):
+        top, bottom, _ = balance(c, stops, y, inputs[n : n + n_x], k, gradient, slopes)
+        p = top / bottom
+        limited = min(max(p, c[5]), c[6])
+        clipped = clipped or abs(limited - p) > HAIR * (1.0 + abs(p))
+        outputs[k] = limited
+    for j in range(n):
+        state[j] = y[j]
+    state[n : n + n * m] = scratch[: n * m]
+    if clipped:
+        state[n + n * m] += 1.0
 
 
-@kernel
-def force_balance_inverse_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
+@step
+def force_balance_inverse_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Solve for where the arm is; the last state counts samples where Newton's method gave up."""
     c = coefficients
     n, n_x, m, scale = int(c[0]), int(c[1]), int(c[3]), c[4]
-    scratch = c[c.size - 2 * n * m - n * (n + 4) :]
     stops, slopes = scratch[: n * m].reshape((n, m)), scratch[n * m : 2 * n * m].reshape((n, m))
     rest = scratch[2 * n * m :]
     vectors = rest[: 4 * n].reshape((4, n))
     y, gradient, residual, trial = vectors[0], vectors[1], vectors[2], vectors[3]
     matrix = rest[4 * n : n * (n + 4)].reshape((n, n))
-    for t in range(inputs.shape[0]):
-        x = inputs[t, n : n + n_x]
-        for j in range(n):
-            y[j] = state[j]
-        solved = False
-        before = np.inf
-        for step in range(MOST_STEPS):
-            strain(c, state[n : n + n * m], state[:n], y, stops, slopes)
-            worst = 0.0
-            for k in range(n):
-                top, bottom, slope = balance(c, stops, y, x, k, gradient, slopes)
-                residual[k] = top - inputs[t, k] * bottom
-                worst = max(worst, abs(residual[k]))
-                for j in range(n):
-                    matrix[k, j] = gradient[j]
-                matrix[k, k] -= inputs[t, k] * slope
-            if worst <= 4e-16 * (1.0 + abs(inputs[t, 0])) or (worst >= before and worst < NEARLY):
-                solved = True
-                break
-            before = worst
-            for k in range(n):
-                trial[k] = -residual[k]
-            eliminate(matrix, trial)
-            far = 0.0
-            for k in range(n):
-                far = max(far, abs(trial[k]))
-            # small steps keep to the branch that the arm is on; halved ones break ties at kinks
-            share = min(1.0, 0.1 / far) if far > 0.0 else 1.0
-            if step > 20:
-                share *= 0.5
-            for k in range(n):
-                y[k] += share * trial[k]
-        # halved steps may leave a residual that is still falling, and next to nothing
-        if not solved and before >= NEARLY:
-            state[n + n * m] += 1.0
+    x = inputs[n : n + n_x]
+    for j in range(n):
+        y[j] = state[j]
+    solved = False
+    before = np.inf
+    for round_ in range(MOST_STEPS):
         strain(c, state[n : n + n * m], state[:n], y, stops, slopes)
-        for j in range(n):
-            state[j] = y[j]
-            outputs[t, j] = scale * y[j]
-        state[n : n + n * m] = scratch[: n * m]
+        worst = 0.0
+        for k in range(n):
+            top, bottom, slope = balance(c, stops, y, x, k, gradient, slopes)
+            residual[k] = top - inputs[k] * bottom
+            worst = max(worst, abs(residual[k]))
+            for j in range(n):
+                matrix[k, j] = gradient[j]
+            matrix[k, k] -= inputs[k] * slope
+        if worst <= BALANCED * (1.0 + abs(inputs[0])) or (worst >= before and worst < NEARLY):
+            solved = True
+            break
+        before = worst
+        for k in range(n):
+            trial[k] = -residual[k]
+        eliminate(matrix, trial)
+        far = 0.0
+        for k in range(n):
+            far = max(far, abs(trial[k]))
+        # small steps keep to the branch that the arm is on; halved ones break ties at kinks
+        share = min(1.0, 0.1 / far) if far > 0.0 else 1.0
+        if round_ > 20:
+            share *= 0.5
+        for k in range(n):
+            y[k] += share * trial[k]
+    # halved steps may leave a residual that is still falling, and next to nothing
+    if not solved and before >= NEARLY:
+        state[n + n * m] += 1.0
+    strain(c, state[n : n + n * m], state[:n], y, stops, slopes)
+    for j in range(n):
+        state[j] = y[j]
+        outputs[j] = scale * y[j]
+    state[n : n + n * m] = scratch[: n * m]
+
+
+@kernel
+def force_balance_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at the first displacements, with friction as if the arm had come from 0, or unloaded."""
+    n, m, scale = int(coefficients[0]), int(coefficients[3]), coefficients[4]
+    for k in range(n):
+        state[k] = inputs[k] / scale
+        for i in range(m):
+            stretched = state[k] / coefficients[HEAD + i]
+            state[n + k * m + i] = 0.0 if virgin else min(max(stretched, -1.0), 1.0)
+    state[n + n * m] = 0.0
+
+
+@kernel
+def force_balance_inverse_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start where an arm is that went in small steps from its rest to the first pressures."""
+    n, n_in = int(coefficients[0]), inputs.size
+    given, outputs, rest = scratch[:n_in], scratch[n_in : n_in + n], scratch[n_in + n :]
+    state[:] = 0.0
+    given[:] = inputs
+    for i in range(PATH + 1):
+        for k in range(n):
+            given[k] = (i * (1.0 / PATH)) * inputs[k]
+        force_balance_inverse_step(coefficients, state, rest, given, outputs)
+    if virgin:
+        state[n:] = 0.0
+    state[state.size - 1] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -237,10 +269,11 @@ class ForceBalance(ManyChannels, Invertible):
     """
 
     kind: ClassVar[str] = "force-balance"
-    kernel: ClassVar[Kernel] = force_balance_kernel
-    inverse_kernel: ClassVar[Kernel] = force_balance_inverse_kernel
+    kernel: ClassVar[Kernel] = force_balance_step
+    start_kernel: ClassVar[Start] = force_balance_start
+    inverse_kernel: ClassVar[Kernel] = force_balance_inverse_step
+    inverse_start_kernel: ClassVar[Start] = force_balance_inverse_start
     inverse_path_dependent: ClassVar[bool] = True
-    in_scratch: ClassVar[bool] = True
     increasing = ("thresholds",)
     notation: ClassVar[Notation] = Notation(
         r"p_k = \frac{\sum_q x^q (c_{kq} + \sum_j S_{kqj} y_j) + e_k(y_k) + \sum_m x^q "
@@ -307,21 +340,6 @@ class ForceBalance(ManyChannels, Invertible):
         width = len(self.forces[0])
         return replace(self, forces=rows(table[:, :width]), areas=rows(table[:, width:]))
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state at the first displacements; friction as if the arm had come there from 0.
-
-        ``virgin`` leaves friction unloaded.
-        """
-        if initial is not None and not isinstance(initial, str):
-            return explicit_state(self, initial)
-        y = np.asarray(first[: len(self.driven)]) / self.scale
-        m = len(self.thresholds)
-        if initial == "virgin":
-            return np.concatenate([y, np.zeros(len(y) * m + 1)])
-        r = np.array(self.thresholds) / self.scale
-        stops = np.clip(y[:, np.newaxis] / r, -1.0, 1.0)
-        return np.concatenate([y, stops.ravel(), [0.0]])
-
     def coefficients(self, sample_time: float | None) -> Array:
         """Return sizes, scale, limits and thresholds, then forces and area of every muscle."""
         del sample_time
@@ -349,21 +367,9 @@ class ForceBalance(ManyChannels, Invertible):
 
     @property
     def n_inverse_scratch(self) -> int:
-        """As forward, a residual and a matrix, and inputs on the way to the first."""
+        """As forward, two vectors and a matrix, and inputs and outputs on the way to the first."""
         n = len(self.driven)
-        return self.n_scratch + n + n * n + len(self.inputs)
-
-    def inverse_start(self, first: Array, start: Rule) -> Array:
-        """Return the state of an arm that went in small steps from its rest to the first pressures."""
-        n = len(self.driven)
-        state = self.initial_state(np.zeros(n), "virgin")
-        steps = np.linspace(0.0, 1.0, 41)[:, np.newaxis]
-        path = np.column_stack([steps * first[:n], np.tile(first[n:], (steps.size, 1))])
-        self.bind_inverse(None, state, np.ascontiguousarray(path), np.empty((steps.size, n)))()
-        if start == "virgin":
-            state = self.initial_state(state[:n] * self.scale, "virgin")
-        state[-1] = 0.0
-        return state
+        return self.n_scratch + 3 * n + n * n + len(self.inputs)
 
     inverse_counts: ClassVar[bool] = True
 

@@ -18,18 +18,17 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import (
     STRICT,
     Channel,
     Channels,
     Rows,
-    Rule,
     Vector,
 )
 from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import SLACK, kernel, step
 from mckibben.blocks.core.linear_system import eliminate, newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
@@ -40,18 +39,26 @@ from mckibben.errors import ModelError
 MOST_STEPS = 40
 """Of Newton's method in a sample."""
 
+SOLVED = 1e-11
+"""Residual by the size of the outputs that is rounding."""
 
-@kernel
-def fuzzy_network_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Answer sample by sample; scratch are the memberships."""
-    memberships = coefficients[coefficients.size - int(coefficients[0] * coefficients[4]) :]
-    for t in range(inputs.shape[0]):
-        answer(coefficients, inputs[t], memberships, outputs[t])
+SINGLE = {"SOLVED": 1e-5}
+
+STARTS = 5
+"""Places from the lowest to the highest inputs from which the first sample is sought."""
 
 
-@kernel
-def fuzzy_network_inverse_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
+@step
+def fuzzy_network_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Answer a sample; scratch are the memberships."""
+    answer(coefficients, inputs, scratch, outputs)
+
+
+@step
+def fuzzy_network_inverse_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Solve for the driven inputs by Newton's method within their limits, from the last ones.
 
@@ -64,49 +71,78 @@ def fuzzy_network_inverse_kernel(
     for i in range(m):
         n_rules *= int(c[5 + i])
     n_left = n_rules * m * (m + 1)
-    scratch = c[c.size - (n * most + m * most + n_left + m * (m + 6)) :]
     memberships, tilts = scratch[: n * most], scratch[n * most : n * most + m * most + m]
-    rest = scratch[n * most + m * most + m :]
-    left, rest = rest[:n_left], rest[n_left:]
-    x, y, best, step = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m], rest[3 * m : 4 * m]
+    left = scratch[n * most + m * most + m : n * most + m * most + m + n_left]
+    rest = scratch[n * most + m * most + m + n_left :]
+    x, y, best, change = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m], rest[3 * m : 4 * m]
     slopes = rest[4 * m : m * (m + 4)].reshape((m, m))
-    for t in range(inputs.shape[0]):
-        contract(c, m, inputs[t, m:], memberships, left)
-        size = 1.0
+    contract(c, m, inputs[m:], memberships, left)
+    size = 1.0
+    for j in range(m):
+        x[j] = state[j]
+        size = max(size, abs(inputs[j]))
+    least, share = np.inf, 1.0
+    for _ in range(MOST_STEPS):
+        sloped_answer(c, left, x, memberships, tilts, y, slopes)
+        worst = 0.0
         for j in range(m):
-            x[j] = state[j]
-            size = max(size, abs(inputs[t, j]))
-        least, share = np.inf, 1.0
-        for _ in range(MOST_STEPS):
-            sloped_answer(c, left, x, memberships, tilts, y, slopes)
-            worst = 0.0
-            for j in range(m):
-                y[j] -= inputs[t, j]
-                worst = max(worst, abs(y[j]))
-            if worst < least:
-                # once at rounding, a step that gains nothing ends the search
-                stuck = worst > 0.5 * least and worst < 1e-11 * size
-                least = worst
-                for i in range(m):
-                    best[i] = x[i]
-                    step[i] = y[i]
-                if stuck or worst == 0.0:
-                    break
-                eliminate(slopes, step)
-                share = 1.0
-            elif least < 1e-11 * size:
-                break
-            else:  # a shorter step from the best
-                share *= 0.5
-                if share < 1e-3:
-                    break
+            y[j] -= inputs[j]
+            worst = max(worst, abs(y[j]))
+        if worst < least:
+            # once at rounding, a step that gains nothing ends the search
+            stuck = worst > 0.5 * least and worst < SOLVED * size
+            least = worst
             for i in range(m):
-                x[i] = min(max(best[i] - share * step[i], low[i]), high[i])
+                best[i] = x[i]
+                change[i] = y[i]
+            if stuck or worst == 0.0:
+                break
+            eliminate(slopes, change)
+            share = 1.0
+        elif least < SOLVED * size:
+            break
+        else:  # a shorter step from the best
+            share *= 0.5
+            if share < 1e-3:
+                break
         for i in range(m):
-            state[i] = best[i]
-            outputs[t, i] = best[i]
-        if least > 1e-9 * size:
-            state[m] += 1.0
+            x[i] = min(max(best[i] - share * change[i], low[i]), high[i])
+    for i in range(m):
+        state[i] = best[i]
+        outputs[i] = best[i]
+    if least > SLACK * size:
+        state[m] += 1.0
+
+
+@kernel
+def fuzzy_network_inverse_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start at the best solution for the first sample that is found from several places."""
+    m = state.size - 1
+    low, high, c = coefficients[:m], coefficients[m : 2 * m], coefficients[2 * m :]
+    n = int(c[0])
+    trial, driven, y = scratch[: m + 1], scratch[m + 1 : 2 * m + 1], scratch[2 * m + 1 : 3 * m + 1]
+    x, rest = scratch[3 * m + 1 : 3 * m + 1 + n], scratch[3 * m + 1 + n :]
+    for i in range(m):
+        state[i] = 0.5 * (low[i] + high[i])
+    state[m] = 0.0
+    least = np.inf
+    for k in range(STARTS):
+        share = min(max(k / (STARTS - 1), 0.02), 0.98)
+        for i in range(m):
+            trial[i] = low[i] + share * (high[i] - low[i])
+        trial[m] = 0.0
+        fuzzy_network_inverse_step(coefficients, trial, rest, inputs, driven)
+        for i in range(n):
+            x[i] = driven[i] if i < m else inputs[i]
+        answer(c, x, rest, y)
+        error = 0.0
+        for j in range(m):
+            error = max(error, abs(y[j] - inputs[j]))
+        if error < least:
+            least = error
+            state[:m] = trial[:m]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -129,10 +165,10 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
     """
 
     kind: ClassVar[str] = "fuzzy-network"
-    kernel: ClassVar[Kernel] = fuzzy_network_kernel
-    inverse_kernel: ClassVar[Kernel] = fuzzy_network_inverse_kernel
+    kernel: ClassVar[Kernel] = fuzzy_network_step
+    inverse_kernel: ClassVar[Kernel] = fuzzy_network_inverse_step
+    inverse_start_kernel: ClassVar[Start] = fuzzy_network_inverse_start
     inverse_path_dependent: ClassVar[bool] = True
-    in_scratch: ClassVar[bool] = True
     of_local_rules: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "consequents")
     notation: ClassVar[Notation] = Notation(
@@ -232,29 +268,14 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
 
     @property
     def n_inverse_scratch(self) -> int:
-        """Memberships, their slopes, contracted rules, six vectors of driven inputs, and a matrix."""
+        """Memberships, their slopes, contracted rules, vectors of inputs, and a matrix."""
         m, most = len(self.driven), max(map(len, self.centres))
-        return self.n_scratch + m * most + self._n_rules_driven * m * (m + 1) + m * (m + 6)
+        solving = m * most + self._n_rules_driven * m * (m + 1) + m * (m + 6)
+        return self.n_scratch + solving + 3 * m + 1 + len(self.centres)
 
     def inverse_numbers(self, own: Array) -> Array:
         """Return the limits, lowest then highest, and the network's."""
         return np.concatenate([*np.array(self.limits).T, own])
-
-    def inverse_start(self, first: Array, start: Rule) -> Array:
-        """Return the solution for the first sample, the best that is found from several starts."""
-        del start
-        low, high = np.array(self.limits).T
-        given = np.asarray(first, dtype=np.float64)[np.newaxis]
-        found, least = np.append(0.5 * (low + high), 0.0), np.inf
-        for share in (0.02, 0.25, 0.5, 0.75, 0.98):
-            state = np.append(low + share * (high - low), 0.0)
-            driven = np.empty((1, low.size))
-            self.bind_inverse(None, state, given, driven)()
-            reached = self.simulate(np.column_stack([driven, given[:, low.size :]]))
-            error = float(np.abs(reached - given[:, : low.size]).max())
-            if error < least:
-                found, least = state, error
-        return np.append(found[:-1], 0.0)
 
     inverse_counts: ClassVar[bool] = True
 

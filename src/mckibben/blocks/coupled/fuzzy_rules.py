@@ -10,10 +10,12 @@ normalised memberships of an input x_i, of Gaussian sets at c_s of width w_s,
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import NOTHING, kernel
 
 
 @kernel
@@ -25,7 +27,7 @@ def fill_memberships(x: float, centres: Array, widths: Array, memberships: Array
         memberships[s] = -0.5 * z * z
         largest = max(largest, memberships[s])
     for s in range(centres.size):
-        memberships[s] = np.exp(memberships[s] - largest)
+        memberships[s] = math.exp(memberships[s] - largest)
         total += memberships[s]
     for s in range(centres.size):
         memberships[s] /= total
@@ -58,12 +60,12 @@ def fill_between(c: Array, first: int, last: int, x: Array, memberships: Array) 
 
 
 @kernel
-def consequents_of(c: Array) -> Array:
-    """Return what comes behind the sets."""
+def consequents_at(c: Array) -> int:
+    """Return where the consequents begin, behind the sets."""
     n, n_sets = int(c[0]), 0
     for i in range(n):
         n_sets += int(c[5 + i])
-    return c[5 + n + 2 * n_sets :]
+    return 5 + n + 2 * n_sets
 
 
 @kernel
@@ -76,7 +78,8 @@ def answer(c: Array, x: Array, memberships: Array, y: Array) -> None:
     """
     n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
     n_rules = fill_between(c, 0, n, x, memberships)
-    rows, at, width = consequents_of(c), 0, n + constant
+    rows = c[consequents_at(c) :]
+    at, width = 0, n + constant
     for j in range(n_out):
         y[j] = 0.0
     for rule in range(n_rules):
@@ -85,7 +88,7 @@ def answer(c: Array, x: Array, memberships: Array, y: Array) -> None:
             sets = int(c[5 + i])
             firing *= memberships[i * most + rest % sets]
             rest //= sets
-        if firing > 1e-300:
+        if firing > NOTHING:
             for j in range(n_out):
                 total = rows[at + n] if constant else 0.0
                 for i in range(n):
@@ -104,7 +107,7 @@ def contract(c: Array, m: int, scheduling: Array, memberships: Array, left: Arra
     """
     n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
     n_known = fill_between(c, m, n, scheduling, memberships)
-    rows, width = consequents_of(c), n + constant
+    rows, width = c[consequents_at(c) :], n + constant
     for place in range(left.size):
         left[place] = 0.0
     for known in range(n_known):
@@ -162,7 +165,7 @@ def sloped_answer(
             firing *= memberships[place]
             tilt[i] = tilts[place]
             rest //= sets
-        if firing > 1e-300:
+        if firing > NOTHING:
             for j in range(n_out):
                 total = left[at + m]
                 for i in range(m):

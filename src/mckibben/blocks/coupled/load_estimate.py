@@ -20,47 +20,78 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.core.block import Block, Kernel, Primitive
-from mckibben.blocks.core.fields import STRICT, Channel, Initial
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
+from mckibben.blocks.core.fields import STRICT, Channel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.saving import nested
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_in import balance_in
-from mckibben.blocks.coupled.balance_law import keep, unbalanced
+from mckibben.blocks.coupled.balance_law import begin, keep, unbalanced
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 
 
-@kernel
-def load_estimate_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def load_estimate_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
     """Give loads; behind the balance's coefficients stands the pseudo-inverse."""
     c = coefficients
     n, n_x, n_loads = int(c[0]), int(c[1]), int(c[3])
-    scratch = c[c.size - n * (n + 6) - n_x - n_loads :]
-    solving = c[c.size - scratch.size - n_loads * n :]
+    solving = c[c.size - n_loads * n :]
     y, residual, gradient = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n]
     matrix, x = scratch[3 * n : n * (n + 3)].reshape((n, n)), scratch[n * (n + 6) :]
     tare = state[state.size - 2 - n :]
-    for t in range(inputs.shape[0]):
-        p = inputs[t, n : 2 * n]
+    p = inputs[n : 2 * n]
+    for k in range(n):
+        y[k] = inputs[k] + tare[k]
+    for i in range(n_x):
+        x[i] = inputs[2 * n + i]
+    for i in range(n_loads):
+        x[n_x + i] = 0.0
+    way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
+    unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+    keep(c, state, way, y, p)
+    state[state.size - 2] = 0.0
+    for i in range(n_loads):
+        load = 0.0
         for k in range(n):
-            y[k] = inputs[t, k] + tare[k]
-        for i in range(n_x):
-            x[i] = inputs[t, 2 * n + i]
+            load -= solving[i * n + k] * residual[k]
+        outputs[i] = load
+
+
+@kernel
+def load_estimate_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start as the balance does, under the loads that the first sample has without friction."""
+    c = coefficients
+    n, n_x, n_loads = int(c[0]), int(c[1]), int(c[3])
+    solving = c[c.size - n_loads * n :]
+    y, p, x = scratch[:n], inputs[n : 2 * n], scratch[n * (n + 6) :]
+    for i in range(n_x):
+        x[i] = inputs[2 * n + i]
+    for i in range(n_loads):
+        x[n_x + i] = 0.0
+    if c[13] == 0.0:
+        residual, gradient = scratch[n : 2 * n], scratch[2 * n : 3 * n]
+        matrix = scratch[3 * n : n * (n + 3)].reshape((n, n))
+        for i in range(state.size):
+            state[i] = 0.0
+        for k in range(n):
+            y[k] = inputs[k]
+        unbalanced(c, state, AT_REST, y, x, p, residual, matrix, gradient)
         for i in range(n_loads):
-            x[n_x + i] = 0.0
-        way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
-        unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
-        keep(c, state, way, y, p)
-        state[state.size - 2] = 0.0
-        for i in range(n_loads):
-            load = 0.0
             for k in range(n):
-                load -= solving[i * n + k] * residual[k]
-            outputs[t, i] = load
+                x[n_x + i] -= solving[i * n + k] * residual[k]
+    begin(c, state, x, y, scratch[n : n * (n + 6)])
+    if virgin:
+        for k in range(n):
+            y[k] = inputs[k] + state[state.size - 2 - n + k]
+        keep(c, state, AT_REST, y, p)
+        state[state.size - 2] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -78,8 +109,8 @@ class LoadEstimate(Primitive):
     """
 
     kind: ClassVar[str] = "load-estimate"
-    kernel: ClassVar[Kernel] = load_estimate_kernel
-    in_scratch: ClassVar[bool] = True
+    kernel: ClassVar[Kernel] = load_estimate_step
+    start_kernel: ClassVar[Start] = load_estimate_start
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
     notation: ClassVar[Notation] = Notation(
         r"F = C^{+} \left(p A(y) - \text{springs} - \text{elasticity} - \text{friction} - "
@@ -172,29 +203,6 @@ class LoadEstimate(Primitive):
         """Return the balance's, and the pseudo-inverse of its shares of loads."""
         solving = np.linalg.pinv(np.array(self.forward.loads))
         return np.concatenate([self.forward.coefficients(sample_time), solving.ravel()])
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state at rest without pressure, from which the muscles come all at once.
-
-        ``virgin``: already at the first sample, with friction and all that relaxes unloaded.
-        """
-        start = self.start if initial is None else initial
-        if start not in ("first_sample", "virgin"):
-            return explicit_state(self, start)
-        n = len(self.forward.driven)
-        y, p = np.ascontiguousarray(first[:n]), np.ascontiguousarray(first[n : 2 * n])
-        resting = np.zeros(self.forward.n_loads)
-        if not self.forward.tare:
-            c, residual, matrix = self.forward.coefficients(1.0), np.empty(n), np.empty((n, n))
-            x, none = np.concatenate([first[2 * n :], resting]), np.zeros(self.n_states)
-            unbalanced(c, none, AT_REST, y, x, p, residual, matrix, np.empty(n))
-            resting = -np.linalg.pinv(np.array(self.forward.loads)) @ residual
-        came = np.concatenate([y, first[2 * n :], resting])
-        state = self.forward.initial_state(came, "first_sample")
-        if start == "virgin":
-            keep(self.forward.coefficients(1.0), state, AT_REST, y + state[-2 - n : -2], p)
-            state[-2] = 0.0
-        return state
 
     @classmethod
     def example(cls) -> Self:

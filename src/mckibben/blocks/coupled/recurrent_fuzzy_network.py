@@ -26,81 +26,98 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
 from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Rows, Vector
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, own_sample_time
+from mckibben.blocks.core.refusals import own_sample_time
 from mckibben.errors import ModelError
 
+LEAST_FIRING = 1e-290
+"""Sum of the firing of rules below which no rule counts."""
 
-@kernel
-def recurrent_fuzzy_network_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
+SINGLE = {"LEAST_FIRING": 1e-36}
+
+
+@step
+def recurrent_fuzzy_network_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Run free.
 
     Coefficients are [n_a, n_b, n_c, sets, centres, widths, feedbacks (each inputs by sets),
-    consequents (rule by rule, each a coefficient for every x and a constant), scratch]; the state is
+    consequents (rule by rule, each a coefficient for every x and a constant)]; the state is
     [past outputs, past driven inputs, past scheduling inputs (one after another), memberships].
     """
     n_a, n_b, n_c = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
-    sets, n_scheduled = int(coefficients[3]), inputs.shape[1] - 1
+    sets, n_scheduled = int(coefficients[3]), inputs.size - 1
     n = n_a + 1 + n_b + n_scheduled * (1 + n_c)
     centres = coefficients[4 : 4 + n * sets]
     widths = coefficients[4 + n * sets : 4 + 2 * n * sets]
     feedbacks = coefficients[4 + 2 * n * sets : 4 + 3 * n * sets]
     consequents = coefficients[4 + 3 * n * sets :]
-    x = coefficients[coefficients.size - n :]
+    x = scratch
     n_past = n_a + n_b + n_scheduled * n_c
     n_rules = 1
     for _ in range(n):
         n_rules *= sets
-    for t in range(inputs.shape[0]):
-        for k in range(n_a):
-            x[k] = state[k]
-        x[n_a] = inputs[t, 0]
-        for k in range(n_b):
-            x[n_a + 1 + k] = state[n_a + k]
-        for s in range(n_scheduled):
-            at = n_a + 1 + n_b + s * (1 + n_c)
-            x[at] = inputs[t, 1 + s]
-            for k in range(n_c):
-                x[at + 1 + k] = state[n_a + n_b + s * n_c + k]
-        memberships = state[n_past:]
-        for place in range(n * sets):
-            z = x[place // sets] - centres[place] + feedbacks[place] * memberships[place]
-            z /= widths[place]
-            memberships[place] = np.exp(-0.5 * z * z)
-        total, y = 0.0, 0.0
-        for rule in range(n_rules):
-            firing, rest = 1.0, rule
-            for i in range(n - 1, -1, -1):
-                firing *= memberships[i * sets + rest % sets]
-                rest //= sets
-            answer = consequents[rule * (n + 1) + n]
-            for i in range(n):
-                answer += consequents[rule * (n + 1) + i] * x[i]
-            total += firing
-            y += firing * answer
-        y = y / total if total > 1e-290 else (state[0] if n_a > 0 else 0.0)
-        outputs[t, 0] = y
-        for k in range(n_a - 1, 0, -1):
-            state[k] = state[k - 1]
-        if n_a > 0:
-            state[0] = y
-        for k in range(n_b - 1, 0, -1):
-            state[n_a + k] = state[n_a + k - 1]
-        if n_b > 0:
-            state[n_a] = inputs[t, 0]
-        for s in range(n_scheduled):
-            at = n_a + n_b + s * n_c
-            for k in range(n_c - 1, 0, -1):
-                state[at + k] = state[at + k - 1]
-            if n_c > 0:
-                state[at] = inputs[t, 1 + s]
+    for k in range(n_a):
+        x[k] = state[k]
+    x[n_a] = inputs[0]
+    for k in range(n_b):
+        x[n_a + 1 + k] = state[n_a + k]
+    for s in range(n_scheduled):
+        at = n_a + 1 + n_b + s * (1 + n_c)
+        x[at] = inputs[1 + s]
+        for k in range(n_c):
+            x[at + 1 + k] = state[n_a + n_b + s * n_c + k]
+    memberships = state[n_past:]
+    for place in range(n * sets):
+        z = x[place // sets] - centres[place] + feedbacks[place] * memberships[place]
+        z /= widths[place]
+        memberships[place] = np.exp(-0.5 * z * z)
+    total, y = 0.0, 0.0
+    for rule in range(n_rules):
+        firing, rest = 1.0, rule
+        for i in range(n - 1, -1, -1):
+            firing *= memberships[i * sets + rest % sets]
+            rest //= sets
+        answer = consequents[rule * (n + 1) + n]
+        for i in range(n):
+            answer += consequents[rule * (n + 1) + i] * x[i]
+        total += firing
+        y += firing * answer
+    y = y / total if total > LEAST_FIRING else (state[0] if n_a > 0 else 0.0)
+    outputs[0] = y
+    for k in range(n_a - 1, 0, -1):
+        state[k] = state[k - 1]
+    if n_a > 0:
+        state[0] = y
+    for k in range(n_b - 1, 0, -1):
+        state[n_a + k] = state[n_a + k - 1]
+    if n_b > 0:
+        state[n_a] = inputs[0]
+    for s in range(n_scheduled):
+        at = n_a + n_b + s * n_c
+        for k in range(n_c - 1, 0, -1):
+            state[at + k] = state[at + k - 1]
+        if n_c > 0:
+            state[at] = inputs[1 + s]
+
+
+@kernel
+def recurrent_fuzzy_network_start(
+    coefficients: Array, state: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start where inputs always were the first ones, and outputs at the driven one."""
+    n_a, n_b, n_c = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
+    state[:] = 0.0
+    state[: n_a + n_b] = inputs[0]
+    for s in range(inputs.size - 1):
+        at = n_a + n_b + s * n_c
+        state[at : at + n_c] = inputs[1 + s]
 
 
 Lag = Annotated[int, Interval(ge=0, le=10)]
@@ -125,9 +142,9 @@ class RecurrentFuzzyNetwork(ManyChannels, Primitive):
     """
 
     kind: ClassVar[str] = "recurrent-fuzzy-network"
-    kernel: ClassVar[Kernel] = recurrent_fuzzy_network_kernel
+    kernel: ClassVar[Kernel] = recurrent_fuzzy_network_step
+    start_kernel: ClassVar[Start] = recurrent_fuzzy_network_start
     rate_dependent: ClassVar[bool] = True
-    in_scratch: ClassVar[bool] = True
     of_local_rules: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "feedbacks", "consequents")
     notation: ClassVar[Notation] = Notation(
@@ -208,20 +225,11 @@ class RecurrentFuzzyNetwork(ManyChannels, Primitive):
         """The regressors."""
         return self.n_regressors
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state of inputs that always were the first ones, and outputs at the driven one."""
-        if initial is not None and not isinstance(initial, str):
-            return explicit_state(self, initial)
-        return self._resting(first, float(first[0]))
-
     def state_at(self, first: Array, output: Array) -> Array:
         """Return the state at rest at the first inputs, where the output is known."""
-        return self._resting(first, float(output[0]))
-
-    def _resting(self, first: Array, output: float) -> Array:
-        scheduled = np.repeat(np.asarray(first[1:], np.float64), self.scheduling_lags)
-        past = [[output] * self.output_lags, [float(first[0])] * self.input_lags, scheduled]
-        return np.concatenate([*past, np.zeros(self.n_regressors * self.n_sets)])
+        state = self.initial_state(first)
+        state[: self.output_lags] = output[0]
+        return state
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return lags, sets and `pack`."""

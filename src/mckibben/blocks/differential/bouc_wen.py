@@ -24,7 +24,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -33,11 +33,11 @@ from mckibben.blocks.core.fields import (
     Coefficients,
     StoredInitial,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.solved_inverse import solve_samples
+from mckibben.blocks.core.solved_inverse import solve_sample, solved_start
 from mckibben.blocks.differential.flow import flow
-from mckibben.blocks.differential.loop import BoucWenLoop
+from mckibben.blocks.differential.loop import BoucWenLoop, bouc_wen_start
 from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
 
 
@@ -68,23 +68,23 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
     return _output(u, _moved(u, c, state), c)
 
 
-@kernel
-def bouc_wen_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def bouc_wen_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; coefficients are [rate, sigma, n, weight, centre, scale, polynomial].
 
     The state is [z, previous input].
     """
-    for t in range(inputs.shape[0]):
-        _advance(inputs[t, 0], coefficients, state)
-        outputs[t, 0] = _output(inputs[t, 0], state[0], coefficients)
+    _advance(inputs[0], coefficients, state)
+    outputs[0] = _output(inputs[0], state[0], coefficients)
 
 
-@kernel
-def bouc_wen_inverse_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+@step
+def bouc_wen_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
-    solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
+    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
+
+
+bouc_wen_inverse_start = solved_start(_trial, bouc_wen_start)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -115,8 +115,9 @@ class BoucWen(BoucWenLoop):
     """
 
     kind: ClassVar[str] = "bouc-wen"
-    kernel: ClassVar[Kernel] = bouc_wen_kernel
-    inverse_kernel: ClassVar[Kernel] = bouc_wen_inverse_kernel
+    kernel: ClassVar[Kernel] = bouc_wen_step
+    inverse_kernel: ClassVar[Kernel] = bouc_wen_inverse_step
+    inverse_start_kernel: ClassVar[Start] = bouc_wen_inverse_start
     parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "sigma")
     notation: ClassVar[Notation] = Notation(
         r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",

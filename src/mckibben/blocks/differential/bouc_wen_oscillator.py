@@ -22,11 +22,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, StoredInitial
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.differential.oscillator import Oscillator, Positive, oscillate
+from mckibben.blocks.differential.oscillator import Oscillator, Positive, oscillate, settle
 from mckibben.blocks.dynamic.repeating import Hold, Substeps
 
 
@@ -37,12 +37,20 @@ def bouc_wen_slope(z: float, velocity: float, numbers: Array) -> float:
     return numbers[0] - numbers[1] * along - numbers[2] * abs(z)
 
 
-@kernel
-def bouc_wen_oscillator_kernel(
+@step
+def bouc_wen_oscillator_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Run the model; see `mckibben.blocks.differential.oscillator`."""
     oscillate(bouc_wen_slope, coefficients, state, inputs, outputs)
+
+
+@kernel
+def bouc_wen_oscillator_start(
+    coefficients: Array, state: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start at rest."""
+    settle(bouc_wen_slope, coefficients, state, inputs, virgin)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -75,7 +83,8 @@ class BoucWenOscillator(Oscillator):
     """
 
     kind: ClassVar[str] = "bouc-wen-oscillator"
-    kernel: ClassVar[Kernel] = bouc_wen_oscillator_kernel
+    kernel: ClassVar[Kernel] = bouc_wen_oscillator_step
+    start_kernel: ClassVar[Start] = bouc_wen_oscillator_start
     slope_by: ClassVar[Callable[[float, float, Array], float]] = staticmethod(bouc_wen_slope)
     parameters: ClassVar[tuple[str, ...]] = (
         *("mass", "damping", "stiffness", "slope", "gamma", "delta", "output_offset"),

@@ -23,21 +23,19 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     Coefficients,
-    Initial,
     StoredInitial,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.single_channel import check_input_range
-from mckibben.blocks.core.solved_inverse import solve_samples
+from mckibben.blocks.core.solved_inverse import solve_sample, solved_start
 from mckibben.blocks.differential.loop import Loop
 from mckibben.blocks.memoryless.reversible import polynomial_at
 from mckibben.errors import ModelError
@@ -49,7 +47,7 @@ def _moved(u: float, c: Array, state: Array) -> float:
     y, before = state[0], state[1]
     if u == before:
         return y
-    size = (c.size - 3) // 2
+    size = (c.size - 3) // 3
     first = 3 if u > before else 3 + size
     x, x0 = (u - c[1]) / c[2], (before - c[1]) / c[2]
     kept = math.exp(-c[0] * abs(x - x0))
@@ -68,21 +66,32 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
     return _moved(u, c, state)
 
 
-@kernel
-def duhem_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; coefficients are [alpha, centre, scale, P rising, P falling].
+@step
+def duhem_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; coefficients are [alpha, centre, scale, P rising, P falling, f].
 
     The state is [output, previous input].
     """
-    for t in range(inputs.shape[0]):
-        _advance(inputs[t, 0], coefficients, state)
-        outputs[t, 0] = state[0]
+    _advance(inputs[0], coefficients, state)
+    outputs[0] = state[0]
+
+
+@step
+def duhem_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
+    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
 
 
 @kernel
-def duhem_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
-    solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
+def duhem_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start on the curve of inputs that have only risen, or on f."""
+    x = (inputs[0] - coefficients[1]) / coefficients[2]
+    size = (coefficients.size - 3) // 3
+    state[0] = polynomial_at(x, coefficients, 3 + 2 * size if virgin else 3, size)
+    state[1] = inputs[0]
+
+
+duhem_inverse_start = solved_start(_trial, duhem_start)
 
 
 def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: float) -> Array:
@@ -130,8 +139,10 @@ class Duhem(Loop):
     """
 
     kind: ClassVar[str] = "duhem"
-    kernel: ClassVar[Kernel] = duhem_kernel
-    inverse_kernel: ClassVar[Kernel] = duhem_inverse_kernel
+    kernel: ClassVar[Kernel] = duhem_step
+    start_kernel: ClassVar[Start] = duhem_start
+    inverse_kernel: ClassVar[Kernel] = duhem_inverse_step
+    inverse_start_kernel: ClassVar[Start] = duhem_inverse_start
     parameters: ClassVar[tuple[str, ...]] = ("target", "slope", "alpha")
     notation: ClassVar[Notation] = Notation(
         r"\frac{dy}{dx} = \alpha \operatorname{sgn}(dx) \left(f(x) - y\right) + "
@@ -161,28 +172,14 @@ class Duhem(Loop):
                 f"{self.kind!r} has an empty polynomial. Remedy: give one coefficient or more to each."
             )
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [output, first input]."""
-        start = self.initial if initial is None else initial
-        x = (float(first[0]) - self.centre) / self.scale
-        if start == "first_sample":
-            rising = particular(self.alpha, self.target, self.slope, 1.0)
-            return np.array([np.polynomial.polynomial.polyval(x, rising), first[0]])
-        if start == "virgin":
-            return np.array([np.polynomial.polynomial.polyval(x, self.target), first[0]])
-        return explicit_state(self, start)
-
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [alpha, centre, scale, P rising, P falling]."""
+        """Return [alpha, centre, scale, P rising, P falling, f], filled up to as many numbers as P."""
         del sample_time
         both = [particular(self.alpha, self.target, self.slope, way) for way in (1.0, -1.0)]
-        return np.array([self.alpha, self.centre, self.scale, *both[0], *both[1]])
-
-    def c_numbers(self, sample_time: float | None) -> Array:
-        """Return the coefficients, then f filled up to as many numbers as P."""
-        own = self.coefficients(sample_time)
-        size = (own.size - 3) // 2
-        return np.array([*own, *self.target, *[0.0] * (size - len(self.target))])
+        filled = [0.0] * (both[0].size - len(self.target))
+        return np.array(
+            [self.alpha, self.centre, self.scale, *both[0], *both[1], *self.target, *filled]
+        )
 
     def least_slope(self) -> float:
         """Return a lower bound of the slope of the output by the input, on loops within the range.

@@ -22,7 +22,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     FORCE,
@@ -31,9 +31,9 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.differential.oscillator import Oscillator, Positive, oscillate
+from mckibben.blocks.differential.oscillator import Oscillator, Positive, oscillate, settle
 from mckibben.blocks.dynamic.repeating import Hold, Substeps
 from mckibben.errors import ModelError
 
@@ -58,12 +58,16 @@ def duhem_slope(z: float, velocity: float, numbers: Array) -> float:
     return numbers[j] + share * (numbers[j + 1] - numbers[j])
 
 
-@kernel
-def duhem_oscillator_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+@step
+def duhem_oscillator_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; see `mckibben.blocks.differential.oscillator`."""
     oscillate(duhem_slope, coefficients, state, inputs, outputs)
+
+
+@kernel
+def duhem_oscillator_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at rest."""
+    settle(duhem_slope, coefficients, state, inputs, virgin)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -97,7 +101,8 @@ class DuhemOscillator(Oscillator):
     """
 
     kind: ClassVar[str] = "duhem-oscillator"
-    kernel: ClassVar[Kernel] = duhem_oscillator_kernel
+    kernel: ClassVar[Kernel] = duhem_oscillator_step
+    start_kernel: ClassVar[Start] = duhem_oscillator_start
     increasing: ClassVar[tuple[str, ...]] = ("knots",)
     slope_by: ClassVar[Callable[[float, float, Array], float]] = staticmethod(duhem_slope)
     parameters: ClassVar[tuple[str, ...]] = (

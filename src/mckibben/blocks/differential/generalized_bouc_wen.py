@@ -25,7 +25,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -35,11 +35,11 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.solved_inverse import solve_samples
+from mckibben.blocks.core.solved_inverse import solve_sample, solved_start
 from mckibben.blocks.differential.flow import flow
-from mckibben.blocks.differential.loop import BoucWenLoop
+from mckibben.blocks.differential.loop import BoucWenLoop, bouc_wen_start
 from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
 from mckibben.errors import ModelError
 
@@ -88,25 +88,27 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
     return _output(u, _moved(u, c, state), c)
 
 
-@kernel
-def generalized_bouc_wen_kernel(
+@step
+def generalized_bouc_wen_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Run the model; the state is [z, previous input].
 
     Coefficients are [rate, n, weight, centre, scale, 1, b2 to b6, polynomial].
     """
-    for t in range(inputs.shape[0]):
-        _advance(inputs[t, 0], coefficients, state)
-        outputs[t, 0] = _output(inputs[t, 0], state[0], coefficients)
+    _advance(inputs[0], coefficients, state)
+    outputs[0] = _output(inputs[0], state[0], coefficients)
 
 
-@kernel
-def generalized_bouc_wen_inverse_kernel(
+@step
+def generalized_bouc_wen_inverse_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
-    solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
+    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
+
+
+generalized_bouc_wen_inverse_start = solved_start(_trial, bouc_wen_start)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -137,8 +139,9 @@ class GeneralizedBoucWen(BoucWenLoop):
     """
 
     kind: ClassVar[str] = "generalized-bouc-wen"
-    kernel: ClassVar[Kernel] = generalized_bouc_wen_kernel
-    inverse_kernel: ClassVar[Kernel] = generalized_bouc_wen_inverse_kernel
+    kernel: ClassVar[Kernel] = generalized_bouc_wen_step
+    inverse_kernel: ClassVar[Kernel] = generalized_bouc_wen_inverse_step
+    inverse_start_kernel: ClassVar[Start] = generalized_bouc_wen_inverse_start
     parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "shape")
     notation: ClassVar[Notation] = Notation(
         r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import Initial, StoredInitial
-from mckibben.blocks.core.refusals import explicit_state
+from mckibben.blocks.core.block import Start
+from mckibben.blocks.core.fields import StoredInitial
+from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.single_channel import check_input_range
 from mckibben.blocks.core.solved_inverse import Solved
 from mckibben.errors import ModelError
+
+
+@kernel
+def bouc_wen_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with z = 1, as after a long rise, or z = 0."""
+    state[0] = 0.0 if virgin else 1.0
+    state[1] = inputs[0]
 
 
 class Loop(Solved):
@@ -28,6 +38,8 @@ class Loop(Solved):
 class BoucWenLoop(Loop):
     """A loop of z beside a reversible polynomial of the input."""
 
+    start_kernel: ClassVar[Start] = bouc_wen_start
+
     polynomial: tuple[float, ...]
     initial: StoredInitial
 
@@ -37,10 +49,3 @@ class BoucWenLoop(Loop):
             raise ModelError(
                 f"{self.kind!r} has no polynomial. Remedy: give one coefficient or more."
             )
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [z, first input]."""
-        start = self.initial if initial is None else initial
-        if isinstance(start, str):
-            return np.array([float(start == "first_sample"), first[0]])
-        return explicit_state(self, start)

@@ -26,11 +26,10 @@ from annotated_types import Gt
 from pydantic import FiniteFloat
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Primitive
+from mckibben.blocks.core.block import Primitive, Run
 from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import Initial
 from mckibben.blocks.core.kernels import inlined
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.blocks.dynamic.repeating import Repeating
 from mckibben.errors import ModelError
@@ -58,33 +57,55 @@ def oscillate(slope: Any, coefficients: Array, state: Array, inputs: Array, outp
     m, c, k, offset = coefficients[3], coefficients[4], coefficients[5], coefficients[6]
     own = coefficients[HEAD:]
     y, v, z = state[0], state[1], state[2]
-    for t in range(inputs.shape[0]):
-        rise = 0.0 if held else (inputs[t, 0] - state[3]) / n
-        for s in range(n):
-            u = state[3] + s * rise
-            v1 = v
-            a1 = (u - c * v1 - k * y - z) / m
-            z1 = v1 * slope(z, v1, own)
-            u += 0.5 * rise
-            v2 = v + 0.5 * h * a1
-            x = z + 0.5 * h * z1
-            a2 = (u - c * v2 - k * (y + 0.5 * h * v1) - x) / m
-            z2 = v2 * slope(x, v2, own)
-            v3 = v + 0.5 * h * a2
-            x = z + 0.5 * h * z2
-            a3 = (u - c * v3 - k * (y + 0.5 * h * v2) - x) / m
-            z3 = v3 * slope(x, v3, own)
-            u += 0.5 * rise
-            v4 = v + h * a3
-            x = z + h * z3
-            a4 = (u - c * v4 - k * (y + h * v3) - x) / m
-            z4 = v4 * slope(x, v4, own)
-            y += h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4)
-            v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-            z += h / 6.0 * (z1 + 2.0 * z2 + 2.0 * z3 + z4)
-        state[3] = inputs[t, 0]
-        outputs[t, 0] = y + offset
+    rise = 0.0 if held else (inputs[0] - state[3]) / n
+    for s in range(n):
+        u = state[3] + s * rise
+        v1 = v
+        a1 = (u - c * v1 - k * y - z) / m
+        z1 = v1 * slope(z, v1, own)
+        u += 0.5 * rise
+        v2 = v + 0.5 * h * a1
+        x = z + 0.5 * h * z1
+        a2 = (u - c * v2 - k * (y + 0.5 * h * v1) - x) / m
+        z2 = v2 * slope(x, v2, own)
+        v3 = v + 0.5 * h * a2
+        x = z + 0.5 * h * z2
+        a3 = (u - c * v3 - k * (y + 0.5 * h * v2) - x) / m
+        z3 = v3 * slope(x, v3, own)
+        u += 0.5 * rise
+        v4 = v + h * a3
+        x = z + h * z3
+        a4 = (u - c * v4 - k * (y + h * v3) - x) / m
+        z4 = v4 * slope(x, v4, own)
+        y += h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4)
+        v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+        z += h / 6.0 * (z1 + 2.0 * z2 + 2.0 * z3 + z4)
+    state[3] = inputs[0]
+    outputs[0] = y + offset
     state[0], state[1], state[2] = y, v, z
+
+
+@inlined
+def settle(slope: Any, coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at rest: where the first input leads slowly from none, or, virgin, without force."""
+    force = 0.0 if virgin else inputs[0]
+    k, own = coefficients[5], coefficients[HEAD:]
+    step = force / SETTLING
+    z = 0.0
+    for _ in range(SETTLING):
+        share1 = _share(slope, z, force, k, own)
+        share2 = _share(slope, z + 0.5 * step * share1, force, k, own)
+        share3 = _share(slope, z + 0.5 * step * share2, force, k, own)
+        share4 = _share(slope, z + step * share3, force, k, own)
+        z += step / 6.0 * (share1 + 2.0 * share2 + 2.0 * share3 + share4)
+    state[0], state[1], state[2], state[3] = (force - z) / k, 0.0, z, force
+
+
+@inlined
+def _share(slope: Any, z: float, force: float, k: float, own: Array) -> float:
+    """Return the share of a slow input that the element takes."""
+    stiffness = slope(z, force, own)
+    return stiffness / (k + stiffness)
 
 
 class Oscillator(Repeating, SingleChannel, Primitive):
@@ -127,6 +148,19 @@ class Oscillator(Repeating, SingleChannel, Primitive):
         Raises
         ------
         ModelError
+            Without a sample time.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        head = [step / self.substeps, self.substeps, self.hold == "zero"]
+        springs = [self.inertia, self.damping, self.stiffness, self.output_offset or 0.0]
+        return np.array([*head, *springs, *self.element])
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the kernel in place.
+
+        Raises
+        ------
+        ModelError
             Without a sample time, or where substeps are too few for it.
         """
         step = needs_sample_time(self.kind, sample_time)
@@ -137,39 +171,10 @@ class Oscillator(Repeating, SingleChannel, Primitive):
                 f"{self.substeps} substep(s). Remedy: at least {np.ceil(10 * angle):.0f} substeps, or a "
                 "shorter sample time."
             )
-        head = [step / self.substeps, self.substeps, self.hold == "zero"]
-        springs = [self.inertia, self.damping, self.stiffness, self.output_offset or 0.0]
-        return np.array([*head, *springs, *self.element])
+        return super().bind(sample_time, state, inputs, outputs)
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what a step costs: four slopes a substep."""
         del sample_time
         operations = self.substeps * 4 * (18 + self.element.size)
         return Cost(operations, operations)
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return rest: where the first input leads slowly from none, or, virgin, without force."""
-        start = self.initial if initial is None else initial
-        if not isinstance(start, str):
-            return explicit_state(self, start)
-        if start == "virgin":
-            return np.zeros(4)
-        u = float(first[0])
-        z = self.settled(u)
-        return np.array([(u - z) / self.stiffness, 0.0, z, u])
-
-    def settled(self, force: float) -> float:
-        """Return the force of the element after a slow rise, or fall, of the input from 0."""
-        own, step, z = self.element, force / SETTLING, 0.0
-
-        def share(z: float) -> float:  # of the input that the element takes
-            slope = type(self).slope_by(z, force, own)
-            return slope / (self.stiffness + slope)
-
-        for _ in range(SETTLING):
-            k1 = share(z)
-            k2 = share(z + 0.5 * step * k1)
-            k3 = share(z + 0.5 * step * k2)
-            k4 = share(z + step * k3)
-            z += step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        return z

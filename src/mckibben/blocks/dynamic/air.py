@@ -27,19 +27,17 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     PRESSURE,
     STRICT,
     Channel,
     ChannelField,
-    Initial,
-    Rule,
     StoredInitial,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.core.single_channel import Ranged, check_input_range
 from mckibben.errors import ModelError, ModelWarning
 
@@ -51,12 +49,6 @@ LONGEST_LAG = 1e6
 
 APPROACHED = 0.05
 """Share of the range at both ends that lags only creep through, which is not counted as reachable."""
-
-SLACK = 1e-9
-"""Relative miss of a reference that counts as one."""
-
-ROUNDING = 1e-14
-"""Relative differences of pressures below are held, in the middle between filling and venting."""
 
 WHOLE = 1e-6
 """Share of a sample by which a dead time may be off a whole number of them."""
@@ -75,47 +67,74 @@ def _moved(c: Array, x: float, u: float) -> float:
 
 
 @kernel
-def air_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+def _middle_of(c: Array) -> float:
+    """Return the command that aims for no pressure, in the middle between filling and venting."""
+    return 0.5 * (c[1] + c[2])
+
+
+@kernel
+def _resting(c: Array, u: float, virgin: bool) -> float:
+    """Return the pressure where a command leads; or, virgin, that of the surroundings, or 0."""
+    if virgin:
+        return c[5] if c[5] > -math.inf else 0.0
+    return min(max(c[0] * (u - _middle_of(c)), c[5]), c[6])
+
+
+@step
+def air_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; the state is [pressure, past pressures, latest first].
 
     Coefficients are [gain, offset while filling, while venting, share of the way that a sample fills,
     that it vents, lowest, highest pressure, dead time in samples].
     """
     late = int(coefficients[7])
-    for t in range(inputs.shape[0]):
-        state[0] = _moved(coefficients, state[0], inputs[t, 0])
-        outputs[t, 0] = state[late]
-        for k in range(late, 0, -1):
-            state[k] = state[k - 1]
+    state[0] = _moved(coefficients, state[0], inputs[0])
+    outputs[0] = state[late]
+    for k in range(late, 0, -1):
+        state[k] = state[k - 1]
 
 
 @kernel
-def air_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+def air_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at rest where the first command leads, or at the pressure of the surroundings."""
+    state[:] = _resting(coefficients, inputs[0], virgin)
+
+
+@step
+def air_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Undo the model; coefficients are [forward ones, lowest, highest command].
 
     The state is [pressure, samples clipped].
     """
     c = coefficients
     lowest, highest = c[c.size - 2], c[c.size - 1]
-    middle = 0.5 * (c[1] + c[2])
-    for t in range(inputs.shape[0]):
-        wanted, x = inputs[t, 0], state[0]
-        held = ROUNDING * (abs(wanted) + c[0] * abs(middle))
-        if wanted > x + held:
-            u = min(x + (wanted - x) / c[3], c[6]) / c[0] + c[1]
-        elif wanted < x - held:
-            u = max(x + (wanted - x) / c[4], c[5]) / c[0] + c[2]
-        else:
-            wanted = x
-            u = x / c[0] + middle
-        u = min(max(u, lowest), highest)
-        reached = _moved(c, x, u)
-        if abs(reached - wanted) > SLACK * (abs(wanted) + c[0] * abs(u)):
-            state[1] += 1.0
-            state[0] = reached
-        else:
-            state[0] = wanted
-        outputs[t, 0] = u
+    middle = _middle_of(c)
+    wanted, x = inputs[0], state[0]
+    # pressures that differ by less are held, in the middle between filling and venting
+    held = ROUNDING * (abs(wanted) + c[0] * abs(middle))
+    if wanted > x + held:
+        u = min(x + (wanted - x) / c[3], c[6]) / c[0] + c[1]
+    elif wanted < x - held:
+        u = max(x + (wanted - x) / c[4], c[5]) / c[0] + c[2]
+    else:
+        wanted = x
+        u = x / c[0] + middle
+    u = min(max(u, lowest), highest)
+    reached = _moved(c, x, u)
+    if abs(reached - wanted) > SLACK * (abs(wanted) + c[0] * abs(u)):
+        state[1] += 1.0
+        state[0] = reached
+    else:
+        state[0] = wanted
+    outputs[0] = u
+
+
+@kernel
+def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at rest where the command for the first pressure leads, within its limits."""
+    c = coefficients
+    u = min(max(inputs[0] / c[0] + _middle_of(c), c[c.size - 2]), c[c.size - 1])
+    state[0], state[1] = _resting(c, u, virgin), 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -148,8 +167,10 @@ class Air(Ranged):
     """
 
     kind: ClassVar[str] = "air"
-    kernel: ClassVar[Kernel] = air_kernel
-    inverse_kernel: ClassVar[Kernel] = air_inverse_kernel
+    kernel: ClassVar[Kernel] = air_step
+    start_kernel: ClassVar[Start] = air_start
+    inverse_kernel: ClassVar[Kernel] = air_inverse_step
+    inverse_start_kernel: ClassVar[Start] = air_inverse_start
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = (
         "gain",
@@ -212,20 +233,11 @@ class Air(Ranged):
         """The pressure and, with a dead time, past ones."""
         return 1 + (LONGEST_DEAD_TIME if self.dead_time > 0 else 0)
 
-    def goal(self, command: float, way: Literal[-1, 0, 1] = 0) -> float:
-        """Return the pressure where a held command leads: in filling, 1, in venting, -1, or between."""
+    def goal(self, command: float, way: Literal[-1, 1]) -> float:
+        """Return the pressure where a held command leads: in filling, 1, or in venting, -1."""
         lowest, highest = self.pressures
         aimed = self.gain * (command - self.offset - 0.5 * way * self.hysteresis)
         return min(max(aimed, lowest), highest)
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the pressure at rest: where the first command leads, or, virgin, none."""
-        start = self.initial if initial is None else initial
-        if start == "first_sample":
-            return np.full(self.n_states, self.goal(float(first[0])))
-        if start == "virgin":
-            return np.full(self.n_states, self.ambient or 0.0)
-        return explicit_state(self, start)
 
     def dead_samples(self, sample_time: float | None) -> int:
         """Return the dead time in samples, rounded.
@@ -270,25 +282,18 @@ class Air(Ranged):
         shares = [-math.expm1(-sample_time / time) if time > 0 else 1.0 for time in times]
         return np.array([self.gain, *self.offsets, *shares, *self.pressures, late])
 
+    def start_numbers(self) -> Array:
+        """Return the coefficients at a sample time that its dead time allows."""
+        return self.coefficients(self.dead_time or 1.0)
+
     @property
     def n_inverse_states(self) -> int:
         """The pressure, and the count of samples clipped; past pressures do not matter."""
         return 2
 
-    def inverse_start(self, first: Array, start: Rule) -> Array:
-        """Return the pressure where the first command leads, and no samples clipped."""
-        command = self.input_giving(float(first[0]), start)
-        return self.inverse_state(self.initial_state(np.array([command]), start))
-
     def inverse_state(self, state: Array) -> Array:
         """Return the pressure, and no samples clipped."""
         return np.array([state[0], 0.0])
-
-    def input_giving(self, output: float, start: Rule) -> float:
-        """Return the command, within the limits, that holds a pressure."""
-        del start
-        low, high = self.limits
-        return min(max(output / self.gain + self.offset, low), high)
 
     def reachable(self) -> tuple[Array, Array]:
         """Return the pressures that can be reached whatever happened before, each of shape (1,).

@@ -14,45 +14,58 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
-from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Rule, Vector
+from mckibben.blocks.core.block import Kernel, Start
+from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Vector
 from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.linear import LinearSystem
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.errors import ModelError
 
 
-@kernel
-def creep_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def creep_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; coefficients are [a, c], the state is x."""
     n = state.size
-    for t in range(inputs.shape[0]):
-        u = inputs[t, 0]
-        y = u
-        for k in range(n):
-            state[k] = coefficients[k] * state[k] + (1.0 - coefficients[k]) * u
-            y += coefficients[n + k] * state[k]
-        outputs[t, 0] = y
+    u = inputs[0]
+    y = u
+    for k in range(n):
+        state[k] = coefficients[k] * state[k] + (1.0 - coefficients[k]) * u
+        y += coefficients[n + k] * state[k]
+    outputs[0] = y
 
 
 @kernel
-def creep_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+def creep_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with the elements at rest: at the first input, or at 0."""
+    state[:] = 0.0 if virgin else inputs[0]
+
+
+@step
+def creep_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Undo the model; coefficients and state as forward."""
     n = state.size
     gain = 1.0
     for k in range(n):
         gain += coefficients[n + k] * (1.0 - coefficients[k])
-    for t in range(inputs.shape[0]):
-        rest = inputs[t, 0]
-        for k in range(n):
-            rest -= coefficients[n + k] * coefficients[k] * state[k]
-        u = rest / gain
-        for k in range(n):
-            state[k] = coefficients[k] * state[k] + (1.0 - coefficients[k]) * u
-        outputs[t, 0] = u
+    rest = inputs[0]
+    for k in range(n):
+        rest -= coefficients[n + k] * coefficients[k] * state[k]
+    u = rest / gain
+    for k in range(n):
+        state[k] = coefficients[k] * state[k] + (1.0 - coefficients[k]) * u
+    outputs[0] = u
+
+
+@kernel
+def creep_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with the elements at rest: where the first output is held, or at 0."""
+    crept = 0.0
+    for k in range(state.size):
+        crept += coefficients[state.size + k]
+    state[:] = 0.0 if virgin else inputs[0] / (1.0 + crept)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -73,8 +86,10 @@ class Creep(SingleChannel, Invertible):
     """
 
     kind: ClassVar[str] = "creep"
-    kernel: ClassVar[Kernel] = creep_kernel
-    inverse_kernel: ClassVar[Kernel] = creep_inverse_kernel
+    kernel: ClassVar[Kernel] = creep_step
+    start_kernel: ClassVar[Start] = creep_start
+    inverse_kernel: ClassVar[Kernel] = creep_inverse_step
+    inverse_start_kernel: ClassVar[Start] = creep_inverse_start
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("compliances", "time_constants")
     notation: ClassVar[Notation] = Notation(
@@ -106,13 +121,6 @@ class Creep(SingleChannel, Invertible):
         """One to every Kelvin-Voigt element."""
         return len(self.compliances)
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the elements at rest: at the first input, or, virgin, at 0."""
-        start = self.initial if initial is None else initial
-        if not isinstance(start, str):
-            return explicit_state(self, start)
-        return np.full(self.n_states, 0.0 if start == "virgin" else first[0])
-
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [decays over a sample, compliances].
 
@@ -128,10 +136,6 @@ class Creep(SingleChannel, Invertible):
         """Return the outputs that can be reached at once, however far the elements have crept."""
         crept = float(np.sum(self.compliances))
         return low + crept * high, high + crept * low
-
-    def inverse_start(self, first: Array, start: Rule) -> Array:
-        """Return the elements at rest: where the first output is held, or, virgin, at 0."""
-        return self.initial_state(first / (1.0 + np.sum(self.compliances)), start)
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the elements, each a state."""

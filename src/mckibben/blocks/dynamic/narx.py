@@ -10,8 +10,9 @@ Everything is centred and scaled: outputs by `output_scale`, inputs and operator
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -25,19 +26,22 @@ from mckibben.blocks.core.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.core.refusals import explicit_state, own_sample_time
+from mckibben.blocks.core.kernels import inlined, kernel
+from mckibben.blocks.core.refusals import own_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
-from mckibben.blocks.play_type.memory import named_state
+from mckibben.blocks.play_type.memory import start_operators
 from mckibben.errors import ModelError
 
 HEAD = 7
 """Coefficients before the thresholds: lags of the output, of the input, operators, and the
 scales."""
+
+FARTHEST, SPACING, PLACES = 1.5, 0.0025, 1201
+"""Where rest is looked for, in scaled output: from one end of the data's range, and half of it more, to
+the other."""
 
 
 @kernel
@@ -50,7 +54,7 @@ def take_input(u: float, coefficients: Array, state: Array) -> None:
     if m > 0:
         state[n] = x
     for i in range(k):
-        r = coefficients[7 + i]
+        r = coefficients[HEAD + i]
         place = n + m + i
         state[place] = min(max(state[place], x - r), x + r)
 
@@ -64,6 +68,50 @@ def give_output(y: float, coefficients: Array, state: Array) -> float:
     if n > 0:
         state[0] = y
     return coefficients[5] + coefficients[6] * y
+
+
+@inlined
+def output_at_rest(
+    regression: Any, wanted: int, coefficients: Array, state: Array
+) -> tuple[float, int]:
+    """Return the output that the regression gives back, one of several by its number, and how many.
+
+    Where there is none, the output that changes least.
+    """
+    n = int(coefficients[0])
+    found, rests, least = 0.0, 0, math.inf
+    before, last = 0.0, 0.0
+    for place in range(PLACES):
+        y = place * SPACING - FARTHEST
+        state[:n] = y
+        change = regression(coefficients, state) - y
+        if rests == 0 and abs(change) < least:
+            found, least = y, abs(change)
+        if place > 0 and ((before > 0.0) != (change > 0.0) or (before < 0.0) != (change < 0.0)):
+            if rests == wanted:
+                found = last - SPACING * before / (change - before)
+            rests += 1
+        before, last = change, y
+    return found, rests
+
+
+@inlined
+def start_resting(
+    regression: Any, coefficients: Array, state: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start at rest at the first input: where the regression gives back the output it is given.
+
+    Of several such outputs within the data's range, the lowest for an input that has risen, the middle
+    one for a virgin start.
+    """
+    n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
+    x = (inputs[0] - coefficients[3]) / coefficients[4]
+    state[n : n + m] = x
+    start_operators(coefficients[HEAD : HEAD + k], x, x, virgin, state[n + m :])
+    y, rests = output_at_rest(regression, 0, coefficients, state)
+    if virgin:
+        y, _ = output_at_rest(regression, rests // 2, coefficients, state)
+    state[:n] = y
 
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
@@ -142,48 +190,18 @@ class Narx(SingleChannel, Primitive):
         return [*counts, *self.input_scale, *self.output_scale, *self.thresholds]
 
     @abstractmethod
-    def evaluate(self, regressors: Array) -> Array:
-        """Return f at scaled regressors, shape (k, number of regressors), in scaled output (k,)."""
-
-    @abstractmethod
     def slopes(self, regressors: Array) -> tuple[Array, Array]:
         """Return the derivatives of f by the parameters, and by past outputs.
 
         Shapes (k, n_parameters) and (k, output_lags), at scaled regressors and in scaled output.
         """
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state at rest at the first input: where f gives back the output it is given.
-
-        Of several such outputs within the data's range, the lowest for an input that has risen, the
-        middle one for a virgin start; where there is none, the one that changes least.
-        """
-        start = self.initial if initial is None else initial
-        if not isinstance(start, str):
-            return explicit_state(self, start)
-        grid = np.linspace(-1.5, 1.5, 1201)
-        states = np.tile(self._resting(float(first[0]), 0.0, str(start)), (grid.size, 1))
-        states[:, : self.output_lags] = grid[:, np.newaxis]
-        change = self.evaluate(states[:, list(self.places)]) - grid
-        crossings = np.flatnonzero(np.diff(np.sign(change)) != 0)
-        if crossings.size == 0:
-            y = float(grid[np.argmin(np.abs(change))])
-        else:
-            place = crossings[0 if start == "first_sample" else crossings.size // 2]
-            rise = change[place + 1] - change[place]
-            share = 0.0 if rise == 0 else -change[place] / rise
-            y = float(grid[place] + share * (grid[1] - grid[0]))
-        return self._resting(float(first[0]), y, str(start))
-
     def state_at(self, first: Array, output: Array) -> Array | None:
         """Return the state at rest at a first input where the output is known."""
         centre, half = self.output_scale
-        return self._resting(float(first[0]), (float(output[0]) - centre) / half, "first_sample")
-
-    def _resting(self, u: float, y: float, rule: str) -> Array:
-        x = (u - self.input_scale[0]) / self.input_scale[1]
-        operators = named_state(rule, np.array(self.thresholds), x, x)
-        return np.array([*[y] * self.output_lags, *[x] * self.past_inputs, *operators])
+        state = self.initial_state(first, "first_sample")
+        state[: self.output_lags] = (float(output[0]) - centre) / half
+        return state
 
     def inverse(self) -> Block:
         """Refuse: nothing keeps the output of a NARX model rising with its input."""

@@ -15,17 +15,17 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import STRICT, Vector
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, take_input
+from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, start_resting, take_input
 from mckibben.errors import ModelError
 
 
 @kernel
-def narx_network_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model.
+def network(coefficients: Array, state: Array) -> float:
+    """Return the scaled output of the regressors in the state.
 
     After what all NARX kernels start with: number of regressors, of units, whether they are
     wavelets, places in the state, bias, linear, then for every unit its weights, shift and output.
@@ -40,18 +40,29 @@ def narx_network_kernel(coefficients: Array, state: Array, inputs: Array, output
     linear = coefficients[start + 3 + n : start + 4 + 2 * n]
     hidden = coefficients[start + 4 + 2 * n :]
     width = n + 2
-    for t in range(inputs.shape[0]):
-        take_input(inputs[t, 0], coefficients, state)
-        y = linear[0]
+    y = linear[0]
+    for i in range(n):
+        y += linear[1 + i] * state[int(places[i])]
+    for h in range(units):
+        s = hidden[h * width + n]
         for i in range(n):
-            y += linear[1 + i] * state[int(places[i])]
-        for h in range(units):
-            s = hidden[h * width + n]
-            for i in range(n):
-                s += hidden[h * width + i] * state[int(places[i])]
-            a = (1.0 - s * s) * math.exp(-0.5 * s * s) if wavelets else math.tanh(s)
-            y += hidden[h * width + n + 1] * a
-        outputs[t, 0] = give_output(y, coefficients, state)
+            s += hidden[h * width + i] * state[int(places[i])]
+        a = (1.0 - s * s) * math.exp(-0.5 * s * s) if wavelets else math.tanh(s)
+        y += hidden[h * width + n + 1] * a
+    return y
+
+
+@step
+def narx_network_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model."""
+    take_input(inputs[0], coefficients, state)
+    outputs[0] = give_output(network(coefficients, state), coefficients, state)
+
+
+@kernel
+def narx_network_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start the model at rest."""
+    start_resting(network, coefficients, state, inputs, virgin)
 
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
@@ -73,7 +84,8 @@ class NarxNetwork(Narx):
     """
 
     kind: ClassVar[str] = "narx-network"
-    kernel: ClassVar[Kernel] = narx_network_kernel
+    kernel: ClassVar[Kernel] = narx_network_step
+    start_kernel: ClassVar[Start] = narx_network_start
     parameters: ClassVar[tuple[str, ...]] = ("bias", "linear", "hidden")
     notation: ClassVar[Notation] = Notation(
         r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)",
@@ -109,13 +121,6 @@ class NarxNetwork(Narx):
         shape = [n, len(self.hidden) // (n + 2), float(self.activation == "wavelet")]
         weights = [self.bias, *self.linear, *self.hidden]
         return np.array([*self.head(sample_time), *shape, *self.places, *weights])
-
-    def evaluate(self, regressors: Array) -> Array:
-        """Return the network at scaled regressors, shape (k, number of regressors)."""
-        n = len(self.places)
-        units = np.reshape(self.hidden, (-1, n + 2))
-        a, _ = activated(self.activation, regressors @ units[:, :n].T + units[:, n])
-        return np.asarray(self.bias + regressors @ np.array(self.linear) + a @ units[:, n + 1])
 
     def slopes(self, regressors: Array) -> tuple[Array, Array]:
         """Return the derivatives by bias, linear and hidden weights, and by past outputs."""

@@ -13,11 +13,11 @@ from pydantic import BeforeValidator
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import STRICT, Vector, rows
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, take_input
+from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, start_resting, take_input
 from mckibben.errors import ModelError
 
 HIGHEST_DEGREE, MOST_TERMS = 20, 10_000
@@ -27,10 +27,8 @@ Terms = Annotated[tuple[Term, ...], MaxLen(MOST_TERMS), BeforeValidator(rows)]
 
 
 @kernel
-def narx_polynomial_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
-    """Run the model.
+def sum_of_terms(coefficients: Array, state: Array) -> float:
+    """Return the scaled output of the regressors in the state.
 
     After what all NARX kernels start with: highest degree, then for every term its weight and,
     padded with -1, the places in the state of its factors.
@@ -39,18 +37,29 @@ def narx_polynomial_kernel(
     degree = int(coefficients[k])
     terms = coefficients[k + 1 :]
     width = degree + 1
-    for t in range(inputs.shape[0]):
-        take_input(inputs[t, 0], coefficients, state)
-        y = 0.0
-        for j in range(terms.size // width):
-            product = terms[j * width]
-            for i in range(1, width):
-                place = int(terms[j * width + i])
-                if place < 0:
-                    break
-                product *= state[place]
-            y += product
-        outputs[t, 0] = give_output(y, coefficients, state)
+    y = 0.0
+    for j in range(terms.size // width):
+        product = terms[j * width]
+        for i in range(1, width):
+            place = int(terms[j * width + i])
+            if place < 0:
+                break
+            product *= state[place]
+        y += product
+    return y
+
+
+@step
+def narx_polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model."""
+    take_input(inputs[0], coefficients, state)
+    outputs[0] = give_output(sum_of_terms(coefficients, state), coefficients, state)
+
+
+@kernel
+def narx_polynomial_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start the model at rest."""
+    start_resting(sum_of_terms, coefficients, state, inputs, virgin)
 
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
@@ -69,7 +78,8 @@ class NarxPolynomial(Narx):
     """
 
     kind: ClassVar[str] = "narx-polynomial"
-    kernel: ClassVar[Kernel] = narx_polynomial_kernel
+    kernel: ClassVar[Kernel] = narx_polynomial_step
+    start_kernel: ClassVar[Start] = narx_polynomial_start
     parameters: ClassVar[tuple[str, ...]] = ("weights",)
     notation: ClassVar[Notation] = Notation(
         r"\bar{y}_t = \sum_i w_i \prod_{j \in P_i} x_{j,t}",
@@ -106,10 +116,6 @@ class NarxPolynomial(Narx):
             for term, weight in zip(self.terms, self.weights, strict=True)
         ]
         return np.array([*self.head(sample_time), degree, *np.ravel(rows)], dtype=np.float64)
-
-    def evaluate(self, regressors: Array) -> Array:
-        """Return the polynomial at scaled regressors, shape (k, number of regressors)."""
-        return products(regressors, self.terms) @ np.array(self.weights)
 
     def slopes(self, regressors: Array) -> tuple[Array, Array]:
         """Return the products themselves, and the derivative of their sum by past outputs."""

@@ -22,20 +22,19 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     FittedInitial,
-    Initial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.linear import LinearSystem, Polynomials
 from mckibben.blocks.core.notation import Notation, tex
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.errors import ModelError
@@ -44,8 +43,8 @@ LONGEST_DELAY = 254
 """Samples."""
 
 
-@kernel
-def process_model_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def process_model_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; the state is [x, past inputs, latest first].
 
     Coefficients are [n, delay in samples, u_0, y_0, D now, D before, C, three input vectors,
@@ -56,21 +55,30 @@ def process_model_kernel(coefficients: Array, state: Array, inputs: Array, outpu
     now, before = coefficients[4], coefficients[5]
     c = coefficients[6:]
     kept = state.size - 2 * n
-    for t in range(inputs.shape[0]):
-        for k in range(kept - 1, 0, -1):
-            state[n + k] = state[n + k - 1]
-        state[n] = inputs[t, 0] - u0
-        first, second, third = state[n + m], state[n + m + 1], state[n + m + 2]
-        y = now * first + before * second
-        for i in range(n):
-            x = c[n + i] * first + c[2 * n + i] * second + c[3 * n + i] * third
-            for j in range(n):
-                x += c[4 * n + i * n + j] * state[j]
-            state[n + kept + i] = x
-            y += c[i] * x
-        for i in range(n):
-            state[i] = state[n + kept + i]
-        outputs[t, 0] = y + y0
+    for k in range(kept - 1, 0, -1):
+        state[n + k] = state[n + k - 1]
+    state[n] = inputs[0] - u0
+    first, second, third = state[n + m], state[n + m + 1], state[n + m + 2]
+    y = now * first + before * second
+    for i in range(n):
+        x = c[n + i] * first + c[2 * n + i] * second + c[3 * n + i] * third
+        for j in range(n):
+            x += c[4 * n + i * n + j] * state[j]
+        state[n + kept + i] = x
+        y += c[i] * x
+    for i in range(n):
+        state[i] = state[n + kept + i]
+    outputs[0] = y + y0
+
+
+@kernel
+def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with the lags at rest: at the first input, or at the operating point."""
+    n = int(coefficients[0])
+    u = 0.0 if virgin else inputs[0] - coefficients[2]
+    state[:] = 0.0
+    state[0] = u
+    state[n : state.size - n] = u
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -102,7 +110,8 @@ class ProcessModel(LinearStart, SingleChannel, Primitive):
     """
 
     kind: ClassVar[str] = "process-model"
-    kernel: ClassVar[Kernel] = process_model_kernel
+    kernel: ClassVar[Kernel] = process_model_step
+    start_kernel: ClassVar[Start] = process_model_start
     rate_dependent: ClassVar[bool] = True
     filters: ClassVar[bool] = True
     notation: ClassVar[Notation] = Notation(
@@ -240,15 +249,9 @@ class ProcessModel(LinearStart, SingleChannel, Primitive):
         head = [n, m, self.input_offset, self.output_offset, now, before]
         return np.concatenate([head, c, vectors.ravel(), (late @ early).ravel()])
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the lags at rest: at the first input, or, virgin, at the operating point."""
-        start = self.initial if initial is None else initial
-        if not isinstance(start, str):
-            return explicit_state(self, start)
-        state = np.zeros(self.n_states)
-        if start in ("first_sample", "fitted"):
-            state[0] = state[self.order : self.n_states - self.order] = first[0] - self.input_offset
-        return state
+    def start_numbers(self) -> Array:
+        """Return [n, 0, u_0], which is what the start reads."""
+        return np.array([self.order, 0.0, self.input_offset])
 
     def inverse(self) -> Block:
         """Refuse: the output lags the input, and the inverse would have to differentiate."""

@@ -22,20 +22,19 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     FORCE,
     STRICT,
     ChannelField,
-    Initial,
     Rows,
     StoredInitial,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.blocks.dynamic.repeating import Hold, Repeating, Substeps
 from mckibben.errors import ModelError
@@ -94,32 +93,39 @@ def advance(
         x[i] += h / 6.0 * (total[i] + k[i])
 
 
-@kernel
-def settle(weights: Array, n: int, units: int, x: Array, u: float, work: Array) -> None:
-    """Run from 0 under an input that stays, until starts are forgotten."""
-    for _ in range(SETTLING):
-        advance(weights, n, units, x, u, 0.0, SETTLING_STEP, work)
-
-
-@kernel
-def state_network_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def state_network_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
     """Run the model; the state is [x, last input].
 
     Coefficients are [substep by rate, how many, 1 for zero-order hold, states, units, offset and scale
-    of the input, of the output, weights, scratch].
+    of the input, of the output, weights].
     """
     h, count, held = coefficients[0], int(coefficients[1]), coefficients[2] > 0.0
     n, units = int(coefficients[3]), int(coefficients[4])
-    size = n * (n + 2) + units * (n + 2) + n * units
-    weights, work = coefficients[HEAD : HEAD + size], coefficients[HEAD + size :]
-    for t in range(inputs.shape[0]):
-        last = (state[n] - coefficients[5]) / coefficients[6]
-        now = (inputs[t, 0] - coefficients[5]) / coefficients[6]
-        rise = 0.0 if held else (now - last) / count
-        for s in range(count):
-            advance(weights, n, units, state, last + s * rise, rise, h, work)
-        state[n] = inputs[t, 0]
-        outputs[t, 0] = coefficients[7] + coefficients[8] * state[0]
+    weights = coefficients[HEAD:]
+    last = (state[n] - coefficients[5]) / coefficients[6]
+    now = (inputs[0] - coefficients[5]) / coefficients[6]
+    rise = 0.0 if held else (now - last) / count
+    for s in range(count):
+        advance(weights, n, units, state, last + s * rise, rise, h, scratch)
+    state[n] = inputs[0]
+    outputs[0] = coefficients[7] + coefficients[8] * state[0]
+
+
+@kernel
+def state_network_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start as after the first input has long been held, or with zeros."""
+    state[:] = 0.0
+    if not virgin:
+        n, units = int(coefficients[3]), int(coefficients[4])
+        u = (inputs[0] - coefficients[5]) / coefficients[6]
+        for _ in range(SETTLING):
+            advance(coefficients[HEAD:], n, units, state, u, 0.0, SETTLING_STEP, scratch)
+        state[n] = inputs[0]
 
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
@@ -150,9 +156,9 @@ class StateNetwork(Repeating, SingleChannel):
     """
 
     kind: ClassVar[str] = "state-network"
-    kernel: ClassVar[Kernel] = state_network_kernel
+    kernel: ClassVar[Kernel] = state_network_step
+    start_kernel: ClassVar[Start] = state_network_start
     rate_dependent: ClassVar[bool] = True
-    in_scratch: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("linear", "hidden", "readout")
     notation: ClassVar[Notation] = Notation(
         r"\dot{x} = \lambda \left(L v + R \tanh(H v)\right),\quad v = \left(x,\, \frac{u "
@@ -228,17 +234,9 @@ class StateNetwork(Repeating, SingleChannel):
         operations = self.substeps * 4 * (2 * self.n_parameters + 20 * len(self.hidden))
         return Cost(operations, operations)
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state after the first input has long been held, or, virgin, zeros."""
-        start = self.initial if initial is None else initial
-        if not isinstance(start, str):
-            return explicit_state(self, start)
-        state = np.zeros(self.n_states)
-        if start == "first_sample":
-            n, u = len(self.linear), (float(first[0]) - self.input_offset) / self.input_scale
-            settle(self.pack(), n, len(self.hidden), state, u, np.empty(self.n_scratch))
-            state[n] = first[0]
-        return state
+    def start_numbers(self) -> Array:
+        """Return the coefficients at a sample time that is not too fast."""
+        return self.coefficients(1.0 / self.rate)
 
     @classmethod
     def example(cls) -> Self:

@@ -19,7 +19,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Primitive
+from mckibben.blocks.core.block import Kernel, Primitive, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -27,35 +27,46 @@ from mckibben.blocks.core.fields import (
     ChannelField,
     Coefficients,
     FittedInitial,
-    Initial,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.linear import LinearSystem, Polynomials
 from mckibben.blocks.core.notation import FEW, Notation, summed
-from mckibben.blocks.core.refusals import explicit_state, own_sample_time
+from mckibben.blocks.core.refusals import own_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 
 
-@kernel
-def transfer_function_kernel(
+@step
+def transfer_function_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Run the filter in transposed direct form; coefficients are [u_0, y_0, b, f]."""
+    """Run the filter in transposed direct form; coefficients are [u_0, y_0, b, f, gain]."""
     n = state.size
-    b, f = coefficients[2 : 3 + n], coefficients[3 + n :]
-    for t in range(inputs.shape[0]):
-        u = inputs[t, 0] - coefficients[0]
-        y = b[0] * u
-        if n > 0:
-            y += state[0]
-        for i in range(n - 1):
-            state[i] = state[i + 1] + b[i + 1] * u - f[i + 1] * y
-        if n > 0:
-            state[n - 1] = b[n] * u - f[n] * y
-        outputs[t, 0] = y + coefficients[1]
+    b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
+    u = inputs[0] - coefficients[0]
+    y = b[0] * u
+    if n > 0:
+        y += state[0]
+    for i in range(n - 1):
+        state[i] = state[i + 1] + b[i + 1] * u - f[i + 1] * y
+    if n > 0:
+        state[n - 1] = b[n] * u - f[n] * y
+    outputs[0] = y + coefficients[1]
+
+
+@kernel
+def transfer_function_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start the filter at rest: at the first input, or at the operating point."""
+    n = state.size
+    b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
+    u = 0.0 if virgin else inputs[0] - coefficients[0]
+    y = coefficients[4 + 2 * n] * u
+    coming = 0.0
+    for i in range(n, 0, -1):
+        coming += b[i] * u - f[i] * y
+        state[i - 1] = coming
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -85,7 +96,8 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
     """
 
     kind: ClassVar[str] = "transfer-function"
-    kernel: ClassVar[Kernel] = transfer_function_kernel
+    kernel: ClassVar[Kernel] = transfer_function_step
+    start_kernel: ClassVar[Start] = transfer_function_start
     rate_dependent: ClassVar[bool] = True
     filters: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = (
@@ -151,19 +163,6 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
         whole = 1.0 + float(np.sum(self.denominator))
         return float(np.sum(self.numerator)) / whole if whole != 0 else float("inf")
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the filter at rest: at the first input, or, virgin, at the operating point."""
-        start = self.initial if initial is None else initial
-        if start in ("first_sample", "fitted"):
-            u = float(first[0]) - self.input_offset
-            y = self.gain * u if np.isfinite(self.gain) else 0.0
-            b, f = self._padded()
-            tails = [np.cumsum((b * u - f * y)[::-1])[::-1][1:]]
-            return np.concatenate(tails)
-        if isinstance(start, str):
-            return np.zeros(self.n_states)
-        return explicit_state(self, start)
-
     def _padded(self) -> tuple[Array, Array]:
         n = self.n_states
         b = np.pad(np.array(self.numerator), (0, n + 1 - len(self.numerator)))
@@ -171,7 +170,7 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
         return b, f
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [u_0, y_0, b, f].
+        """Return [u_0, y_0, b, f, gain], with no gain where that is infinite.
 
         Raises
         ------
@@ -179,12 +178,9 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
             Without a sample time, or at another than the model's own.
         """
         own_sample_time(self.kind, self.sample_time, sample_time)
-        return np.concatenate([[self.input_offset, self.output_offset], *self._padded()])
-
-    def c_numbers(self, sample_time: float | None) -> Array:
-        """Return the coefficients, then the state at rest at an input of 1 above the operating point."""
-        at_rest = self.initial_state(np.array([self.input_offset + 1.0]), "first_sample")
-        return np.array([*self.coefficients(sample_time), *at_rest])
+        gain = self.gain if np.isfinite(self.gain) else 0.0
+        b, f = self._padded()
+        return np.array([self.input_offset, self.output_offset, *b, *f, gain])
 
     def predict(self, recording: Recording, horizon: int = 1) -> Recording:
         """Predict the output some samples ahead from outputs measured until then; no free run.

@@ -19,43 +19,56 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive
-from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Vector
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
+from mckibben.blocks.core.fields import STRICT, Channel, Channels, Vector
+from mckibben.blocks.core.kernels import accumulate, kernel, step
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.errors import ModelError
 
 MEASURED = "_measured"
 """What the name of a reference ends with where it is measured."""
 
 
-@kernel
-def pid_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def pid_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
     """Run the loops; the state is [integrals, rates, last measurements, last references].
 
     Coefficients are [sample time, share of the filter, lowest, highest, whether there is a base,
     whether references are late, kp, ki, kd]; inputs are references, measurements, bases.
     """
-    n = outputs.shape[1]
+    n = outputs.size
     step, share = coefficients[0], coefficients[1]
     lowest, highest = coefficients[2], coefficients[3]
     based, late = coefficients[4] > 0.0, coefficients[5] > 0.0
     kp, ki, kd = coefficients[6 : 6 + n], coefficients[6 + n : 6 + 2 * n], coefficients[6 + 2 * n :]
-    for t in range(inputs.shape[0]):
-        for k in range(n):
-            reference, measured = inputs[t, k], inputs[t, n + k]
-            error = (state[3 * n + k] if late else reference) - measured
-            state[n + k] += share * ((measured - state[2 * n + k]) / step - state[n + k])
-            state[2 * n + k], state[3 * n + k] = measured, reference
-            base = inputs[t, 2 * n + k] if based else 0.0
-            wanted = base + kp[k] * error + state[k] - kd[k] * state[n + k]
-            way = ki[k] * error
-            further = (wanted > highest and way > 0.0) or (wanted < lowest and way < 0.0)
-            if not further:
-                state[k] += ki[k] * step * error
-            outputs[t, k] = min(max(wanted, lowest), highest)
+    for k in range(n):
+        reference, measured = inputs[k], inputs[n + k]
+        error = (state[3 * n + k] if late else reference) - measured
+        state[n + k] += share * ((measured - state[2 * n + k]) / step - state[n + k])
+        state[2 * n + k], state[3 * n + k] = measured, reference
+        base = inputs[2 * n + k] if based else 0.0
+        wanted = base + kp[k] * error + state[k] - kd[k] * state[n + k]
+        way = ki[k] * error
+        further = (wanted > highest and way > 0.0) or (wanted < lowest and way < 0.0)
+        if not further:
+            state[k] = accumulate(state[k], ki[k] * step * error, scratch, k)
+        outputs[k] = min(max(wanted, lowest), highest)
+
+
+@kernel
+def pid_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start with empty integrals and rates, at the first measurements."""
+    n = state.size // 4
+    state[: 2 * n] = 0.0
+    state[2 * n : 3 * n] = inputs[n : 2 * n]
+    state[3 * n :] = inputs[n : 2 * n]
+    scratch[:] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -81,7 +94,8 @@ class PIDFeedback(ManyChannels, Primitive):
     """
 
     kind: ClassVar[str] = "pid"
-    kernel: ClassVar[Kernel] = pid_kernel
+    kernel: ClassVar[Kernel] = pid_step
+    start_kernel: ClassVar[Start] = pid_start
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("kp", "ki", "kd")
     notation: ClassVar[Notation] = Notation(
@@ -130,14 +144,6 @@ class PIDFeedback(ManyChannels, Primitive):
     def n_scratch(self) -> int:
         """What single precision loses of the integrals."""
         return len(self.driven)
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return empty integrals and rates, at the first measurement."""
-        if initial is not None and not isinstance(initial, str):
-            return explicit_state(self, initial)
-        n = len(self.driven)
-        measured = np.asarray(first, dtype=np.float64)[n : 2 * n]
-        return np.concatenate([np.zeros(2 * n), measured, measured])
 
     def coefficients(self, sample_time: float | None) -> Array:
         step = needs_sample_time(self.kind, sample_time)

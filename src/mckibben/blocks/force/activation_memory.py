@@ -21,27 +21,25 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     CONTRACTION,
     FORCE,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.force.activation import Activation
-from mckibben.blocks.play_type.memory import named_state
 from mckibben.errors import ModelError
 
 
-@kernel
-def activation_memory_kernel(
+@step
+def activation_memory_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Run the model; the state is [play operators, previous contraction, filtered rate, x_m].
@@ -50,34 +48,47 @@ def activation_memory_kernel(
     and scale, degree by contraction, degree by force, number of x_m, c row by row, thresholds, a,
     b, d, g, h, decays of x_m].
     """
+    degree, by_force, m = int(coefficients[6]), int(coefficients[7]), int(coefficients[8])
+    n = state.size - 2 - m
+    thresholds = 9 + (degree + 1) * (by_force + 1)
+    surface, r = coefficients[9:thresholds], coefficients[thresholds:]
+    friction = r[n:]
+    viscosity = friction[2 * n :]
+    relaxation = viscosity[2:]
+    decays = relaxation[2 * m :]
+    followers = state[n + 2 :]
+    e = inputs[0]
+    x = (e - coefficients[2]) / coefficients[3]
+    f = (inputs[1] - coefficients[4]) / coefficients[5]
+    rate = coefficients[0] * state[n + 1] + coefficients[1] * (e - state[n])
+    p = 0.0
+    for i in range(degree, -1, -1):
+        row = 0.0
+        for j in range(by_force, -1, -1):
+            row = row * f + surface[i * (by_force + 1) + j]
+        p = p * x + row
+    for k in range(n):
+        state[k] = min(max(state[k], e - r[k]), e + r[k])
+        p += (friction[k] + f * friction[n + k]) * (e - state[k])
+    p += (viscosity[0] + f * viscosity[1]) * rate
+    for k in range(m):
+        followers[k] = decays[k] * followers[k] + (1.0 - decays[k]) * x
+        p += (relaxation[k] + f * relaxation[m + k]) * (followers[k] - x)
+    state[n], state[n + 1] = e, rate
+    outputs[0] = p
+
+
+@kernel
+def activation_memory_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start where the contraction has only risen to the first one, or has never moved."""
     m = int(coefficients[8])
     n = state.size - 2 - m
-    degree, by_force = int(coefficients[6]), int(coefficients[7])
-    thresholds = 9 + (degree + 1) * (by_force + 1)
-    weights = thresholds + n
-    for t in range(inputs.shape[0]):
-        e = inputs[t, 0]
-        x = (e - coefficients[2]) / coefficients[3]
-        f = (inputs[t, 1] - coefficients[4]) / coefficients[5]
-        rate = coefficients[0] * state[n + 1] + coefficients[1] * (e - state[n])
-        p = 0.0
-        for i in range(degree, -1, -1):
-            row = 0.0
-            for j in range(by_force, -1, -1):
-                row = row * f + coefficients[9 + i * (by_force + 1) + j]
-            p = p * x + row
-        for k in range(n):
-            r = coefficients[thresholds + k]
-            state[k] = min(max(state[k], e - r), e + r)
-            p += (coefficients[weights + k] + f * coefficients[weights + n + k]) * (e - state[k])
-        p += (coefficients[weights + 2 * n] + f * coefficients[weights + 2 * n + 1]) * rate
-        for k in range(m):
-            place = weights + 2 * n + 2 + k
-            decay = coefficients[place + 2 * m]
-            state[n + 2 + k] = decay * state[n + 2 + k] + (1.0 - decay) * x
-            p += (coefficients[place] + f * coefficients[place + m]) * (state[n + 2 + k] - x)
-        state[n], state[n + 1] = e, rate
-        outputs[t, 0] = p
+    thresholds = 9 + (int(coefficients[6]) + 1) * (int(coefficients[7]) + 1)
+    e = inputs[0]
+    for k in range(n):
+        state[k] = e if virgin else e - coefficients[thresholds + k]
+    state[n], state[n + 1] = e, 0.0
+    state[n + 2 :] = (e - coefficients[2]) / coefficients[3]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -111,7 +122,8 @@ class ActivationMemory(Activation):
     """
 
     kind: ClassVar[str] = "activation-memory"
-    kernel: ClassVar[Kernel] = activation_memory_kernel
+    kernel: ClassVar[Kernel] = activation_memory_step
+    start_kernel: ClassVar[Start] = activation_memory_start
     parameters: ClassVar[tuple[str, ...]] = ("surface", "friction", "viscosity", "relaxation")
     notation: ClassVar[Notation] = Notation(
         r"p = \sum_{ij} c_{ij} x^i f^j + \sum_k (a_k + b_k f) S_k[\epsilon] + (d_0 + d_1 "
@@ -177,18 +189,6 @@ class ActivationMemory(Activation):
     def n_states(self) -> int:
         """Operators, previous contraction, filtered rate, and what follows."""
         return len(self.thresholds) + 2 + len(self.time_constants)
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [operators, first contraction, 0, scaled first contraction]."""
-        start = self.initial if initial is None else initial
-        if not isinstance(start, str):
-            return explicit_state(self, start)
-        r = np.array(self.thresholds)
-        operators = np.full(r.size, first[0])
-        if start == "first_sample":
-            operators = named_state(start, r, first[0], first[0])
-        x = (first[0] - self.input_scale[0]) / self.input_scale[1]
-        return np.array([*operators, first[0], 0.0, *[x] * len(self.time_constants)])
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return what the kernel reads.

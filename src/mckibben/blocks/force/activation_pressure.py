@@ -22,20 +22,19 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     CONTRACTION,
     FORCE,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.force.activation import Activation
 from mckibben.errors import ModelError
 
@@ -50,8 +49,8 @@ def cubic(coefficients: Array, first: int, x: float) -> float:
     ) * x + coefficients[first + 3]
 
 
-@kernel
-def activation_pressure_kernel(
+@step
+def activation_pressure_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Run the model; the state is [previous contraction, filtered rate].
@@ -59,20 +58,27 @@ def activation_pressure_kernel(
     Coefficients are [smoothing, gain of the rate, gamma, phi (4), contractions (16), pressures
     (16)].
     """
-    for t in range(inputs.shape[0]):
-        e, force = inputs[t, 0], inputs[t, 1]
-        rate = coefficients[0] * state[1] + coefficients[1] * (e - state[0])
-        y = 0.0
-        for j in range(4):
-            share = 1.0
-            own = cubic(coefficients, 7 + 4 * j, force)
-            for k in range(4):
-                if k != j:
-                    other = cubic(coefficients, 7 + 4 * k, force)
-                    share *= (e - other) / (own - other)
-            y += share * cubic(coefficients, 23 + 4 * j, force)
-        outputs[t, 0] = y + coefficients[2] * cubic(coefficients, 3, force) * rate
-        state[0], state[1] = e, rate
+    e, force = inputs[0], inputs[1]
+    rate = coefficients[0] * state[1] + coefficients[1] * (e - state[0])
+    y = 0.0
+    for j in range(4):
+        share = 1.0
+        own = cubic(coefficients, 7 + 4 * j, force)
+        for k in range(4):
+            if k != j:
+                other = cubic(coefficients, 7 + 4 * k, force)
+                share *= (e - other) / (own - other)
+        y += share * cubic(coefficients, 23 + 4 * j, force)
+    outputs[0] = y + coefficients[2] * cubic(coefficients, 3, force) * rate
+    state[0], state[1] = e, rate
+
+
+@kernel
+def activation_pressure_start(
+    coefficients: Array, state: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start at rest at the first contraction."""
+    state[0], state[1] = inputs[0], 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -101,7 +107,8 @@ class ActivationPressure(Activation):
     """
 
     kind: ClassVar[str] = "activation-pressure"
-    kernel: ClassVar[Kernel] = activation_pressure_kernel
+    kernel: ClassVar[Kernel] = activation_pressure_step
+    start_kernel: ClassVar[Start] = activation_pressure_start
     parameters: ClassVar[tuple[str, ...]] = ("contractions", "pressures", "phi", "gamma")
     notation: ClassVar[Notation] = Notation(
         r"p = \sum_{k=0}^{3} b_k(F)\, \epsilon^k + \gamma\, \phi(F)\, \dot{\epsilon}",
@@ -143,13 +150,6 @@ class ActivationPressure(Activation):
     def n_states(self) -> int:
         """Previous contraction and filtered rate."""
         return 2
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [first contraction, 0]."""
-        start = self.initial if initial is None else initial
-        if isinstance(start, str):
-            return np.array([first[0], 0.0])
-        return explicit_state(self, start)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return what the kernel reads.

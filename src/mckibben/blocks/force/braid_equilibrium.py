@@ -20,11 +20,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, Initial
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import SLACK, kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import Memoryless, Ranged
+from mckibben.blocks.core.single_channel import Memoryless, Ranged, nothing_clipped
 
 NEWTONS_PER_BAR = 0.1
 """Force of one bar on one square millimetre [N]."""
@@ -35,6 +35,11 @@ SHARE = 0.995
 LEAST = -0.1
 """Contraction below which no muscle is modelled."""
 
+STILL = 1e-16
+"""Change of the contraction below which it has been found."""
+
+SINGLE = {"STILL": 1e-8}
+
 
 @kernel
 def balance(e: float, c: Array) -> float:
@@ -42,8 +47,8 @@ def balance(e: float, c: Array) -> float:
     return (c[0] + e * (c[1] + c[2] * e * e)) / (c[3] * (c[4] * (1.0 - e) ** 2 - c[5]))
 
 
-@kernel
-def braid_equilibrium_kernel(
+@step
+def braid_equilibrium_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Find the displacement.
@@ -52,49 +57,44 @@ def braid_equilibrium_kernel(
     contraction, rest length, offset].
     """
     c = coefficients
-    guess = 0.0
-    for t in range(inputs.shape[0]):
-        p = inputs[t, 0]
-        low, high = c[6], c[7]
-        e = min(max(guess, low), high)
-        if p <= balance(low, c):
-            e = low
-        elif p >= balance(high, c):
-            e = high
-        else:
-            for _ in range(200):
-                error = balance(e, c) - p
-                if error == 0.0:
-                    break
-                if error > 0.0:
-                    high = e
-                else:
-                    low = e
-                pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
-                slope = (
-                    c[1] + 3.0 * c[2] * e * e + (error + p) * 2.0 * c[3] * c[4] * (1.0 - e)
-                ) / pull
-                candidate = e - error / slope if slope > 0.0 else low
-                if not low < candidate < high:
-                    candidate = 0.5 * (low + high)
-                if abs(candidate - e) <= 1e-16 or candidate in (low, high):
-                    break
-                e = candidate
-        outputs[t, 0] = c[8] * e + c[9]
+    p = inputs[0]
+    low, high = c[6], c[7]
+    e = min(max(0.0, low), high)
+    if p <= balance(low, c):
+        e = low
+    elif p >= balance(high, c):
+        e = high
+    else:
+        for _ in range(200):
+            error = balance(e, c) - p
+            if error == 0.0:
+                break
+            if error > 0.0:
+                high = e
+            else:
+                low = e
+            pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
+            slope = (c[1] + 3.0 * c[2] * e * e + (error + p) * 2.0 * c[3] * c[4] * (1.0 - e)) / pull
+            candidate = e - error / slope if slope > 0.0 else low
+            if not low < candidate < high:
+                candidate = 0.5 * (low + high)
+            if abs(candidate - e) <= STILL or candidate in (low, high):
+                break
+            e = candidate
+    outputs[0] = c[8] * e + c[9]
 
 
-@kernel
-def braid_equilibrium_inverse_kernel(
+@step
+def braid_equilibrium_inverse_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Give the pressure of a displacement; the state is the count of samples clipped."""
     c = coefficients
-    for t in range(inputs.shape[0]):
-        e = (inputs[t, 0] - c[9]) / c[8]
-        inside = min(max(e, c[6]), c[7])
-        if abs(e - inside) > 1e-9:
-            state[0] += 1.0
-        outputs[t, 0] = balance(inside, c)
+    e = (inputs[0] - c[9]) / c[8]
+    inside = min(max(e, c[6]), c[7])
+    if abs(e - inside) > SLACK:
+        state[0] += 1.0
+    outputs[0] = balance(inside, c)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -122,8 +122,9 @@ class BraidEquilibrium(Memoryless, Ranged):
     """
 
     kind: ClassVar[str] = "braid-equilibrium"
-    kernel: ClassVar[Kernel] = braid_equilibrium_kernel
-    inverse_kernel: ClassVar[Kernel] = braid_equilibrium_inverse_kernel
+    kernel: ClassVar[Kernel] = braid_equilibrium_step
+    inverse_kernel: ClassVar[Kernel] = braid_equilibrium_inverse_step
+    inverse_start_kernel: ClassVar[Start] = nothing_clipped
     parameters: ClassVar[tuple[str, ...]] = (
         "load",
         "stiffness",

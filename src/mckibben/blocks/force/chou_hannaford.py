@@ -18,18 +18,23 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.law import ForceLaw
 
 
-@kernel
-def chou_hannaford_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def chou_hannaford_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Evaluate; coefficients are [force per bar and square length, square of b / 3, constant]."""
-    for t in range(inputs.shape[0]):
-        pull = inputs[t, 0] * inputs[t, 0] - coefficients[1]
-        outputs[t, 0] = inputs[t, 1] * coefficients[0] * pull + coefficients[2]
+    pull = inputs[0] * inputs[0] - coefficients[1]
+    outputs[0] = inputs[1] * coefficients[0] * pull + coefficients[2]
+
+
+@kernel
+def chou_hannaford_terms(length: float, c: Array) -> tuple[float, float]:
+    """Return force per pressure, and force without any."""
+    return c[0] * (length * length - c[1]), c[2]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -49,8 +54,8 @@ class ChouHannaford(ForceLaw):
     """
 
     kind: ClassVar[str] = "chou-hannaford"
-    number: ClassVar[int] = 1
-    kernel: ClassVar[Kernel] = chou_hannaford_kernel
+    kernel: ClassVar[Kernel] = chou_hannaford_step
+    terms_kernel = chou_hannaford_terms
     parameters: ClassVar[tuple[str, ...]] = ("thread_length", "turns", "constant")
     notation: ClassVar[Notation] = Notation(
         r"f = p\, \frac{3 l^2 - b^2}{4 \pi n^2} + c",
@@ -74,11 +79,6 @@ class ChouHannaford(ForceLaw):
         del sample_time
         per_bar = 3 * NEWTONS_PER_BAR / (4 * math.pi * self.turns**2)
         return np.array([per_bar, self.thread_length**2 / 3, self.constant])
-
-    def terms(self, length: Array) -> tuple[Array, Array]:
-        """Return force per pressure, and force without any."""
-        per_bar, floor, constant = self.coefficients(None).tolist()
-        return per_bar * (length * length - floor), np.full_like(length, constant)
 
     @classmethod
     def example(cls) -> Self:

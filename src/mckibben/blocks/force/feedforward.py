@@ -8,6 +8,7 @@ of Pneumatic Artificial Muscles", Section 4.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -16,21 +17,67 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
 from mckibben.blocks.core.fields import STRICT, Channel, Initial
+from mckibben.blocks.core.kernels import Step, kernel, step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.saving import nested
 from mckibben.blocks.force.law import ForceLaw
-from mckibben.blocks.force.multistate_friction import MultistateFriction
+from mckibben.blocks.force.multistate_friction import (
+    MultistateFriction,
+    multistate_friction_start,
+    multistate_friction_step,
+)
 from mckibben.blocks.force.polynomial_force import PolynomialForce
 from mckibben.errors import ModelError
 
 LEAST_PULL = 1e-9
 """Force per bar below which no pressure gives a force [N/bar]."""
 
+SINGLE = {"LEAST_PULL": 1e-9}
+
+
+@cache
+def kernels_of(law: type[ForceLaw]) -> tuple[Step, Start]:
+    """Return the kernels of a feedforward by a kind of law, its step and its start.
+
+    Coefficients are [size of the law's, the law's, the friction's if there is some]; the state is the
+    friction's.
+    """
+    terms = law.terms_kernel
+
+    @step
+    def force_feedforward_step(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+    ) -> None:
+        """Give the pressure that has a force at a length; NaN where none has."""
+        n = int(coefficients[0])
+        friction = coefficients[1 + n :]
+        per_bar, rest = terms(inputs[1], coefficients[1 : 1 + n])
+        slid, gain, reference = 0.0, 0.0, 0.0
+        if friction.size > 0:
+            gain, reference = friction[1], friction[2]
+            at, force = scratch[:2], scratch[2:3]
+            at[0], at[1] = inputs[1], reference
+            multistate_friction_step(friction, state, scratch[3:], at, force)
+            slid = force[0]
+        pull = per_bar + gain * slid
+        missing = inputs[0] - rest - slid * (1.0 - gain * reference)
+        outputs[0] = np.nan if abs(pull) < LEAST_PULL else missing / pull
+
+    @kernel
+    def force_feedforward_start(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+    ) -> None:
+        """Start the friction at the first length."""
+        friction = coefficients[1 + int(coefficients[0]) :]
+        multistate_friction_start(friction, state, scratch[3:], inputs[1:], virgin)
+
+    return force_feedforward_step, force_feedforward_start
+
 
 @dataclass(frozen=True, config=STRICT)
-class ForceFeedforward(Block):
+class ForceFeedforward(Primitive):
     """Pressure by wished-for force and measured length.
 
     Parameters
@@ -52,7 +99,7 @@ class ForceFeedforward(Block):
     friction: Annotated[InstanceOf[MultistateFriction] | None, BeforeValidator(nested)] = None
 
     def __post_init__(self) -> None:
-        self.law.terms(np.ones(1))
+        self.law.check_linear()
         if self.friction is not None and self.friction.inputs != self.law.inputs:
             raise ModelError(
                 "law and friction differ in their channels. Remedy: give both the same length and "
@@ -112,50 +159,31 @@ class ForceFeedforward(Block):
 
     @property
     def n_scratch(self) -> int:
-        """That of the friction."""
-        return 0 if self.friction is None else self.friction.n_scratch
+        """What the friction takes and gives, and computes in."""
+        return 3 + (0 if self.friction is None else self.friction.n_scratch)
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the friction's state at the first length."""
-        if self.friction is None:
-            return np.empty(0)
-        return self.friction.initial_state(np.array([first[1], 0.0]), initial)
+    @property
+    def kernel(self) -> Kernel:  # type: ignore[override]
+        """That of its kind of law."""
+        return kernels_of(type(self.law))[0]
 
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs the friction over the lengths and solves for the pressure."""
-        n = inputs.shape[0]
-        gain, reference = 0.0, 0.0
-        lengths, slid = np.zeros((n, 2)), np.zeros((n, 1))
-        run_friction: Run | None = None
-        if self.friction is not None:
-            gain, reference = self.friction.pressure_gain, self.friction.reference_pressure
-            lengths[:, 1] = reference
-            run_friction = self.friction.bind(sample_time, state, lengths, slid)
-
-        def run() -> None:
-            lengths[:, 0] = inputs[:, 1]
-            if run_friction is not None:
-                run_friction()
-            per_bar, rest = self.law.terms(inputs[:, 1])
-            pull = per_bar + gain * slid[:, 0]
-            missing = inputs[:, 0] - rest - slid[:, 0] * (1.0 - gain * reference)
-            small = np.abs(pull) < LEAST_PULL
-            outputs[:, 0] = np.where(small, np.nan, missing / np.where(small, 1.0, pull))
-
-        return run
+    @property
+    def start_kernel(self) -> Start | None:  # type: ignore[override]
+        """That of its kind of law, if there is friction."""
+        return None if self.friction is None else kernels_of(type(self.law))[1]
 
     @property
     def start(self) -> Initial:
         """The friction's."""
         return self.law.start if self.friction is None else self.friction.start
 
-    def c_numbers(self, sample_time: float | None) -> Array:
-        """Return [number of the law, size, the law's], then the friction's."""
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [size of the law's, the law's], then the friction's."""
         law = self.law.coefficients(sample_time)
-        own = np.array([self.law.number, law.size, *law])
-        if self.friction is None:
-            return own
-        return np.concatenate([own, self.friction.coefficients(sample_time)])
+        own = [law.size, *law]
+        if self.friction is not None:
+            own += self.friction.coefficients(sample_time).tolist()
+        return np.array(own)
 
     @classmethod
     def example(cls) -> Self:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from collections.abc import Callable
 from typing import ClassVar
+
+import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Primitive
@@ -22,12 +24,26 @@ class ForceLaw(Stateless, ScheduledChannel, Primitive):
 
     pressure: Channel
 
-    number: ClassVar[int]
-    """What C tells it by, in a feedforward."""
+    terms_kernel: ClassVar[Callable[[float, Array], tuple[float, float]]]
+    """Force per pressure [N/bar], and force without any [N], from a length and `coefficients`."""
 
-    @abstractmethod
     def terms(self, length: Array) -> tuple[Array, Array]:
-        """Return force per pressure [N/bar], and force without any [N], each of the shape given."""
+        """Return force per pressure [N/bar], and force without any [N], each of the shape given.
+
+        Raises
+        ------
+        ModelError
+            If the law is not linear in pressure.
+        """
+        self.check_linear()
+        numbers, terms = self.coefficients(None), type(self).terms_kernel
+        found = np.array([terms(each, numbers) for each in np.ravel(length).tolist()]).reshape(
+            -1, 2
+        )
+        return found[:, 0].reshape(np.shape(length)), found[:, 1].reshape(np.shape(length))
+
+    def check_linear(self) -> None:
+        """Refuse a law that is not linear in pressure; by default it is."""
 
     def inverse(self) -> Block:
         """Refuse: what undoes a force law gives pressure, not length."""

@@ -29,20 +29,19 @@ from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
 from mckibben.blocks.core.fields import (
     FORCE,
     LENGTH,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import accumulate, kernel, step
 from mckibben.blocks.core.notation import Notation, tex, with_unit
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.core.single_channel import ScheduledChannel
 from mckibben.errors import ModelError
 
@@ -80,8 +79,16 @@ def deflected(x: float, v: float, time: float, k: float, sigma: float, limit: fl
 
 
 @kernel
-def multistate_friction_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
+def sticking(x: float, v: float, k: float, sigma: float, limit: float) -> float:
+    """Return for how long an element goes on sticking at a constant rate; v >= 0, by symmetry."""
+    if not -limit <= k * x + sigma * v <= limit:
+        return 0.0
+    return ((limit - sigma * v) / k - x) / v if v > 0.0 else math.inf
+
+
+@step
+def multistate_friction_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Run the elements; the state is [deflections, previous length].
 
@@ -90,25 +97,40 @@ def multistate_friction_kernel(
     """
     n = state.size - 1
     step = coefficients[0]
-    for t in range(inputs.shape[0]):
-        v = (inputs[t, 0] - state[n]) / step
-        state[n] = inputs[t, 0]
-        first, sign = (3, 1.0) if v >= 0.0 else (6, -1.0)
-        force = 0.0
-        for i in range(n):
-            place = first + 6 * i
-            limit = coefficients[place + 2]
-            if limit == 0.0:
-                x = state[i] + v * step
-                state[i] = min(x, 0.0) if sign > 0.0 else max(x, 0.0)
-                force += coefficients[9 - first + 6 * i] * state[i]
-                continue
-            k, sigma = coefficients[place], coefficients[place + 1]
-            x = sign * deflected(sign * state[i], sign * v, step, k, sigma, limit)
-            state[i] = x
-            force += min(max(k * x + sigma * v, -limit), limit)
-        grown = 1.0 + coefficients[1] * (inputs[t, 1] - coefficients[2])
-        outputs[t, 0] = force * grown
+    v = (inputs[0] - state[n]) / step
+    state[n] = inputs[0]
+    first, sign = (3, 1.0) if v >= 0.0 else (6, -1.0)
+    force = 0.0
+    for i in range(n):
+        place = first + 6 * i
+        limit = coefficients[place + 2]
+        if limit == 0.0:
+            x = state[i] + v * step
+            state[i] = min(x, 0.0) if sign > 0.0 else max(x, 0.0)
+            force += coefficients[9 - first + 6 * i] * state[i]
+            continue
+        k, sigma = coefficients[place], coefficients[place + 1]
+        if sticking(sign * state[i], sign * v, k, sigma, limit) >= step:
+            state[i] = accumulate(state[i], v * step, scratch, i)
+        else:
+            state[i] = sign * deflected(sign * state[i], sign * v, step, k, sigma, limit)
+            scratch[i] = 0.0
+        force += min(max(k * state[i] + sigma * v, -limit), limit)
+    grown = 1.0 + coefficients[1] * (inputs[1] - coefficients[2])
+    outputs[0] = force * grown
+
+
+@kernel
+def multistate_friction_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start as if the length had only grown, or with nothing deflected."""
+    n = state.size - 1
+    for i in range(n):
+        k, limit = coefficients[3 + 6 * i], coefficients[5 + 6 * i]
+        state[i] = 0.0 if virgin else limit / k
+        scratch[i] = 0.0
+    state[n] = inputs[0]
 
 
 def _directions(value: object) -> object:
@@ -140,7 +162,8 @@ class MultistateFriction(ScheduledChannel, Primitive):
 
     kind: ClassVar[str] = "multistate-friction"
     scheduled_by: ClassVar[str] = "pressure"
-    kernel: ClassVar[Kernel] = multistate_friction_kernel
+    kernel: ClassVar[Kernel] = multistate_friction_step
+    start_kernel: ClassVar[Start] = multistate_friction_start
     rate_dependent: ClassVar[bool] = True
     notation: ClassVar[Notation] = Notation(
         r"f = \left(1 + g_p (p - p_r)\right) \sum_i \operatorname{sat}(F_{c,i},\, k_i x_i "
@@ -214,16 +237,6 @@ class MultistateFriction(ScheduledChannel, Primitive):
     def n_scratch(self) -> int:
         """What single precision loses of the deflections."""
         return len(self.elements)
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [deflections, first length]."""
-        start = self.initial if initial is None else initial
-        if start == "first_sample":
-            table = self.table()
-            return np.array([*(table[:, 2] / table[:, 0]), first[0]])
-        if start == "virgin":
-            return np.array([*np.zeros(len(self.elements)), first[0]])
-        return explicit_state(self, start)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [sample time, pressure gain, reference pressure, table].

@@ -20,7 +20,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField, Vector
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.blocks.memoryless.reversible import polynomial_at
@@ -28,16 +28,18 @@ from mckibben.errors import ModelError
 
 
 @kernel
-def polynomial_force_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
-    """Evaluate; coefficients are [centre, scale, number of g, g, h]."""
-    n = int(coefficients[2])
-    rest = coefficients.size - 3 - n
-    for t in range(inputs.shape[0]):
-        x = (inputs[t, 0] - coefficients[0]) / coefficients[1]
-        per_bar = polynomial_at(x, coefficients, 3, n)
-        outputs[t, 0] = inputs[t, 1] * per_bar + polynomial_at(x, coefficients, 3 + n, rest)
+def polynomial_force_terms(length: float, c: Array) -> tuple[float, float]:
+    """Return force per pressure, and force without any; ``c`` is [centre, scale, number of g, g, h]."""
+    n = int(c[2])
+    x = (length - c[0]) / c[1]
+    return polynomial_at(x, c, 3, n), polynomial_at(x, c, 3 + n, c.size - 3 - n)
+
+
+@step
+def polynomial_force_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Give the force at a length and a pressure."""
+    per_bar, rest = polynomial_force_terms(inputs[0], coefficients)
+    outputs[0] = inputs[1] * per_bar + rest
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -57,8 +59,8 @@ class PolynomialForce(ForceLaw):
     """
 
     kind: ClassVar[str] = "polynomial-force"
-    number: ClassVar[int] = 0
-    kernel: ClassVar[Kernel] = polynomial_force_kernel
+    kernel: ClassVar[Kernel] = polynomial_force_step
+    terms_kernel = polynomial_force_terms
     parameters: ClassVar[tuple[str, ...]] = ("per_bar", "elastic")
     notation: ClassVar[Notation] = Notation(
         r"f = p \sum_i g_i x^i + \sum_j h_j x^j,\quad x = \frac{l - m}{s}",
@@ -89,12 +91,6 @@ class PolynomialForce(ForceLaw):
         """Return [centre, scale, number of g, g, h]."""
         del sample_time
         return np.array([self.centre, self.scale, len(self.per_bar), *self.per_bar, *self.elastic])
-
-    def terms(self, length: Array) -> tuple[Array, Array]:
-        """Return force per pressure, and force without any."""
-        x = (length - self.centre) / self.scale
-        value = np.polynomial.polynomial.polyval
-        return np.asarray(value(x, self.per_bar)), np.asarray(value(x, self.elastic))
 
     @classmethod
     def example(cls) -> Self:

@@ -22,7 +22,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.law import ForceLaw
@@ -32,15 +32,23 @@ MU_DECAY = 40.0
 """Per contraction."""
 
 
-@kernel
-def tondu_lopez_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def tondu_lopez_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Evaluate; coefficients are [rest length, A, a, b, mu_1, mu_0, kappa_1, kappa_0, constant]."""
     c = coefficients
-    for t in range(inputs.shape[0]):
-        e, p = 1.0 - inputs[t, 0] / c[0], inputs[t, 1]
-        mu = c[4] * math.exp(-40.0 * e) + c[5]
-        short = 1.0 - (c[6] * math.exp(-p) + c[7]) * e
-        outputs[t, 0] = mu * c[1] * p * (c[2] * short * short - c[3]) + c[8]
+    e, p = 1.0 - inputs[0] / c[0], inputs[1]
+    mu = c[4] * math.exp(-MU_DECAY * e) + c[5]
+    short = 1.0 - (c[6] * math.exp(-p) + c[7]) * e
+    outputs[0] = mu * c[1] * p * (c[2] * short * short - c[3]) + c[8]
+
+
+@kernel
+def tondu_lopez_terms(length: float, c: Array) -> tuple[float, float]:
+    """Return force per pressure, and force without any, where kappa_1 = 0."""
+    e = 1.0 - length / c[0]
+    mu = c[4] * math.exp(-MU_DECAY * e) + c[5]
+    short = 1.0 - c[7] * e
+    return mu * c[1] * (c[2] * short * short - c[3]), c[8]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -64,8 +72,8 @@ class TonduLopez(ForceLaw):
     """
 
     kind: ClassVar[str] = "tondu-lopez"
-    number: ClassVar[int] = 2
-    kernel: ClassVar[Kernel] = tondu_lopez_kernel
+    kernel: ClassVar[Kernel] = tondu_lopez_step
+    terms_kernel = tondu_lopez_terms
     parameters: ClassVar[tuple[str, ...]] = ("braid_angle", "mu", "kappa", "constant")
     notation: ClassVar[Notation] = Notation(
         r"f = \mu(\epsilon)\, A\, p \left(a (1 - \kappa(p) \epsilon)^2 - b\right) + "
@@ -101,17 +109,13 @@ class TonduLopez(ForceLaw):
         area = 0.25 * math.pi * self.diameter**2 * NEWTONS_PER_BAR
         return np.array([self.rest_length, area, a, b, *self.mu, *self.kappa, self.constant])
 
-    def terms(self, length: Array) -> tuple[Array, Array]:
+    def check_linear(self) -> None:
         """Refuse where kappa makes the law non-linear in pressure."""
         if self.kappa[0] != 0:
             raise ModelError(
                 f"{self.kind!r} with kappa_1 = {self.kappa[0]:g} is not linear in pressure. Remedy: use "
                 "a polynomial force law for feedforward."
             )
-        rest, area, a, b, mu1, mu0, _, kappa0, constant = self.coefficients(None).tolist()
-        e = 1 - length / rest
-        mu = mu1 * np.exp(-MU_DECAY * e) + mu0
-        return mu * area * (a * (1 - kappa0 * e) ** 2 - b), np.full_like(length, constant)
 
     @classmethod
     def example(cls) -> Self:

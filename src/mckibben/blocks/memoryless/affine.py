@@ -13,18 +13,17 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel, Primitive
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import step
 from mckibben.blocks.core.linear import LinearSystem
 from mckibben.blocks.core.notation import Notation, summed
 from mckibben.blocks.core.single_channel import Memoryless
 from mckibben.errors import ModelError
 
 
-@kernel
-def affine_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def affine_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Scale and shift; coefficients are [gain, offset]."""
-    for t in range(inputs.shape[0]):
-        outputs[t, 0] = coefficients[0] * inputs[t, 0] + coefficients[1]
+    outputs[0] = coefficients[0] * inputs[0] + coefficients[1]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -42,7 +41,7 @@ class Affine(Memoryless, Primitive):
     """
 
     kind: ClassVar[str] = "affine"
-    kernel: ClassVar[Kernel] = affine_kernel
+    kernel: ClassVar[Kernel] = affine_step
     parameters: ClassVar[tuple[str, ...]] = ("gain", "offset")
     notation: ClassVar[Notation] = Notation(
         "y = K u + y_0",

@@ -10,16 +10,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, ClassVar, Self
 
-import numpy as np
 from annotated_types import Gt
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
-from mckibben.blocks.core.fields import PRESSURE, STRICT, ChannelField, Initial, Rule
+from mckibben.blocks.core.fields import PRESSURE, STRICT, ChannelField, Initial
 from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless
 
@@ -29,34 +28,35 @@ LOST = 0.95
 MOST_STEPS = 60
 """Of Newton's method, which comes from above and needs four to eight."""
 
+SETTLED = 1e-16
+"""Relative step below which it has come."""
 
-@kernel
-def contact_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+SINGLE = {"SETTLED": 1e-7}
+
+
+@step
+def contact_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Evaluate; coefficients are [pressure]."""
     c = coefficients[0]
-    for t in range(inputs.shape[0]):
-        u = inputs[t, 0]
-        lost = LOST * c * (1.0 - math.exp(-abs(u) / c))
-        outputs[t, 0] = u - lost if u >= 0.0 else u + lost
+    u = inputs[0]
+    lost = LOST * c * (1.0 - math.exp(-abs(u) / c))
+    outputs[0] = u - lost if u >= 0.0 else u + lost
 
 
-@kernel
-def contact_inverse_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+@step
+def contact_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Undo it: the root of a convex rising function."""
     c = coefficients[0]
-    for t in range(inputs.shape[0]):
-        goal = abs(inputs[t, 0])
-        u = goal + LOST * c
-        for _ in range(MOST_STEPS):
-            faded = LOST * math.exp(-u / c)
-            step = (u - c * (LOST - faded) - goal) / (1.0 - faded)
-            u -= step
-            if step <= 1e-16 * u:
-                break
-        u = max(u, 0.0)
-        outputs[t, 0] = u if inputs[t, 0] >= 0.0 else -u
+    goal = abs(inputs[0])
+    u = goal + LOST * c
+    for _ in range(MOST_STEPS):
+        faded = LOST * math.exp(-u / c)
+        step = (u - c * (LOST - faded) - goal) / (1.0 - faded)
+        u -= step
+        if step <= SETTLED * u:
+            break
+    u = max(u, 0.0)
+    outputs[0] = u if inputs[0] >= 0.0 else -u
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -72,8 +72,8 @@ class Contact(Memoryless, Invertible):
     """
 
     kind: ClassVar[str] = "contact"
-    kernel: ClassVar[Kernel] = contact_kernel
-    inverse_kernel: ClassVar[Kernel] = contact_inverse_kernel
+    kernel: ClassVar[Kernel] = contact_step
+    inverse_kernel: ClassVar[Kernel] = contact_inverse_step
     parameters: ClassVar[tuple[str, ...]] = ("pressure",)
     initial: ClassVar[Initial] = "first_sample"
     notation: ClassVar[Notation] = Notation(
@@ -86,10 +86,6 @@ class Contact(Memoryless, Invertible):
     pressure: Annotated[FiniteFloat, Gt(0)]
     input: ChannelField = PRESSURE
     output: ChannelField = PRESSURE
-
-    def inverse_start(self, first: Array, start: Rule) -> Array:
-        """Return no state."""
-        return np.empty(0)
 
     @classmethod
     def example(cls) -> Self:

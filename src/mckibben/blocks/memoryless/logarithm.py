@@ -18,7 +18,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import PRESSURE, STRICT, ChannelField, Initial
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless
 
@@ -26,22 +26,20 @@ FLOOR = 0.05
 """Of u + offset, where the logarithm turns into its tangent."""
 
 
-@kernel
-def logarithm_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def logarithm_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Evaluate; coefficients are [offset]."""
-    for t in range(inputs.shape[0]):
-        x = inputs[t, 0] + coefficients[0]
-        outputs[t, 0] = math.log(x) if x > FLOOR else math.log(FLOOR) + (x - FLOOR) / FLOOR
+    x = inputs[0] + coefficients[0]
+    outputs[0] = math.log(x) if x > FLOOR else math.log(FLOOR) + (x - FLOOR) / FLOOR
 
 
-@kernel
-def exponential_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def exponential_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Undo the logarithm; coefficients are [offset]."""
-    for t in range(inputs.shape[0]):
-        y = inputs[t, 0]
-        bend = math.log(FLOOR)
-        x = math.exp(y) if y > bend else FLOOR + (y - bend) * FLOOR
-        outputs[t, 0] = x - coefficients[0]
+    y = inputs[0]
+    bend = math.log(FLOOR)
+    x = math.exp(y) if y > bend else FLOOR + (y - bend) * FLOOR
+    outputs[0] = x - coefficients[0]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -57,7 +55,7 @@ class Logarithm(Memoryless, Primitive):
     """
 
     kind: ClassVar[str] = "logarithm"
-    kernel: ClassVar[Kernel] = logarithm_kernel
+    kernel: ClassVar[Kernel] = logarithm_step
     parameters: ClassVar[tuple[str, ...]] = ("offset",)
     initial: ClassVar[Initial] = "first_sample"
     notation: ClassVar[Notation] = Notation(
@@ -92,7 +90,7 @@ class Exponential(Memoryless, Primitive):
     """
 
     kind: ClassVar[str] = "exponential"
-    kernel: ClassVar[Kernel] = exponential_kernel
+    kernel: ClassVar[Kernel] = exponential_step
     parameters: ClassVar[tuple[str, ...]] = ("offset",)
     initial: ClassVar[Initial] = "first_sample"
     notation: ClassVar[Notation] = Notation(

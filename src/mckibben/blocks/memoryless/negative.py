@@ -9,17 +9,16 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel, Primitive
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import step
 from mckibben.blocks.core.linear import LinearSystem
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless
 
 
-@kernel
-def negative_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def negative_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Change the sign; there are no coefficients."""
-    for t in range(inputs.shape[0]):
-        outputs[t, 0] = -inputs[t, 0]
+    outputs[0] = -inputs[0]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -33,7 +32,7 @@ class Negative(Memoryless, Primitive):
     """
 
     kind: ClassVar[str] = "negative"
-    kernel: ClassVar[Kernel] = negative_kernel
+    kernel: ClassVar[Kernel] = negative_step
     notation: ClassVar[Notation] = Notation(
         "y = -u",
     )

@@ -14,20 +14,17 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel, Primitive
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Vector
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless
 from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
 
 
-@kernel
-def piecewise_linear_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+@step
+def piecewise_linear_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Interpolate; coefficients are [knots, values]."""
     n = coefficients.size // 2
-    for t in range(inputs.shape[0]):
-        outputs[t, 0] = interpolate(inputs[t, 0], coefficients[:n], coefficients[n:])
+    outputs[0] = interpolate(inputs[0], coefficients[:n], coefficients[n:])
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -45,7 +42,7 @@ class PiecewiseLinear(Memoryless, Primitive):
     """
 
     kind: ClassVar[str] = "piecewise-linear"
-    kernel: ClassVar[Kernel] = piecewise_linear_kernel
+    kernel: ClassVar[Kernel] = piecewise_linear_step
     increasing = ("knots", "values")
     parameters: ClassVar[tuple[str, ...]] = ("values",)
     notation: ClassVar[Notation] = Notation(

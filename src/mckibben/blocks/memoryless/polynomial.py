@@ -15,7 +15,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     STRICT,
@@ -23,9 +23,14 @@ from mckibben.blocks.core.fields import (
     Coefficients,
     Initial,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import SLACK, kernel, step
 from mckibben.blocks.core.notation import Notation, summed
-from mckibben.blocks.core.single_channel import Memoryless, Ranged, check_input_range
+from mckibben.blocks.core.single_channel import (
+    Memoryless,
+    Ranged,
+    check_input_range,
+    nothing_clipped,
+)
 from mckibben.errors import ModelError
 
 
@@ -38,16 +43,15 @@ def horner(c: Array, x: float) -> float:
     return y
 
 
-@kernel
-def polynomial_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Evaluate; coefficients are [centre, scale, ascending polynomial coefficients]."""
-    for t in range(inputs.shape[0]):
-        x = (inputs[t, 0] - coefficients[0]) / coefficients[1]
-        outputs[t, 0] = horner(coefficients[2:], x)
+    x = (inputs[0] - coefficients[0]) / coefficients[1]
+    outputs[0] = horner(coefficients[2:], x)
 
 
-@kernel
-def polynomial_inverse_kernel(
+@step
+def polynomial_inverse_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Invert an increasing polynomial by Newton's method kept inside a shrinking bracket.
@@ -63,34 +67,33 @@ def polynomial_inverse_kernel(
     )
     c = coefficients[4:]
     bottom, top = horner(c, lowest), horner(c, highest)
-    slack = 1e-9 * (top - bottom)
-    for t in range(inputs.shape[0]):
-        y = inputs[t, 0]
-        low, high = lowest, highest
-        if not bottom < y < top:
-            if y < bottom - slack or y > top + slack:
-                state[0] += 1.0
-            outputs[t, 0] = centre + scale * (low if y <= bottom else high)
-            continue
-        x = 0.5 * (low + high)
-        for _ in range(200):
-            error = horner(c, x) - y
-            if error == 0.0:
-                break
-            if error > 0.0:
-                high = x
-            else:
-                low = x
-            slope = 0.0
-            for k in range(c.size - 1, 0, -1):
-                slope = slope * x + k * c[k]
-            candidate = x - error / slope if slope > 0.0 else low
-            if not low < candidate < high:
-                candidate = 0.5 * (low + high)
-            if candidate in (x, low, high):
-                break
-            x = candidate
-        outputs[t, 0] = centre + scale * x
+    slack = SLACK * (top - bottom)
+    y = inputs[0]
+    low, high = lowest, highest
+    if not bottom < y < top:
+        if y < bottom - slack or y > top + slack:
+            state[0] += 1.0
+        outputs[0] = centre + scale * (low if y <= bottom else high)
+        return
+    x = 0.5 * (low + high)
+    for _ in range(200):
+        error = horner(c, x) - y
+        if error == 0.0:
+            break
+        if error > 0.0:
+            high = x
+        else:
+            low = x
+        slope = 0.0
+        for k in range(c.size - 1, 0, -1):
+            slope = slope * x + k * c[k]
+        candidate = x - error / slope if slope > 0.0 else low
+        if not low < candidate < high:
+            candidate = 0.5 * (low + high)
+        if candidate in (x, low, high):
+            break
+        x = candidate
+    outputs[0] = centre + scale * x
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -112,8 +115,9 @@ class Polynomial(Memoryless, Ranged):
     """
 
     kind: ClassVar[str] = "polynomial"
-    kernel: ClassVar[Kernel] = polynomial_kernel
-    inverse_kernel: ClassVar[Kernel] = polynomial_inverse_kernel
+    kernel: ClassVar[Kernel] = polynomial_step
+    inverse_kernel: ClassVar[Kernel] = polynomial_inverse_step
+    inverse_start_kernel: ClassVar[Start] = nothing_clipped
     parameters: ClassVar[tuple[str, ...]] = ("polynomial",)
     notation: ClassVar[Notation] = Notation(
         r"y = \sum_{k} c_k x^k,\quad x = \frac{u - m}{s}",

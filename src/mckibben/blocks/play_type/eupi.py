@@ -24,40 +24,43 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.kernels import kernel, step, summing_step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import check_input_range
-from mckibben.blocks.core.solved_inverse import Solved, solve_samples
-from mckibben.blocks.play_type.memory import check_thresholds, play_state
+from mckibben.blocks.core.solved_inverse import Solved, solve_sample, solved_start
+from mckibben.blocks.play_type.memory import check_thresholds, start_operators
 from mckibben.errors import ModelError
 
 
-@summing_kernel
-def eupi_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@kernel
+def unparallel_play(s: float, x: float, r: float, alpha: float, beta: float) -> float:
+    """Move an operator whose edges differ in slope."""
+    return max(min(s, alpha * x + beta * r), x - r)
+
+
+@summing_step
+def eupi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; coefficients are [u_0, alpha, beta, offset, a_1..a_3, thresholds, weights]."""
     n = state.size
     origin, alpha, beta, offset = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
     a1, a2, a3 = coefficients[4], coefficients[5], coefficients[6]
     r = coefficients[7 : n + 7]
     w = coefficients[n + 7 :]
-    for t in range(inputs.shape[0]):
-        x = inputs[t, 0] - origin
-        y = 0.0
-        for i in range(n):
-            s = max(min(state[i], alpha * x + beta * r[i]), x - r[i])
-            state[i] = s
-            y += w[i] * s
-        outputs[t, 0] = offset + ((a3 * x + a2) * x + a1) * x + y
+    x = inputs[0] - origin
+    y = 0.0
+    for i in range(n):
+        state[i] = unparallel_play(state[i], x, r[i], alpha, beta)
+        y += w[i] * state[i]
+    outputs[0] = offset + ((a3 * x + a2) * x + a1) * x + y
 
 
 @kernel
@@ -68,7 +71,7 @@ def eupi_matrix(x: Array, alpha: float, beta: float, r: Array, s: Array, operato
     """
     for t in range(x.size):
         for i in range(r.size):
-            s[i] = max(min(s[i], alpha * x[t] + beta * r[i]), x[t] - r[i])
+            s[i] = unparallel_play(s[i], x[t], r[i], alpha, beta)
             operators[t, i] = s[i]
 
 
@@ -76,7 +79,7 @@ def eupi_matrix(x: Array, alpha: float, beta: float, r: Array, s: Array, operato
 def _advance(u: float, c: Array, state: Array) -> None:
     x = u - c[0]
     for i in range(state.size):
-        state[i] = max(min(state[i], c[1] * x + c[2] * c[7 + i]), x - c[7 + i])
+        state[i] = unparallel_play(state[i], x, c[7 + i], c[1], c[2])
 
 
 @kernel
@@ -86,15 +89,24 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
     x = u - c[0]
     y = c[3] + ((c[6] * x + c[5]) * x + c[4]) * x
     for i in range(n):
-        r = c[7 + i]
-        y += c[7 + n + i] * max(min(state[i], c[1] * x + c[2] * r), x - r)
+        y += c[7 + n + i] * unparallel_play(state[i], x, c[7 + i], c[1], c[2])
     return y
 
 
-@kernel
-def eupi_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def eupi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
-    solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
+    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
+
+
+@kernel
+def eupi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start the operators before the first sample."""
+    x = inputs[0] - coefficients[0]
+    start_operators(coefficients[7 : state.size + 7], x, x, virgin, state)
+
+
+eupi_inverse_start = solved_start(_trial, eupi_start)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -124,8 +136,10 @@ class EUPI(Solved):
     """
 
     kind: ClassVar[str] = "eupi"
-    kernel: ClassVar[Kernel] = eupi_kernel
-    inverse_kernel: ClassVar[Kernel] = eupi_inverse_kernel
+    kernel: ClassVar[Kernel] = eupi_step
+    start_kernel: ClassVar[Start] = eupi_start
+    inverse_kernel: ClassVar[Kernel] = eupi_inverse_step
+    inverse_start_kernel: ClassVar[Start] = eupi_inverse_start
     increasing = ("thresholds",)
     parameters: ClassVar[tuple[str, ...]] = (
         "weights",
@@ -165,12 +179,6 @@ class EUPI(Solved):
     def n_states(self) -> int:
         """One an operator."""
         return len(self.thresholds)
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the operators' outputs before the first sample, shape (N,)."""
-        start = self.initial if initial is None else initial
-        x = first[0] - self.input_range[0]
-        return play_state(self, np.array(self.thresholds), x, x, start)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights]."""

@@ -21,29 +21,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Annotated, ClassVar, Self
+from functools import cache
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.adaptable import Learning
-from mckibben.blocks.adaptive.operators import LearntOperators
-from mckibben.blocks.core.block import Run
+from mckibben.blocks.adaptive.learning import start_learning
+from mckibben.blocks.adaptive.operators import LearntOperators, follow_learning, inverse_at
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
-    Rule,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.kernels import Step, kernel, step, summing_step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.single_channel import check_input_range
 from mckibben.blocks.play_type.envelopes.base import Envelope, nested_envelope
 from mckibben.blocks.play_type.envelopes.tanh import Tanh
@@ -51,39 +49,136 @@ from mckibben.blocks.play_type.memory import (
     check_invertible_sum,
     check_thresholds,
     follow,
-    play_state,
-    solve_from_rest,
+    start_operators,
+    start_sum,
 )
 from mckibben.errors import ModelError
-from mckibben.system.compiling import bound, in_turn
 
 EnvelopeField = Annotated[InstanceOf[Envelope], BeforeValidator(nested_envelope)]
 
 
-@summing_kernel
-def gpi_kernel(
-    coefficients: Array, state: Array, inputs: Array, rising: Array, falling: Array, outputs: Array
-) -> None:
-    """Run a GPI model, given its envelopes at every sample; coefficients are [thresholds, weights].
+class Kernels(NamedTuple):
+    """The kernels of models with two kinds of envelopes."""
 
-    The state is [operators, previous input].
+    step: Step
+    start: Start
+    inverse_step: Step
+    inverse_start: Start
+    adaptive_step: Step
+    adaptive_start: Start
+
+
+@cache
+def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
+    """Return the kernels of models with these kinds of envelopes.
+
+    Coefficients are [kind and size of rising, of falling, thresholds, weights, rising, falling], and of
+    the inverse [lowest, highest input] before. The state is [operators, previous input], and of the
+    inverse also [previous reference, samples clipped].
     """
-    n = state.size - 1
-    r = coefficients[:n]
-    w = coefficients[n:]
-    previous = state[n]
-    for t in range(inputs.size):
-        u = inputs[t]
-        lower = rising[t] if u > previous else -np.inf
-        upper = falling[t] if u < previous else np.inf
+    rising_at, rising_from = rising.value, rising.inverse
+    falling_at, falling_from = falling.value, falling.inverse
+
+    @summing_step
+    def gpi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Run a GPI model."""
+        n = state.size - 1
+        r = coefficients[4 : n + 4]
+        w = coefficients[n + 4 : 2 * n + 4]
+        first = 2 * n + 4 + int(coefficients[1])
+        u = inputs[0]
         y = 0.0
-        for i in range(n):
-            s = min(max(state[i], lower - r[i]), upper + r[i])
-            state[i] = s
-            y += w[i] * s
-        outputs[t, 0] = y
-        previous = u
-    state[n] = previous
+        if u > state[n]:
+            edge = rising_at(u, coefficients[2 * n + 4 : first])
+            for i in range(n):
+                state[i] = max(state[i], edge - r[i])
+                y += w[i] * state[i]
+        else:
+            edge = falling_at(u, coefficients[first:]) if u < state[n] else np.inf
+            for i in range(n):
+                state[i] = min(state[i], edge + r[i])
+                y += w[i] * state[i]
+        state[n] = u
+        outputs[0] = y
+
+    @kernel
+    def gpi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start a GPI model before its first sample."""
+        n = state.size - 1
+        first = 2 * n + 4 + int(coefficients[1])
+        u = inputs[0]
+        edge = rising_at(u, coefficients[2 * n + 4 : first])
+        other = falling_at(u, coefficients[first:])
+        start_operators(coefficients[4 : n + 4], edge, other, virgin, state[:n])
+        state[n] = u
+
+    @step
+    def gpi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Invert: find the operators' common edge, and the input from the envelope of the direction."""
+        n = state.size - 3
+        low, high = coefficients[0], coefficients[1]
+        r = coefficients[6 : n + 6]
+        w = coefficients[n + 6 : 2 * n + 6]
+        first = 2 * n + 6 + int(coefficients[3])
+        up, down = coefficients[2 * n + 6 : first], coefficients[first:]
+        y = inputs[0]
+        lowest, highest = falling_at(low, down), rising_at(high, up)
+        direction, clipped = follow(y, state[n + 1], lowest, highest, r, w, state[:n])
+        if clipped:
+            state[n + 2] += 1.0
+        state[n + 1] = y
+        if direction > 0.0:
+            state[n] = min(max(rising_from(state[0], up), low), high)
+        elif direction < 0.0:
+            state[n] = min(max(falling_from(state[0], down), low), high)
+        outputs[0] = state[n]
+
+    @kernel
+    def gpi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start the inverse of a GPI model before its first reference."""
+        n = state.size - 3
+        low, high = coefficients[0], coefficients[1]
+        r = coefficients[6 : n + 6]
+        w = coefficients[n + 6 : 2 * n + 6]
+        first = 2 * n + 6 + int(coefficients[3])
+        up, down = coefficients[2 * n + 6 : first], coefficients[first:]
+        y = inputs[0]
+        lowest = falling_at(low, down) if virgin else rising_at(low, up)
+        start_sum(y, lowest, rising_at(high, up), r, w, virgin, state[:n])
+        falls = virgin and y < 0.0
+        u = falling_from(state[0], down) if falls else rising_from(state[0], up)
+        state[n] = min(max(u, low), high)
+        state[n + 1] = y
+        state[n + 2] = 0.0
+
+    @step
+    def gpi_adaptive_step(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+    ) -> None:
+        """Invert, and learn the weights and an offset from what is measured."""
+        n = int(coefficients[0]) - 1
+        own = coefficients[inverse_at(coefficients) :]
+        first = 2 * n + 6 + int(own[3])
+        s, last, learnt = state[:n], state[n + 1 : n + 4], state[n + 4 :]
+        direction = follow_learning(
+            coefficients, own[6 : n + 6], s, last, learnt, scratch, inputs[0], inputs[1]
+        )
+        if direction > 0.0:
+            state[n] = min(max(rising_from(s[0], own[2 * n + 6 : first]), own[0]), own[1])
+        elif direction < 0.0:
+            state[n] = min(max(falling_from(s[0], own[first:]), own[0]), own[1])
+        outputs[0] = state[n]
+
+    @kernel
+    def gpi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start as the inverse does, with the weights as fitted."""
+        n = int(coefficients[0]) - 1
+        gpi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 3], inputs, virgin)
+        state[n + 3] = 0.0
+        start_learning(coefficients, state[n + 4 :])
+
+    forward = (gpi_step, gpi_start, gpi_inverse_step, gpi_inverse_start)
+    return Kernels(*forward, gpi_adaptive_step, gpi_adaptive_start)
 
 
 @kernel
@@ -103,45 +198,6 @@ def gpi_matrix(
             s[i] = min(max(s[i], lower - r[i]), upper + r[i])
             operators[t, i] = s[i]
         previous = u[t]
-
-
-@kernel
-def gpi_inverse_kernel(
-    coefficients: Array, state: Array, references: Array, z: Array, direction: Array
-) -> None:
-    """Find the common envelope value z and the direction of the input, for every reference.
-
-    Coefficients are [lowest, highest z, thresholds, weights]; the state is [operators, previous
-    input, previous reference, samples clipped].
-    """
-    n = state.size - 3
-    lowest, highest = coefficients[0], coefficients[1]
-    r = coefficients[2 : n + 2]
-    w = coefficients[n + 2 :]
-    s = state[:n]
-    for t in range(references.size):
-        y = references[t]
-        direction[t], clipped = follow(y, state[n + 1], lowest, highest, r, w, s)
-        if clipped:
-            state[n + 2] += 1.0
-        state[n + 1] = y
-        z[t] = s[0]
-
-
-@kernel
-def choose_branch(
-    limits: Array, state: Array, direction: Array, rising: Array, falling: Array, inputs: Array
-) -> None:
-    """Take the input from the envelope of the direction, or hold it; limits are [lowest, highest]."""
-    n = state.size - 3
-    u = state[n]
-    for t in range(direction.size):
-        if direction[t] > 0.0:
-            u = min(max(rising[t], limits[0]), limits[1])
-        elif direction[t] < 0.0:
-            u = min(max(falling[t], limits[0]), limits[1])
-        inputs[t, 0] = u
-    state[n] = u
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -191,21 +247,46 @@ class GPI(LearntOperators):
         check_input_range(self.kind, self.input_range)
 
     @property
+    def kernel(self) -> Kernel:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.step
+
+    @property
+    def start_kernel(self) -> Start:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.start
+
+    @property
+    def inverse_kernel(self) -> Kernel:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.inverse_step
+
+    @property
+    def inverse_start_kernel(self) -> Start:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.inverse_start
+
+    @property
+    def adaptive_kernel(self) -> Kernel:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.adaptive_step
+
+    @property
+    def adaptive_start_kernel(self) -> Start:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.adaptive_start
+
+    @property
+    def _kernels(self) -> Kernels:
+        return kernels_of(type(self.rising), type(self.falling))
+
+    @property
     def n_states(self) -> int:
         """One an operator, and the previous input."""
         return len(self.thresholds) + 1
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the operators' outputs and the first input, shape (N + 2,)."""
-        start = self.initial if initial is None else initial
-        if not isinstance(start, str) and len(start) == self.n_states:
-            return explicit_state(self, start)
-        r = np.array(self.thresholds)
-        rising, falling = self.rising(first)[0], self.falling(first)[0]
-        return np.array([*play_state(self, r, rising, falling, start), first[0]])
-
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what C reads: [kinds and sizes of envelopes, thresholds, weights, envelopes]."""
+        """Return [kind and size of rising, of falling, thresholds, weights, rising, falling]."""
         del sample_time
         envelopes = (self.rising, self.falling)
         numbers = [envelope.coefficients() for envelope in envelopes]
@@ -215,21 +296,6 @@ class GPI(LearntOperators):
             for part in (envelope.number, own.size)
         ]
         return np.array([*head, *self.thresholds, *self.weights, *numbers[0], *numbers[1]])
-
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that evaluates both envelopes, then runs the operators."""
-        del sample_time
-        coefficients = np.array([*self.thresholds, *self.weights])
-        u = inputs.reshape(-1)
-        rising, falling = np.empty(u.size), np.empty(u.size)
-        up, down = type(self.rising).value, type(self.falling).value
-        up_coefficients, down_coefficients = self.rising.coefficients(), self.falling.coefficients()
-
-        return in_turn(
-            bound(up, up_coefficients, u, rising),
-            bound(down, down_coefficients, u, falling),
-            bound(gpi_kernel, coefficients, state, u, rising, falling, outputs),
-        )
 
     def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Give the thresholds, and the knots of the envelopes that have some."""
@@ -264,35 +330,9 @@ class GPI(LearntOperators):
         """Return [lowest, highest input], then this model's."""
         return np.array([*self.limits, *own])
 
-    def inverse_start(self, first: Array, start: Rule) -> Array:
-        """Return [operators, previous input, previous reference, samples clipped]."""
-        output = float(first[0])
-        r, w = np.array(self.thresholds), np.array(self.weights)
-        low, high = self.input_range
-        envelope, highest = self.rising, float(self.rising(high))
-        if start == "virgin":
-            states = solve_from_rest(output, float(self.falling(low)), highest, r, w)
-            envelope = self.falling if output < 0 else self.rising
-        else:
-            risen = (output + w @ r) / w.sum()
-            states = min(max(risen, float(self.rising(low))), highest) - r
-        u = float(np.clip(envelope.solve(states[0]), low, high))
-        return np.array([*states, u, output, 0.0])
-
     def remembered(self, state: Array) -> tuple[float, ...]:
         """Return the output."""
         return (np.dot(self.weights, state[:-1]),)
-
-    def bind_inverse(
-        self, sample_time: float | None, state: Array, inputs: Array, outputs: Array
-    ) -> Run:
-        """Return a function that solves for z, then inverts the envelopes."""
-        del sample_time
-        operators = np.array([*self.learnt_limits, *self.thresholds, *self.weights])
-        references = inputs.reshape(-1)
-        z, direction = np.empty(references.size), np.empty(references.size)
-        solve = bound(gpi_inverse_kernel, operators, state, references, z, direction)
-        return in_turn(solve, *self._bind_branches(state, z, direction, outputs))
 
     @property
     def learnt_limits(self) -> tuple[float, float]:
@@ -307,33 +347,6 @@ class GPI(LearntOperators):
     def added(self, theta: Array) -> float:
         """Return the offset."""
         return float(theta[-1])
-
-    def bind_adaptive(
-        self,
-        sample_time: float | None,
-        learning: Learning,
-        state: Array,
-        inputs: Array,
-        measured: Array,
-        outputs: Array,
-    ) -> Run:
-        """Return a function that learns and solves for z, then inverts the envelopes."""
-        del sample_time
-        n, length = len(self.thresholds), inputs.shape[0]
-        s, last = state[:n], state[n + 1 :]
-        z, direction = np.empty(length), np.empty(length)
-        learn = self._bind_operators(learning, s, last, inputs, measured, z, direction)
-        return in_turn(learn, *self._bind_branches(state[: n + 3], z, direction, outputs))
-
-    def _bind_branches(self, state: Array, z: Array, direction: Array, outputs: Array) -> list[Run]:
-        rising, falling = np.empty(z.size), np.empty(z.size)
-        up, down = self.rising, self.falling
-        limits = np.array(self.input_range)
-        return [
-            bound(type(up).inverse, up.coefficients(), z, rising),
-            bound(type(down).inverse, down.coefficients(), z, falling),
-            bound(choose_branch, limits, state, direction, rising, falling, outputs),
-        ]
 
     @classmethod
     def example(cls) -> Self:

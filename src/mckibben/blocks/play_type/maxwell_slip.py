@@ -22,33 +22,35 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     Coefficients,
-    Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import accumulate, kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.single_channel import check_input_range
-from mckibben.blocks.core.solved_inverse import Solved, solve_samples
+from mckibben.blocks.core.solved_inverse import Solved, solve_input, solved_start
 from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
 from mckibben.blocks.play_type.memory import check_thresholds
 from mckibben.errors import ModelError
 
 
 @kernel
-def slip(s: float, du: float, limit: float, stiffness: float, ratio: float) -> float:
-    """Return the deflection of a spring after the input has moved by ``du``."""
-    if du >= 0.0:
-        return min(s + du, limit)
-    return max(s + stiffness * du, -ratio * limit)
+def stretch(du: float, stiffness: float) -> float:
+    """Return by how much springs that do not slip are deflected where the input moves by ``du``."""
+    return du if du >= 0.0 else stiffness * du
+
+
+@kernel
+def slip(s: float, du: float, limit: float, ratio: float) -> float:
+    """Return what is left of a spring's deflection where it slips."""
+    return min(s, limit) if du >= 0.0 else max(s, -ratio * limit)
 
 
 @kernel
@@ -61,18 +63,21 @@ def slip_matrix(
     """
     before = u[0]
     for t in range(u.size):
+        du = u[t] - before
+        change = stretch(du, stiffness)
         for i in range(limits.size):
-            s[i] = slip(s[i], u[t] - before, limits[i], stiffness, ratio)
+            s[i] = slip(s[i] + change, du, limits[i], ratio)
             deflections[t, i] = s[i]
         before = u[t]
 
 
 @kernel
-def _advance(u: float, c: Array, state: Array) -> None:
+def _advance(u: float, c: Array, state: Array, lost: Array) -> None:
     n, m = state.size - 1, int(c[0])
     du = u - state[n]
+    change = stretch(du, c[1])
     for i in range(n):
-        state[i] = slip(state[i], du, c[5 + m + i], c[1], c[2])
+        state[i] = slip(accumulate(state[i], change, lost, i), du, c[5 + m + i], c[2])
     state[n] = u
 
 
@@ -81,14 +86,17 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
     c, state = memory
     n, m = state.size - 1, int(c[0])
     du = u - state[n]
+    change = stretch(du, c[1])
     y = polynomial_at((u - c[3]) / c[4], c, 5, m)
     for i in range(n):
-        y += c[5 + m + n + i] * slip(state[i], du, c[5 + m + i], c[1], c[2])
+        y += c[5 + m + n + i] * slip(state[i] + change, du, c[5 + m + i], c[2])
     return y
 
 
-@kernel
-def maxwell_slip_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def maxwell_slip_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
     """Run the model; the state is [deflections, previous input].
 
     Coefficients are [size of the polynomial, kappa, lambda, centre, scale, polynomial, limits,
@@ -96,21 +104,34 @@ def maxwell_slip_kernel(coefficients: Array, state: Array, inputs: Array, output
     """
     n, m = state.size - 1, int(coefficients[0])
     weights = coefficients[5 + m + n :]
-    for t in range(inputs.shape[0]):
-        u = inputs[t, 0]
-        _advance(u, coefficients, state)
-        y = polynomial_at((u - coefficients[3]) / coefficients[4], coefficients, 5, m)
-        for i in range(n):
-            y += weights[i] * state[i]
-        outputs[t, 0] = y
+    u = inputs[0]
+    _advance(u, coefficients, state, scratch)
+    y = polynomial_at((u - coefficients[3]) / coefficients[4], coefficients, 5, m)
+    for i in range(n):
+        y += weights[i] * state[i]
+    outputs[0] = y
+
+
+@step
+def maxwell_slip_inverse_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
+    u = solve_input(_trial, coefficients, state, inputs)
+    _advance(u, coefficients[:-2], state[:-2], scratch)
+    outputs[0] = u
 
 
 @kernel
-def maxwell_slip_inverse_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
-    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
-    solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
+def maxwell_slip_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with all springs slipping upwards, or none deflected."""
+    n, m = state.size - 1, int(coefficients[0])
+    for i in range(n):
+        state[i] = 0.0 if virgin else coefficients[5 + m + i]
+    state[n] = inputs[0]
+
+
+maxwell_slip_inverse_start = solved_start(_trial, maxwell_slip_start)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -141,8 +162,10 @@ class MaxwellSlip(Solved):
     """
 
     kind: ClassVar[str] = "maxwell-slip"
-    kernel: ClassVar[Kernel] = maxwell_slip_kernel
-    inverse_kernel: ClassVar[Kernel] = maxwell_slip_inverse_kernel
+    kernel: ClassVar[Kernel] = maxwell_slip_step
+    start_kernel: ClassVar[Start] = maxwell_slip_start
+    inverse_kernel: ClassVar[Kernel] = maxwell_slip_inverse_step
+    inverse_start_kernel: ClassVar[Start] = maxwell_slip_inverse_start
     parameters: ClassVar[tuple[str, ...]] = (
         "weights",
         "polynomial",
@@ -193,15 +216,6 @@ class MaxwellSlip(Solved):
     def n_scratch(self) -> int:
         """What single precision loses of the deflections."""
         return len(self.breakaways)
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [deflections, first input]."""
-        start = self.initial if initial is None else initial
-        if start == "first_sample":
-            return np.array([*self.breakaways, first[0]])
-        if start == "virgin":
-            return np.array([*np.zeros(len(self.breakaways)), first[0]])
-        return explicit_state(self, start)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [size, kappa, lambda, centre, scale, polynomial, limits, weights]."""

@@ -7,10 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Initial
-from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.core.refusals import explicit_state
+from mckibben.blocks.core.kernels import ROUNDING, SLACK, kernel
+from mckibben.blocks.core.refusals import VIRGIN
 from mckibben.errors import ModelError
 
 
@@ -50,37 +48,54 @@ def check_invertible_sum(kind: str, thresholds: Sequence[float], weights: Sequen
         )
 
 
-def named_state(rule: str, r: Array, rising: float, falling: float) -> Array:
-    """Return the states of play operators with thresholds ``r``, started by a named rule.
+@kernel
+def start_operators(r: Array, rising: float, falling: float, virgin: bool, s: Array) -> None:
+    """Start play operators as if the input had only risen, or as if nothing had ever happened.
 
     ``rising`` and ``falling`` are the first input as the two edges see it: the same for classical
     operators, the two envelopes' values for generalised ones.
     """
-    if rule == "first_sample":
-        return rising - r
-    if rule == "virgin":
-        return np.asarray(np.clip(0.0, rising - r, falling + r))
-    raise ModelError(
-        f"there is no initial state {rule!r}. "
-        "Remedy: use 'first_sample', 'virgin', or the states themselves."
-    )
+    for i in range(r.size):
+        s[i] = rising - r[i]
+        if virgin:
+            s[i] = min(max(0.0, rising - r[i]), falling + r[i])
 
 
-def play_state(block: Block, r: Array, rising: float, falling: float, initial: Initial) -> Array:
-    """Return the starting states of play operators: by a named rule, or explicit."""
-    if isinstance(initial, str):
-        return named_state(initial, r, rising, falling)
-    return explicit_state(block, initial)
-
-
-def solve_from_rest(target: float, lowest: float, highest: float, r: Array, w: Array) -> Array:
-    """Return the states that one excursion from rest leaves, when the weighted sum is ``target``."""
-    states = np.zeros_like(r)
-    if target > 0:
-        rise_to(target, highest, r, w, states)
-    elif target < 0:
-        fall_to(target, lowest, r, w, states)
+def started(r: Array, rising: float, falling: float, rule: str) -> Array:
+    """Return the states of play operators with thresholds ``r``, see `start_operators`."""
+    states = np.empty_like(r)
+    start_operators(r, rising, falling, VIRGIN[rule], states)
     return states
+
+
+@kernel
+def start_from_rest(
+    target: float, lowest: float, highest: float, r: Array, w: Array, s: Array
+) -> None:
+    """Start as one excursion from rest leaves operators when the weighted sum is ``target``."""
+    for i in range(r.size):
+        s[i] = 0.0
+    if target > 0.0:
+        rise_to(target, highest, r, w, s)
+    elif target < 0.0:
+        fall_to(target, lowest, r, w, s)
+
+
+@kernel
+def start_sum(
+    target: float, lowest: float, highest: float, r: Array, w: Array, virgin: bool, s: Array
+) -> None:
+    """Start operators so that their weighted sum is ``target``, within the limits of their input."""
+    if virgin:
+        start_from_rest(target, lowest, highest, r, w, s)
+        return
+    risen, slope = target, 0.0
+    for i in range(r.size):
+        risen += w[i] * r[i]
+        slope += w[i]
+    z = min(max(risen / slope, lowest), highest)
+    for i in range(r.size):
+        s[i] = z - r[i]
 
 
 @kernel
@@ -99,10 +114,10 @@ def follow(
         total += w[i] * s[i]
         size += abs(w[i] * s[i])
     missing = target - total
-    slack = 1e-9 * abs(highest - lowest)
-    if target > previous and missing > 1e-14 * size:
+    slack = SLACK * abs(highest - lowest)
+    if target > previous and missing > ROUNDING * size:
         return 1.0, rise_to(target, highest, r, w, s) > highest + slack
-    if target < previous and missing < -1e-14 * size:
+    if target < previous and missing < -ROUNDING * size:
         return -1.0, fall_to(target, lowest, r, w, s) < lowest - slack
     above = missing > w[0] * slack and s[0] >= highest
     below = missing < -w[0] * slack and s[0] <= lowest

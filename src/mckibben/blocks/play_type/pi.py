@@ -18,50 +18,47 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.adaptable import Learning
-from mckibben.blocks.adaptive.operators import LearntOperators
-from mckibben.blocks.core.block import Kernel, Run
+from mckibben.blocks.adaptive.learning import start_learning
+from mckibben.blocks.adaptive.operators import LearntOperators, follow_learning, inverse_at
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
-    Rule,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.kernels import kernel, step, summing_step
 from mckibben.blocks.core.notation import FEW, Notation, summed, tex
 from mckibben.blocks.core.single_channel import check_input_range
 from mckibben.blocks.play_type.memory import (
     check_invertible_sum,
     check_thresholds,
     follow,
-    play_state,
-    solve_from_rest,
+    start_operators,
+    start_sum,
 )
 
 
-@summing_kernel
-def pi_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@summing_step
+def pi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run a PI model; coefficients are [offset, thresholds, weights]."""
     n = state.size
     offset = coefficients[0]
     r = coefficients[1 : n + 1]
     w = coefficients[n + 1 :]
-    for t in range(inputs.shape[0]):
-        u = inputs[t, 0]
-        y = 0.0
-        for i in range(n):
-            s = min(max(state[i], u - r[i]), u + r[i])
-            state[i] = s
-            y += w[i] * s
-        outputs[t, 0] = offset + y
+    u = inputs[0]
+    y = 0.0
+    for i in range(n):
+        s = min(max(state[i], u - r[i]), u + r[i])
+        state[i] = s
+        y += w[i] * s
+    outputs[0] = offset + y
 
 
-@kernel
-def pi_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def pi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Invert a PI model; coefficients are [lowest, highest input, offset, thresholds, weights].
 
     The state is [forward operators, previous reference, samples clipped].
@@ -71,13 +68,52 @@ def pi_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs:
     r = coefficients[3 : n + 3]
     w = coefficients[n + 3 :]
     s = state[:n]
-    for t in range(inputs.shape[0]):
-        y = inputs[t, 0]
-        _, clipped = follow(y - offset, state[n] - offset, lowest, highest, r, w, s)
-        if clipped:
-            state[n + 1] += 1.0
-        state[n] = y
-        outputs[t, 0] = s[0]
+    y = inputs[0]
+    _, clipped = follow(y - offset, state[n] - offset, lowest, highest, r, w, s)
+    if clipped:
+        state[n + 1] += 1.0
+    state[n] = y
+    outputs[0] = s[0]
+
+
+@kernel
+def pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start a PI model before its first sample."""
+    n = state.size
+    start_operators(coefficients[1 : n + 1], inputs[0], inputs[0], virgin, state)
+
+
+@kernel
+def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start the inverse of a PI model before its first reference."""
+    n = state.size - 2
+    lowest, highest, offset = coefficients[0], coefficients[1], coefficients[2]
+    r = coefficients[3 : n + 3]
+    w = coefficients[n + 3 :]
+    start_sum(inputs[0] - offset, lowest, highest, r, w, virgin, state[:n])
+    state[n] = inputs[0]
+    state[n + 1] = 0.0
+
+
+@step
+def pi_adaptive_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Invert a PI model, and learn its weights and offset from what is measured."""
+    n = int(coefficients[0]) - 1
+    r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
+    s, last, learnt = state[:n], state[n : n + 3], state[n + 3 :]
+    follow_learning(coefficients, r, s, last, learnt, scratch, inputs[0], inputs[1])
+    outputs[0] = s[0]
+
+
+@kernel
+def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as the inverse does, with the weights as fitted."""
+    n = int(coefficients[0]) - 1
+    pi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 2], inputs, virgin)
+    state[n + 2] = 0.0
+    start_learning(coefficients, state[n + 3 :])
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -101,8 +137,12 @@ class PI(LearntOperators):
     """
 
     kind: ClassVar[str] = "pi"
-    kernel: ClassVar[Kernel] = pi_kernel
-    inverse_kernel: ClassVar[Kernel] = pi_inverse_kernel
+    kernel: ClassVar[Kernel] = pi_step
+    start_kernel: ClassVar[Start] = pi_start
+    inverse_kernel: ClassVar[Kernel] = pi_inverse_step
+    inverse_start_kernel: ClassVar[Start] = pi_inverse_start
+    adaptive_kernel: ClassVar[Kernel] = pi_adaptive_step
+    adaptive_start_kernel: ClassVar[Start] = pi_adaptive_start
     inverse_remembers = "output"
     increasing = ("thresholds",)
     parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
@@ -131,11 +171,6 @@ class PI(LearntOperators):
         """One a play operator."""
         return len(self.thresholds)
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the operators' outputs before the first sample, shape (N,)."""
-        start = self.initial if initial is None else initial
-        return play_state(self, np.array(self.thresholds), first[0], first[0], start)
-
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [offset, thresholds, weights]."""
         del sample_time
@@ -158,14 +193,6 @@ class PI(LearntOperators):
         """Return [lowest, highest input, offset, thresholds, weights]."""
         return np.array([*self.limits, *own])
 
-    def input_giving(self, output: float, start: Rule) -> float:
-        """Return the first input, within the limits, that gives an output after a named start."""
-        r, w = np.array(self.thresholds), np.array(self.weights)
-        lowest, highest = self.limits
-        if start == "virgin":
-            return float(solve_from_rest(output - self.offset, lowest, highest, r, w)[0])
-        return min(max((output - self.offset + w @ r) / w.sum(), lowest), highest)
-
     def remembered(self, state: Array) -> tuple[float, ...]:
         """Return the output."""
         return (self.offset + np.dot(self.weights, state),)
@@ -173,22 +200,6 @@ class PI(LearntOperators):
     def retaught(self, theta: Array) -> PI:
         """Return the model with other weights and another offset."""
         return replace(self, weights=tuple(theta[:-1].tolist()), offset=float(theta[-1]))
-
-    def bind_adaptive(
-        self,
-        sample_time: float | None,
-        learning: Learning,
-        state: Array,
-        inputs: Array,
-        measured: Array,
-        outputs: Array,
-    ) -> Run:
-        """Return a function that learns and inverts; the input is that of the operators."""
-        del sample_time
-        s, last = state[:-3], state[-3:]
-        ways = np.empty(inputs.shape[0])
-        z = outputs.reshape(-1)
-        return self._bind_operators(learning, s, last, inputs, measured, z, ways)
 
     def worked(self) -> tuple[str, ...]:
         """Return the sum with its numbers, where it is short."""

@@ -11,36 +11,39 @@ from __future__ import annotations
 
 from typing import ClassVar, Self
 
-import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Primitive
+from mckibben.blocks.core.block import Kernel, Primitive, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
     StoredInitial,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import SingleChannel
-from mckibben.blocks.play_type.memory import check_thresholds, play_state
+from mckibben.blocks.play_type.memory import check_thresholds, start_operators
 
 
-@kernel
-def play_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+@step
+def play_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run one play operator; coefficients are [r]."""
     r = coefficients[0]
     s = state[0]
-    for t in range(inputs.shape[0]):
-        u = inputs[t, 0]
-        s = min(max(s, u - r), u + r)
-        outputs[t, 0] = s
+    u = inputs[0]
+    s = min(max(s, u - r), u + r)
+    outputs[0] = s
     state[0] = s
+
+
+@kernel
+def play_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start a play operator."""
+    start_operators(coefficients, inputs[0], inputs[0], virgin, state)
 
 
 @kernel
@@ -70,7 +73,8 @@ class Play(SingleChannel, Primitive):
     """
 
     kind: ClassVar[str] = "play"
-    kernel: ClassVar[Kernel] = play_kernel
+    kernel: ClassVar[Kernel] = play_step
+    start_kernel: ClassVar[Start] = play_start
     parameters: ClassVar[tuple[str, ...]] = ("threshold",)
     notation: ClassVar[Notation] = Notation(
         r"y = F_r[u],\quad F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
@@ -89,11 +93,6 @@ class Play(SingleChannel, Primitive):
     def n_states(self) -> int:
         """The operator's own output."""
         return 1
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the operator's output before the first sample, shape (1,)."""
-        start = self.initial if initial is None else initial
-        return play_state(self, np.array([self.threshold]), first[0], first[0], start)
 
     @classmethod
     def example(cls) -> Self:

@@ -22,31 +22,35 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
     Rule,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.kernels import kernel, step, summing_step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.core.root import solve_near
 from mckibben.blocks.core.single_channel import Ranged, check_input_range
 from mckibben.blocks.core.solved_inverse import solved_cost
-from mckibben.blocks.play_type.memory import check_invertible_sum, check_thresholds, play_state
+from mckibben.blocks.play_type.memory import (
+    check_invertible_sum,
+    check_thresholds,
+    start_operators,
+    start_sum,
+)
 from mckibben.blocks.play_type.pi import PI
 from mckibben.errors import ModelError
 
 
-@summing_kernel
-def rate_dependent_pi_kernel(
+@summing_step
+def rate_dependent_pi_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Run the model; coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
@@ -58,19 +62,18 @@ def rate_dependent_pi_kernel(
     r = coefficients[3 : n + 3]
     k = coefficients[n + 3 : 2 * n + 3]
     d = coefficients[2 * n + 3 :]
-    for t in range(inputs.shape[0]):
-        u = inputs[t, 0]
-        rate = smoothing * state[n + 1] + gain * (u - state[n])
-        static = 0.0
-        dynamic = 0.0
-        for i in range(n):
-            s = min(max(state[i], u - r[i]), u + r[i])
-            state[i] = s
-            static += d[i] * s
-            dynamic += k[i] * s
-        outputs[t, 0] = offset + static + rate * dynamic
-        state[n] = u
-        state[n + 1] = rate
+    u = inputs[0]
+    rate = smoothing * state[n + 1] + gain * (u - state[n])
+    static = 0.0
+    dynamic = 0.0
+    for i in range(n):
+        s = min(max(state[i], u - r[i]), u + r[i])
+        state[i] = s
+        static += d[i] * s
+        dynamic += k[i] * s
+    outputs[0] = offset + static + rate * dynamic
+    state[n] = u
+    state[n + 1] = rate
 
 
 @kernel
@@ -86,8 +89,8 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
     return y
 
 
-@kernel
-def rate_dependent_pi_inverse_kernel(
+@step
+def rate_dependent_pi_inverse_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Solve for the input; coefficients are [forward ones, lowest, highest input].
@@ -96,19 +99,37 @@ def rate_dependent_pi_inverse_kernel(
     """
     n = state.size - 3
     lowest, highest = coefficients[-2], coefficients[-1]
-    for t in range(inputs.shape[0]):
-        u, clipped = solve_near(
-            _trial, inputs[t, 0], state[n], lowest, highest, (coefficients, state)
-        )
-        rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
-        for i in range(n):
-            r = coefficients[3 + i]
-            state[i] = min(max(state[i], u - r), u + r)
-        state[n] = u
-        state[n + 1] = rate
-        if clipped:
-            state[n + 2] += 1.0
-        outputs[t, 0] = u
+    u, clipped = solve_near(_trial, inputs[0], state[n], lowest, highest, (coefficients, state))
+    rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
+    for i in range(n):
+        r = coefficients[3 + i]
+        state[i] = min(max(state[i], u - r), u + r)
+    state[n] = u
+    state[n + 1] = rate
+    if clipped:
+        state[n + 2] += 1.0
+    outputs[0] = u
+
+
+@kernel
+def rate_dependent_pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at rest, at the first input."""
+    n = state.size - 2
+    start_operators(coefficients[3 : n + 3], inputs[0], inputs[0], virgin, state[:n])
+    state[n], state[n + 1] = inputs[0], 0.0
+
+
+@kernel
+def rate_dependent_pi_inverse_start(
+    coefficients: Array, state: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start at rest, at the input that gives the first reference."""
+    n = state.size - 3
+    lowest, highest = coefficients[-2], coefficients[-1]
+    r, d = coefficients[3 : n + 3], coefficients[2 * n + 3 : 3 * n + 3]
+    start_sum(inputs[0] - coefficients[2], lowest, highest, r, d, virgin, state[:n])
+    state[n] = state[0]  # whose threshold is 0
+    state[n + 1], state[n + 2] = 0.0, 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -136,8 +157,10 @@ class RateDependentPI(Ranged):
     """
 
     kind: ClassVar[str] = "rate-dependent-pi"
-    kernel: ClassVar[Kernel] = rate_dependent_pi_kernel
-    inverse_kernel: ClassVar[Kernel] = rate_dependent_pi_inverse_kernel
+    kernel: ClassVar[Kernel] = rate_dependent_pi_step
+    start_kernel: ClassVar[Start] = rate_dependent_pi_start
+    inverse_kernel: ClassVar[Kernel] = rate_dependent_pi_inverse_step
+    inverse_start_kernel: ClassVar[Start] = rate_dependent_pi_inverse_start
     rate_dependent: ClassVar[bool] = True
     increasing = ("thresholds",)
     parameters: ClassVar[tuple[str, ...]] = ("rate_weights", "weights", "offset")
@@ -171,14 +194,6 @@ class RateDependentPI(Ranged):
         """Operators, previous input and filtered rate."""
         return len(self.thresholds) + 2
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the operators' outputs, the first input and a rate of 0, shape (N + 2,)."""
-        start = self.initial if initial is None else initial
-        if not isinstance(start, str) and len(start) == self.n_states:
-            return explicit_state(self, start)
-        r = np.array(self.thresholds)
-        return np.array([*play_state(self, r, first[0], first[0], start), first[0], 0.0])
-
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [smoothing, gain of the rate, offset, thresholds, k, d].
 
@@ -205,16 +220,14 @@ class RateDependentPI(Ranged):
         """Return what trials cost, of which there are few on smooth references."""
         return solved_cost(self.cost(sample_time))
 
-    def input_giving(self, output: float, start: Rule) -> float:
-        """Return the first input, within the limits, that gives an output at rest."""
+    def inverse_start(self, first: Array, start: Rule) -> Array:
+        """Return the inverse's state at rest."""
         if start == "virgin":
             raise ModelError(
                 f"the inverse of {self.kind!r} cannot start virgin. "
                 "Remedy: start it from 'first_sample' or a state."
             )
-        r, w = np.array(self.thresholds), np.array(self.weights)
-        low, high = self.limits
-        return min(max((output - self.offset + w @ r) / w.sum(), low), high)
+        return super().inverse_start(first, start)
 
     def reachable(self) -> tuple[Array, Array]:
         """Return the outputs that can be reached at rest whatever happened before."""

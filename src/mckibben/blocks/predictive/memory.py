@@ -11,7 +11,10 @@ from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.composition import Composition
 from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.play_type.pi import PI
 from mckibben.errors import ModelError
 
 Ways = Callable[[Array], Array]
@@ -72,3 +75,45 @@ def undoing(compensator: Block) -> Ways:
 
 def _parts(compensator: Composition) -> tuple[Block, ...]:
     return compensator.parts
+
+
+Resume = Callable[[Array, Array, Array], None]
+
+
+@kernel
+def pi_resume(coefficients: Array, memory: Array, state: Array) -> None:
+    """Fill the state of a PI model's inverse from that of the model, which has these coefficients."""
+    n, y = memory.size, 0.0
+    for i in range(n):
+        state[i] = memory[i]
+        y += coefficients[1 + n + i] * memory[i]
+    state[n] = coefficients[0] + y
+    state[n + 1] = 0.0
+
+
+@kernel
+def gpi_resume(coefficients: Array, memory: Array, state: Array) -> None:
+    """Fill the state of a GPI model's inverse from that of the model, which has these coefficients."""
+    n, y = memory.size - 1, 0.0
+    for i in range(n):
+        state[i] = memory[i]
+        y += coefficients[4 + n + i] * memory[i]
+    state[n], state[n + 1], state[n + 2] = memory[n], y, 0.0
+
+
+@kernel
+def same_resume(coefficients: Array, memory: Array, state: Array) -> None:
+    """Fill a state that is that of the model."""
+    state[:] = memory
+
+
+def resume_of(compensator: Block) -> Resume | None:
+    """Return the kernel that fills a compensator's state from its model's; None where there is none."""
+    match compensator:
+        case Inverse(forward=PI()):
+            return pi_resume
+        case Inverse(forward=GPI()):
+            return gpi_resume
+        case Balance():
+            return same_resume
+    return None

@@ -14,13 +14,18 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.predictive.supply import weighed
+from mckibben.blocks.predictive.supply import weighed_at
 
 MOST_STEPS = 30
 """Of the interior-point method; it takes about ten."""
 
 CLOSED = 1e-11
 """Gap between primal and dual, over the mean squared slope [bar^2], that counts as none."""
+
+STAYS, FLAT = 1e-9, 1e-30
+"""Weight of staying where no slope pulls, and mean squared slope below which there is none."""
+
+SINGLE = {"CLOSED": 1e-7, "STAYS": 1e-6, "FLAT": 1e-30}
 
 ROOM = 0.3
 """Least room that limits are given at the start [bar], and their price."""
@@ -64,30 +69,38 @@ def applied(n: int, matrix: Array, x: Array, scale: float, y: Array) -> None:
 
 @kernel
 def factored(
-    rows: Array, hessian: Array, room: Array, price: Array, off: Array, factors: Array, work: Array
+    n: int,
+    rows: Array,
+    hessian: Array,
+    room: Array,
+    price: Array,
+    off: Array,
+    factors: Array,
+    work: Array,
 ) -> None:
     """Factor the system of one step: ``factors`` are inverses along the diagonal, ``off`` beside it."""
-    length, n = room.shape[0], rows.shape[1] - 2
-    block = n * n
+    width, block = n + 2, n * n
+    m = rows.size // width
+    length = room.size // m
     matrix, product = work[:block], work[block : 2 * block]
     for t in range(length):
+        beside = off[t * block : (t + 1) * block]
         for i in range(block):
             matrix[i] = hessian[t * block + i]
-            off[t * block + i] = 0.0
+            beside[i] = 0.0
         for later in range(2):  # changes of the next sample are of this one's pressures too
-            if t + later < length:
-                for i in range(rows.shape[0]):
-                    if later == 0 or rows[i, 0] > 0.0:
-                        weight = price[t + later, i] / room[t + later, i]
-                        for j in range(n):
-                            for k in range(n):
-                                added = weight * rows[i, 2 + j] * rows[i, 2 + k]
-                                matrix[j * n + k] += added
-                                if later == 0 and rows[i, 0] > 0.0:
-                                    off[t * block + j * n + k] -= added
+            for i in range(m if t + later < length else 0):
+                row = rows[i * width : (i + 1) * width]
+                if later == 0 or row[0] > 0.0:
+                    weight = price[(t + later) * m + i] / room[(t + later) * m + i]
+                    for j in range(n):
+                        for k in range(n):
+                            added = weight * row[2 + j] * row[2 + k]
+                            matrix[j * n + k] += added
+                            if later == 0 and row[0] > 0.0:
+                                beside[j * n + k] -= added
         if t > 0:
             last = factors[(t - 1) * block : t * block]
-            beside = off[t * block : (t + 1) * block]
             for i in range(n):
                 for j in range(n):
                     total = 0.0
@@ -105,6 +118,7 @@ def factored(
 
 @kernel
 def moved(
+    n: int,
     rows: Array,
     factors: Array,
     off: Array,
@@ -123,55 +137,60 @@ def moved(
     ``right`` is what the pressures' gradient lacks; ``goal`` what room times price shall become, over
     room; ``short`` what rooms are off.
     """
-    length, n = right.shape
-    block = n * n
-    none = point[:n]
+    width, block, length = n + 2, n * n, right.size // n
+    m = rows.size // width
+    none, forward = point[:n], point[n : 2 * n]
     for k in range(n):
         none[k] = 0.0
     for t in range(length):
         for k in range(n):
-            step[t, k] = right[t, k]
+            step[t * n + k] = right[t * n + k]
     for t in range(length):
-        for i in range(rows.shape[0]):
-            pull = goal[t, i] - price[t, i] + price[t, i] / room[t, i] * short[t, i]
+        for i in range(m):
+            row, at = rows[i * width : (i + 1) * width], t * m + i
+            pull = goal[at] - price[at] + price[at] / room[at] * short[at]
             for k in range(n):
-                step[t, k] -= pull * rows[i, 2 + k]
-                if t > 0 and rows[i, 0] > 0.0:
-                    step[t - 1, k] += pull * rows[i, 2 + k]
-    forward = point[n:]
+                step[t * n + k] -= pull * row[2 + k]
+                if t > 0 and row[0] > 0.0:
+                    step[(t - 1) * n + k] += pull * row[2 + k]
     for t in range(length):
+        now = step[t * n : (t + 1) * n]
         for k in range(n):
-            forward[k] = step[t, k]
+            forward[k] = now[k]
         if t > 0:
-            applied(n, off[t * block : (t + 1) * block], step[t - 1], -1.0, forward)
+            beside = off[t * block : (t + 1) * block]
+            applied(n, beside, step[(t - 1) * n : t * n], -1.0, forward)
         for k in range(n):
-            step[t, k] = 0.0
-        applied(n, factors[t * block : (t + 1) * block], forward, 1.0, step[t])
+            now[k] = 0.0
+        applied(n, factors[t * block : (t + 1) * block], forward, 1.0, now)
     for t in range(length - 2, -1, -1):
         for k in range(n):
             forward[k] = 0.0
-        applied(n, off[(t + 1) * block : (t + 2) * block], step[t + 1], 1.0, forward)
-        applied(n, factors[t * block : (t + 1) * block], forward, -1.0, step[t])
+        after = step[(t + 1) * n : (t + 2) * n]
+        applied(n, off[(t + 1) * block : (t + 2) * block], after, 1.0, forward)
+        own = factors[t * block : (t + 1) * block]
+        applied(n, own, forward, -1.0, step[t * n : (t + 1) * n])
     for t in range(length):
-        for i in range(rows.shape[0]):
-            change = weighed(rows[i], none if t == 0 else step[t - 1], step[t])
-            room_step[t, i] = -short[t, i] - change
-            price_step[t, i] = goal[t, i] - price[t, i] - price[t, i] / room[t, i] * room_step[t, i]
+        for i in range(m):
+            at = t * m + i
+            change = weighed_at(n, rows[i * width : (i + 1) * width], none, step, t)
+            room_step[at] = -short[at] - change
+            price_step[at] = goal[at] - price[at] - price[at] / room[at] * room_step[at]
 
 
 @kernel
 def furthest(values: Array, steps: Array) -> float:
     """Return the share of a step, at most 1, at which the first value becomes 0."""
     share = 1.0
-    for t in range(values.shape[0]):
-        for i in range(values.shape[1]):
-            if steps[t, i] < 0.0:
-                share = min(share, -values[t, i] / steps[t, i])
+    for i in range(values.size):
+        if steps[i] < 0.0:
+            share = min(share, -values[i] / steps[i])
     return share
 
 
 @kernel
 def plan(
+    n: int,
     rows: Array,
     before: Array,
     slopes: Array,
@@ -180,101 +199,115 @@ def plan(
     p: Array,
     scratch: Array,
 ) -> int:
-    """Find the pressures of a horizon, shape (N, n), from those before it; return the steps taken.
+    """Find the pressures of a horizon, N by n in a row, from those before it; return the steps taken.
 
-    ``slopes`` has N n n numbers; ``nominal`` (q), ``errors`` (e) and ``p`` are (N, n).
+    ``slopes`` are N by n by n in a row; ``nominal`` (q), ``errors`` (e) and ``p`` are N by n.
     """
-    length, n = p.shape
-    m, block = rows.shape[0], n * n
-    blocks = scratch[: 3 * length * block]
-    hessian, off = blocks[: length * block], blocks[length * block : 2 * length * block]
-    factors = blocks[2 * length * block :]
-    place = 3 * length * block
-    vectors = scratch[place : place + 3 * length * n].reshape((3, length, n))
-    wished, right, step = vectors[0], vectors[1], vectors[2]
-    place += 3 * length * n
-    tables = scratch[place : place + 6 * length * m].reshape((6, length, m))
-    room, price, short = tables[0], tables[1], tables[2]
-    goal, room_step, price_step = tables[3], tables[4], tables[5]
-    work = scratch[place + 6 * length * m :]
+    width, block, length = n + 2, n * n, p.size // n
+    m = rows.size // width
+    hessian, off = scratch[: length * block], scratch[length * block : 2 * length * block]
+    factors, rest = scratch[2 * length * block : 3 * length * block], scratch[3 * length * block :]
+    wished, right = rest[: length * n], rest[length * n : 2 * length * n]
+    step, tables = rest[2 * length * n : 3 * length * n], rest[3 * length * n :]
+    room, price = tables[: length * m], tables[length * m : 2 * length * m]
+    short, goal = tables[2 * length * m : 3 * length * m], tables[3 * length * m : 4 * length * m]
+    room_step = tables[4 * length * m : 5 * length * m]
+    price_step, work = tables[5 * length * m : 6 * length * m], tables[6 * length * m :]
     size = 0.0
     for i in range(length * block):
         size += slopes[i] * slopes[i]
-    size = max(size / (length * n), 1e-30)
+    size = max(size / (length * n), FLAT)
     for t in range(length):
-        slope = slopes[t * block : (t + 1) * block]
+        slope, own = slopes[t * block : (t + 1) * block], hessian[t * block : (t + 1) * block]
         for i in range(n):
             for j in range(n):
                 total = 0.0
                 for k in range(n):
                     total += slope[k * n + i] * slope[k * n + j]
-                hessian[t * block + i * n + j] = total / size
-            hessian[t * block + i * n + i] += 1e-9  # where nothing pulls, stay
+                own[i * n + j] = total / size
+            own[i * n + i] += STAYS
         for i in range(n):
-            wished[t, i] = 0.0
+            wished[t * n + i] = 0.0
             for k in range(n):
-                wished[t, i] += slope[k * n + i] * errors[t, k] / size
-                wished[t, i] += hessian[t * block + i * n + k] * nominal[t, k]
+                wished[t * n + i] += slope[k * n + i] * errors[t * n + k] / size
+                wished[t * n + i] += own[i * n + k] * nominal[t * n + k]
     for t in range(length):
         for k in range(n):
-            p[t, k] = nominal[t, k]
+            p[t * n + k] = nominal[t * n + k]
         for i in range(m):
-            left = rows[i, 1] - weighed(rows[i], before if t == 0 else p[t - 1], p[t])
-            room[t, i] = max(left, ROOM)
-            price[t, i] = ROOM
+            row = rows[i * width : (i + 1) * width]
+            room[t * m + i] = max(row[1] - weighed_at(n, row, before, p, t), ROOM)
+            price[t * m + i] = ROOM
     for taken in range(MOST_STEPS):
-        gap = 0.0
-        amiss = 0.0
+        gap, amiss = 0.0, 0.0
         for t in range(length):
             for k in range(n):
-                right[t, k] = wished[t, k]
-            applied(n, hessian[t * block : (t + 1) * block], p[t], -1.0, right[t])
+                right[t * n + k] = wished[t * n + k]
+            curved = hessian[t * block : (t + 1) * block]
+            applied(n, curved, p[t * n : (t + 1) * n], -1.0, right[t * n : (t + 1) * n])
         for t in range(length):
             for i in range(m):
-                now = weighed(rows[i], before if t == 0 else p[t - 1], p[t])
-                short[t, i] = now + room[t, i] - rows[i, 1]
-                amiss = max(amiss, abs(short[t, i]))
-                gap += room[t, i] * price[t, i]
+                limit, at = rows[i * width : (i + 1) * width], t * m + i
+                short[at] = weighed_at(n, limit, before, p, t) + room[at] - limit[1]
+                amiss = max(amiss, abs(short[at]))
+                gap += room[at] * price[at]
                 for k in range(n):
-                    right[t, k] -= price[t, i] * rows[i, 2 + k]
-                    if t > 0 and rows[i, 0] > 0.0:
-                        right[t - 1, k] += price[t, i] * rows[i, 2 + k]
+                    right[t * n + k] -= price[at] * limit[2 + k]
+                    if t > 0 and limit[0] > 0.0:
+                        right[(t - 1) * n + k] += price[at] * limit[2 + k]
         gap /= length * m
         if gap <= CLOSED and amiss * amiss <= CLOSED:
             return taken
-        factored(rows, hessian, room, price, off, factors, work)
-        for t in range(length):
-            for i in range(m):
-                goal[t, i] = 0.0
+        factored(n, rows, hessian, room, price, off, factors, work)
+        for i in range(length * m):
+            goal[i] = 0.0
         moved(
-            rows, factors, off, right, step, room, price, goal, room_step, price_step, short, work
+            n,
+            rows,
+            factors,
+            off,
+            right,
+            step,
+            room,
+            price,
+            goal,
+            room_step,
+            price_step,
+            short,
+            work,
         )
         share, dear = furthest(room, room_step), furthest(price, price_step)
         then = 0.0
-        for t in range(length):
-            for i in range(m):
-                then += (room[t, i] + share * room_step[t, i]) * (
-                    price[t, i] + dear * price_step[t, i]
-                )
+        for i in range(length * m):
+            then += (room[i] + share * room_step[i]) * (price[i] + dear * price_step[i])
         then = then / (length * m) / gap
         centre = gap * then * then * then
-        for t in range(length):
-            for i in range(m):
-                goal[t, i] = (centre - room_step[t, i] * price_step[t, i]) / room[t, i]
+        for i in range(length * m):
+            goal[i] = (centre - room_step[i] * price_step[i]) / room[i]
         moved(
-            rows, factors, off, right, step, room, price, goal, room_step, price_step, short, work
+            n,
+            rows,
+            factors,
+            off,
+            right,
+            step,
+            room,
+            price,
+            goal,
+            room_step,
+            price_step,
+            short,
+            work,
         )
         share = 0.99 * min(furthest(room, room_step), furthest(price, price_step))
         size = 0.0
-        for t in range(length):
-            for k in range(n):
-                size += abs(step[t, k])
+        for i in range(length * n):
+            size += abs(step[i])
         if not size < np.inf:  # as near as rounding lets it come
             return taken
-        for t in range(length):
-            for k in range(n):
-                p[t, k] += share * step[t, k]
-            for i in range(m):
-                room[t, i] += share * room_step[t, i]
-                price[t, i] += share * price_step[t, i]
+        for i in range(length * n):
+            p[i] += share * step[i]
+        for i in range(length * m):
+            room[i] += share * room_step[i]
+            price[i] += share * price_step[i]
     return MOST_STEPS

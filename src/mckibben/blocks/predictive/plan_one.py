@@ -12,6 +12,8 @@ from __future__ import annotations
 from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
 
+SINGLE = {"STAYING": 1e-6}
+
 STAYING = 1e-6
 """Share of the mean squared slope by which pressures stay where no slope holds them."""
 
@@ -32,35 +34,35 @@ def plan_one(
     p: Array,
     scratch: Array,
 ) -> None:
-    """Find the pressures of a horizon, shape (N, 1), from the one before it.
+    """Find the pressures of a horizon, shape (N,), from the one before it.
 
-    Arguments are those of `mckibben.blocks.predictive.plan.plan`.
+    Arguments are those of `mckibben.blocks.predictive.plan.plan`, of one muscle.
     """
-    length = p.shape[0]
+    length, m = p.size, rows.size // 3
     most = 4 * length + 2
     x, d, best = scratch[:most], scratch[most : 2 * most], scratch[2 * most :]
     low, high = -1e30, 1e30
-    for i in range(rows.shape[0]):
-        end = rows[i, 1] / rows[i, 2]
-        if not rows[i, 0] > 0.0:
-            if rows[i, 2] > 0.0:
+    for i in range(m):
+        end = rows[3 * i + 1] / rows[3 * i + 2]
+        if not rows[3 * i] > 0.0:
+            if rows[3 * i + 2] > 0.0:
                 high = min(high, end)
             else:
                 low = max(low, end)
-    fall = rise = high - low
-    for i in range(rows.shape[0]):
-        if rows[i, 0] > 0.0:
-            if rows[i, 2] > 0.0:
-                rise = min(rise, rows[i, 1] / rows[i, 2])
+    fall, rise = high - low, high - low
+    for i in range(m):
+        if rows[3 * i] > 0.0:
+            if rows[3 * i + 2] > 0.0:
+                rise = min(rise, rows[3 * i + 1] / rows[3 * i + 2])
             else:
-                fall = min(fall, -rows[i, 1] / rows[i, 2])
+                fall = min(fall, -rows[3 * i + 1] / rows[3 * i + 2])
     size = 0.0
     for t in range(length):
         size += slopes[t] * slopes[t]
     staying = STAYING * max(size / length, STAYING)
     count = 2
     x[0], x[1] = low, high
-    d[0] = d[1] = 0.0
+    d[0], d[1] = 0.0, 0.0
     for t in range(length - 1, -1, -1):
         if t + 1 < length:
             place, at = turned(count, x, d, low, high, best, t + 1)
@@ -76,15 +78,15 @@ def plan_one(
             x[place + 3], d[place + 3] = least + fall, over
             count += 4
         weight = slopes[t] * slopes[t] + staying
-        wished = weight * nominal[t, 0] + slopes[t] * errors[t, 0]
+        wished = weight * nominal[t] + slopes[t] * errors[t]
         for i in range(count):
             d[i] += weight * x[i] - wished
-    turned(count, x, d, low, high, best, 0)
+    _, _ = turned(count, x, d, low, high, best, 0)
     last = before[0]
     for t in range(length):
         near = min(max(best[t], last - fall), last + rise)
         last = min(max(near, low), high)
-        p[t, 0] = last
+        p[t] = last
 
 
 @kernel

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt, Interval, Le
@@ -21,31 +21,31 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.block import Block, Run, Start
 from mckibben.blocks.core.commanding import drives
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector
-from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.kernels import Step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.saving import nested
-from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
-from mckibben.blocks.predictive.memory import memory_of, undoing
+from mckibben.blocks.predictive.horizon import (
+    PASSES,
+    STILL,
+    horizon_scratch,
+    kernels_of,
+    plan_for_one,
+)
+from mckibben.blocks.predictive.memory import memory_of, resume_of, undoing
 from mckibben.blocks.predictive.plan import MOST_STEPS, plan, plan_scratch
-from mckibben.blocks.predictive.plan_one import one_scratch, plan_one
+from mckibben.blocks.predictive.plan_one import one_scratch
 from mckibben.blocks.predictive.supply import allowed, limit_rows
 from mckibben.errors import ModelError
-
-PASSES = 2
-"""Times that a plan is made, each along what the model makes of the one before."""
+from mckibben.system.compiling import bound
 
 NUDGE = 1e-3
 """Of the pressure range: by how much pressures are moved to see the model's slope."""
-
-STILL = 0.1
-"""Of that: what moves less counts as going on as before."""
 
 MOST = 1e6
 """Of limits: bar, or bar/s."""
@@ -187,43 +187,43 @@ class Predictive(Block):
     @property
     def n_scratch(self) -> int:
         """States to try, pressures, slopes, and what a plan computes in."""
-        n, length = len(self.outputs), self.horizon
-        tried = 3 * self.undone.n_states + self.undone.n_scratch
-        tried += self.compensator.n_states + self.compensator.n_scratch
-        planned = one_scratch(length) if n == 1 else plan_scratch(length, n, len(self.rows(1.0)))
-        return tried + len(self.inputs) + 3 * n + length * n * (4 + n) + planned
+        rows = len(self.rows(1.0))
+        return horizon_scratch(self.undone, self.compensator, self.horizon, rows)
+
+    @cached_property
+    def _kernels(self) -> tuple[Step, Start] | None:
+        """Those of a compensator of one kernel; None where it is of several."""
+        resume = resume_of(self.compensator)
+        if resume is None or not isinstance(self.compensator.start, str):
+            return None
+        (undo_step, undo_start), (model_step, _) = self.compensator.c_kernels, self.undone.c_kernels
+        one = len(self.outputs) == 1
+        return kernels_of(model_step, undo_step, undo_start, resume, one=one)
+
+    @property
+    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
+        """Those that look ahead with the compensator's."""
+        return self._kernels or ()
 
     def c_numbers(self, sample_time: float | None) -> Array:
-        """Return what the C reads, as its header says.
+        """Return the coefficients that `mckibben.blocks.predictive.horizon` names.
 
         Raises
         ------
         ModelError
-            If the compensator is of no family whose C can be run ahead.
+            If the compensator is of several kernels, which C does not run ahead.
         """
-        match self.compensator:
-            case Inverse(forward=PI()):
-                which = 0
-            case Inverse(forward=GPI()):
-                which = 1
-            case Balance():
-                which = 2
-            case _:
-                raise ModelError(
-                    f"{self.compensator.title!r} cannot be run ahead in C. Remedy: export pi, gpi or "
-                    "balance, or stream this one from Python."
-                )
-        if not isinstance(self.compensator.start, str):
+        if self._kernels is None:
             raise ModelError(
-                f"{self.compensator.title!r} starts from a given state, which C does "
-                "not. Remedy: invert a model that starts at its first sample."
+                f"{self.compensator.title!r} cannot be run ahead in C. Remedy: export pi, gpi or "
+                "balance that starts at its first sample, or stream this one from Python."
             )
         rows = self.rows(needs_sample_time(self.kind, sample_time))
         low, high = self.pressures
         own = self.undone.c_numbers(sample_time), self.compensator.c_numbers(sample_time)
         blocks = (self.undone, self.compensator)
-        head = [which, self.horizon, len(low), len(rows), *(block.n_states for block in blocks)]
-        head += [*map(len, own), *(block.n_scratch for block in blocks), PASSES]
+        head = [len(low), self.horizon, len(rows), *(block.n_states for block in blocks)]
+        head += map(len, own)
         return np.concatenate([head, NUDGE * (high - low), low, rows.ravel(), *own])
 
     @property
@@ -243,8 +243,11 @@ class Predictive(Block):
         return Cost(length * inverse, length * (inverse + answers + planned))
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        step = needs_sample_time(self.kind, sample_time)
-        horizon = _Horizon(self, step, state)
+        """Return a function that looks ahead at every sample."""
+        if self._kernels is not None:
+            numbers, scratch = self.c_numbers(sample_time), np.zeros(self.n_scratch)
+            return bound(self._kernels[0].batch, numbers, state, scratch, inputs, outputs)
+        horizon = _Horizon(self, needs_sample_time(self.kind, sample_time), state)
 
         def run() -> None:
             for t in range(len(inputs)):
@@ -259,7 +262,7 @@ class Predictive(Block):
 
 
 class _Horizon:
-    """What a predictive compensator computes in, bound to its state."""
+    """What a compensator of several kernels computes in, bound to its state."""
 
     def __init__(self, block: Predictive, sample_time: float, state: Array) -> None:
         model, undo = block.undone, block.compensator
@@ -295,7 +298,7 @@ class _Horizon:
         self.invert()
         if first:  # whatever the rate
             self.before[:] = self.inverted[0]
-            allowed(self.rows[self.rows[:, 0] == 0.0], self.lowest, self.before)
+            allowed(self.rows[self.rows[:, 0] == 0.0].ravel(), self.lowest, self.before)
             self.started[0] = 1.0
         pressures = self.inverted.copy()
         if not self._kept_to(pressures):
@@ -311,7 +314,7 @@ class _Horizon:
         """Clip pressures of a horizon to all limits, in turn; tell whether they kept to them."""
         there, before = True, self.before
         for row in pressures:
-            there = allowed(self.rows, before, row) and there
+            there = allowed(self.rows.ravel(), before, row) and there
             before = row
         return there
 
@@ -320,9 +323,12 @@ class _Horizon:
         pressures = self.inverted
         for _ in range(PASSES):
             self._linearised(pressures)
-            slopes = self.slopes.reshape(-1)
-            given = (self.rows, self.before, slopes, pressures, self.errors)
-            (plan_one if self.n == 1 else plan)(*given, self.planning, self.scratch)
+            slopes, nominal, errors, planned = (
+                table.reshape(-1) for table in (self.slopes, pressures, self.errors, self.planning)
+            )
+            given = (slopes, nominal, errors, planned, self.scratch)
+            planner = plan_for_one if self.n == 1 else plan
+            planner(self.n, self.rows.ravel(), self.before, *given)
             pressures = self.planning.copy()
             self._kept_to(pressures)
         return pressures

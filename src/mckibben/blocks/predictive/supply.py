@@ -11,10 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
-
-SLACK = 1e-9
-"""In bar: what passes a limit by less is rounding."""
+from mckibben.blocks.core.kernels import SLACK, kernel
 
 
 def limit_rows(
@@ -63,6 +60,15 @@ def weighed(row: Array, before: Array, p: Array) -> float:
 
 
 @kernel
+def weighed_at(n: int, row: Array, before: Array, p: Array, t: int) -> float:
+    """Return the weighted sum that a row limits, of sample t of pressures, n a sample."""
+    now = p[t * n : (t + 1) * n]
+    if t == 0:
+        return weighed(row, before, now)
+    return weighed(row, p[(t - 1) * n : t * n], now)
+
+
+@kernel
 def own_place(row: Array) -> int:
     """Return the muscle that a row is of, or -1 if of several."""
     found = -1
@@ -76,29 +82,32 @@ def own_place(row: Array) -> int:
 
 @kernel
 def allowed(rows: Array, before: Array, p: Array) -> bool:
-    """Move pressures to where they may go from those before; tell whether they already were there.
+    """Move pressures to where they may go from those before; return whether they were there already.
 
     Each goes to its own limits; what the supply cannot give is taken from all changes in one share.
+    ``rows`` are limits in a row.
     """
-    there = True
-    for changes in (1, 0):  # the range is what counts in the end
-        for i in range(rows.shape[0]):
-            k = own_place(rows[i])
-            if k >= 0 and int(rows[i, 0]) == changes:
-                over = weighed(rows[i], before, p) - rows[i, 1]
+    there, width = True, p.size + 2
+    m = rows.size // width
+    for turn in range(2):  # changes first: the range is what counts in the end
+        for i in range(m):
+            row = rows[i * width : (i + 1) * width]
+            k = own_place(row)
+            if k >= 0 and int(row[0]) == 1 - turn:
+                over = weighed(row, before, p) - row[1]
                 if over > 0.0:
-                    p[k] -= over / rows[i, 2 + k]
+                    p[k] -= over / row[2 + k]
                     there = there and over <= SLACK
     share = 1.0
-    for i in range(rows.shape[0]):
-        if own_place(rows[i]) < 0:
-            now = weighed(rows[i], before, p)
-            was = weighed(rows[i], before, before)
-            if now > rows[i, 1]:
-                there = there and now - rows[i, 1] <= SLACK
+    for i in range(m):
+        limit = rows[i * width : (i + 1) * width]
+        if own_place(limit) < 0:
+            now, was = weighed(limit, before, p), weighed(limit, before, before)
+            if now > limit[1]:
+                there = there and now - limit[1] <= SLACK
                 if now > was:
-                    share = min(share, max(rows[i, 1] - was, 0.0) / (now - was))
+                    share = min(share, max(limit[1] - was, 0.0) / (now - was))
     if share < 1.0:
-        for k in range(p.size):
-            p[k] = before[k] + share * (p[k] - before[k])
+        for i in range(p.size):
+            p[i] = before[i] + share * (p[i] - before[i])
     return there

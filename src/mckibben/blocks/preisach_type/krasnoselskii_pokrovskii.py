@@ -18,20 +18,18 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state
-from mckibben.blocks.core.solved_inverse import Solved, solve_samples
+from mckibben.blocks.core.solved_inverse import Solved, solve_sample, solved_start
 from mckibben.blocks.preisach_type.grid import TriangularGrid
 
 
@@ -68,8 +66,8 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
     return y
 
 
-@kernel
-def krasnoselskii_pokrovskii_kernel(
+@step
+def krasnoselskii_pokrovskii_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Run the model; coefficients are [number of intervals, offset, levels, weights].
@@ -78,20 +76,39 @@ def krasnoselskii_pokrovskii_kernel(
     """
     n = int(coefficients[0])
     weights = coefficients[3 + n :]
-    for t in range(inputs.shape[0]):
-        _advance(inputs[t, 0], coefficients, state)
-        y = coefficients[1]
-        for k in range(weights.size):
-            y += weights[k] * state[k]
-        outputs[t, 0] = y
+    _advance(inputs[0], coefficients, state)
+    y = coefficients[1]
+    for k in range(weights.size):
+        y += weights[k] * state[k]
+    outputs[0] = y
 
 
-@kernel
-def krasnoselskii_pokrovskii_inverse_kernel(
+@step
+def krasnoselskii_pokrovskii_inverse_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
     """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
-    solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
+    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
+
+
+@kernel
+def krasnoselskii_pokrovskii_start(
+    coefficients: Array, state: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start on the rising ridges, or half-way between the ridges."""
+    n = int(coefficients[0])
+    levels = coefficients[2 : 3 + n]
+    place = 0
+    for i in range(n):
+        least = _ramp(inputs[0], levels, i)
+        for j in range(i + 1):
+            most = _ramp(inputs[0], levels, j) if virgin else least
+            state[place] = 0.5 * (least + most)
+            place += 1
+    state[place] = inputs[0]
+
+
+krasnoselskii_pokrovskii_inverse_start = solved_start(_trial, krasnoselskii_pokrovskii_start)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -115,8 +132,10 @@ class KrasnoselskiiPokrovskii(TriangularGrid, Solved):
     """
 
     kind: ClassVar[str] = "krasnoselskii-pokrovskii"
-    kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_kernel
-    inverse_kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_inverse_kernel
+    kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_step
+    start_kernel: ClassVar[Start] = krasnoselskii_pokrovskii_start
+    inverse_kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_inverse_step
+    inverse_start_kernel: ClassVar[Start] = krasnoselskii_pokrovskii_inverse_start
     parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
     notation: ClassVar[Notation] = Notation(
         r"y = y_0 + \sum_{j \le i} w_{ij} s_{ij}",
@@ -140,16 +159,6 @@ class KrasnoselskiiPokrovskii(TriangularGrid, Solved):
     def n_states(self) -> int:
         """Operators and the previous input."""
         return len(self.weights) + 1
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [operators, first input]."""
-        start = self.initial if initial is None else initial
-        if not isinstance(start, str):
-            return explicit_state(self, start)
-        rising, falling = np.tril_indices(len(self.levels) - 1)
-        ramps = np.clip((first[0] - np.array(self.levels[:-1])) / np.diff(self.levels), 0.0, 1.0)
-        high = ramps[rising] if start == "first_sample" else ramps[falling]
-        return np.array([*(0.5 * (ramps[rising] + high)), first[0]])
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [number of intervals, offset, levels, weights]."""

@@ -24,7 +24,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
@@ -35,9 +35,9 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state
+from mckibben.blocks.core.solved_inverse import solved_start
 from mckibben.blocks.preisach_type.grid import TriangularGrid
 from mckibben.errors import ModelError
 
@@ -78,8 +78,8 @@ def _solve(target: float, other: float, rising: bool, levels: Array, table: Arra
     n = levels.size
     j, _ = _place(other, levels)
     near, near_e = other, 0.0
-    for step in range(n):
-        k = j + 1 + step if rising else j - step
+    for i in range(n):
+        k = j + 1 + i if rising else j - i
         if k < 0 or k >= n:
             break
         far = levels[k]
@@ -94,15 +94,22 @@ def _solve(target: float, other: float, rising: bool, levels: Array, table: Arra
     return near
 
 
-# The state is [depth, direction, lowest level's output, turning points, outputs at them]; the first
+# The state is [depth, direction, turning points, outputs at them, last input, last output]; the first
 # turning point is the lowest level, from which everything has risen.
+CORNERS, OUTPUTS = 2, 2 + DEPTH
+LAST, LAST_OUTPUT = 2 + 2 * DEPTH, 3 + 2 * DEPTH
+CLIPPED = 4 + 2 * DEPTH
+"""Places in the state, and behind it in that of the inverse."""
+
+SWINGS = DEPTH // 2 - 2
+"""From end to end, before a virgin start."""
 
 
 @kernel
 def _output(u: float, state: Array, levels: Array, table: Array) -> float:
     """Return the output at ``u``, within the last two turning points."""
     top = int(state[0]) - 1
-    corner, y = state[2 + top], state[2 + DEPTH + top]
+    corner, y = state[CORNERS + top], state[OUTPUTS + top]
     if u == corner:
         return y
     if state[1] > 0.0:
@@ -111,92 +118,90 @@ def _output(u: float, state: Array, levels: Array, table: Array) -> float:
 
 
 @kernel
-def _move(u: float, state: Array, levels: Array, table: Array, last: float, y: float) -> float:
-    """Move from input ``last`` and output ``y`` to ``u``, and return the output there."""
-    if u == last:
-        return y
-    going = 1.0 if u > last else -1.0
+def _turn(going: float, state: Array) -> None:
+    """Remember the last sample as a turning point, if the input turns there."""
     if going != state[1]:
         depth = int(state[0])
         if depth == DEPTH:
             depth -= 2
-        state[2 + depth], state[2 + DEPTH + depth] = last, y
+        state[CORNERS + depth], state[OUTPUTS + depth] = state[LAST], state[LAST_OUTPUT]
         state[0], state[1] = depth + 1.0, going
+
+
+@kernel
+def _visit(wanted: float, c: Array, state: Array) -> None:
+    """Move to an input, or to the first or last level if it is beyond."""
+    n = int(c[0])
+    levels, table = c[1 : 1 + n], c[1 + n : 1 + n + n * n]
+    u = min(max(wanted, levels[0]), levels[n - 1])
+    if u == state[LAST]:
+        return
+    going = 1.0 if u > state[LAST] else -1.0
+    _turn(going, state)
     while state[0] >= 3.0:
-        before = state[2 + int(state[0]) - 2]
+        before = state[CORNERS + int(state[0]) - 2]
         if (u - before) * going < 0.0:
             break
-        state[0] -= 2.0
-    return _output(u, state, levels, table)
+        state[0] -= 2.0  # a loop is closed, and wiped out
+    state[LAST], state[LAST_OUTPUT] = u, _output(u, state, levels, table)
 
 
-@kernel
-def preisach_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; coefficients are [number of levels, levels, Everett table].
+@step
+def preisach_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; coefficients are [number of levels, levels, Everett table, offset]."""
+    _visit(inputs[0], coefficients, state)
+    outputs[0] = state[LAST_OUTPUT]
 
-    The state is [depth, direction, turning points, outputs at them, last input, last output].
-    """
+
+@step
+def preisach_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Invert in closed form; the state's last number counts samples clipped."""
     n = int(coefficients[0])
     levels, table = coefficients[1 : 1 + n], coefficients[1 + n : 1 + n + n * n]
-    last, y = state[2 + 2 * DEPTH], state[3 + 2 * DEPTH]
-    for t in range(inputs.shape[0]):
-        u = min(max(inputs[t, 0], levels[0]), levels[n - 1])
-        y = _move(u, state, levels, table, last, y)
-        last = u
-        outputs[t, 0] = y
-    state[2 + 2 * DEPTH], state[3 + 2 * DEPTH] = last, y
-
-
-@kernel
-def preisach_inverse_kernel(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
-    """Invert in closed form; coefficients as forward, the state's last number counts samples clipped."""
-    n = int(coefficients[0])
-    levels, table = coefficients[1 : 1 + n], coefficients[1 + n : 1 + n + n * n]
-    last, y = state[2 + 2 * DEPTH], state[3 + 2 * DEPTH]
-    bottom = state[2 + DEPTH]
+    bottom = state[OUTPUTS]
     size = 2.0 * table[(n - 1) * n]
-    for t in range(inputs.shape[0]):
-        wanted = inputs[t, 0]
-        target = min(max(wanted, bottom), bottom + size)
-        if abs(target - wanted) > 1e-9 * size:
-            state[4 + 2 * DEPTH] += 1.0
-        if abs(target - y) > 1e-14 * size:
-            going = 1.0 if target > y else -1.0
-            depth = int(state[0])
-            if going != state[1]:
-                if depth == DEPTH:
-                    depth -= 2
-                state[2 + depth], state[2 + DEPTH + depth] = last, y
-                depth += 1
-                state[1] = going
-            while depth >= 3 and (target - state[2 + DEPTH + depth - 2]) * going >= 0.0:
-                depth -= 2
-            state[0] = float(depth)
-            corner, y_corner = state[2 + depth - 1], state[2 + DEPTH + depth - 1]
-            last = _solve(0.5 * abs(target - y_corner), corner, going > 0.0, levels, table)
-            last = min(max(last, levels[0]), levels[n - 1])
-            y = target
-        outputs[t, 0] = last
-    state[2 + 2 * DEPTH], state[3 + 2 * DEPTH] = last, y
+    target = min(max(inputs[0], bottom), bottom + size)
+    if abs(target - inputs[0]) > SLACK * size:
+        state[CLIPPED] += 1.0
+    if abs(target - state[LAST_OUTPUT]) > ROUNDING * size:
+        going = 1.0 if target > state[LAST_OUTPUT] else -1.0
+        _turn(going, state)
+        while state[0] >= 3.0 and (target - state[OUTPUTS + int(state[0]) - 2]) * going >= 0.0:
+            state[0] -= 2.0
+        top = int(state[0]) - 1
+        half = 0.5 * abs(target - state[OUTPUTS + top])
+        u = _solve(half, state[CORNERS + top], going > 0.0, levels, table)
+        state[LAST] = min(max(u, levels[0]), levels[n - 1])
+        state[LAST_OUTPUT] = target
+    outputs[0] = state[LAST]
 
 
-def checked_memory(state: Array, kind: str) -> Array:
-    """Return a memory after checking that its depth and direction can be ones.
+@kernel
+def preisach_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as if the input had risen from the lowest level to the first one, or swung ever less."""
+    n = int(coefficients[0])
+    low, high, offset = coefficients[1], coefficients[n], coefficients[1 + n + n * n]
+    state[:] = 0.0
+    state[0], state[1] = 1.0, 1.0
+    state[CORNERS], state[OUTPUTS] = low, offset
+    state[LAST], state[LAST_OUTPUT] = low, offset
+    if virgin:
+        middle = min(max(inputs[0], low), high)
+        for k in range(SWINGS):
+            share = 1.0 - k * (1.0 / (SWINGS - 1))
+            _visit(middle + share * (high - middle), coefficients, state)
+            _visit(middle + share * (low - middle), coefficients, state)
+    _visit(inputs[0], coefficients, state)
 
-    Raises
-    ------
-    ModelError
-        If they cannot: they say where in the memory to go on.
-    """
-    depth, direction = state[0], state[1]
-    if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
-        raise ModelError(
-            f"the memory of {kind!r} has depth {depth:g} and direction {direction:g}. Remedy: give a "
-            f"depth of 1 to {DEPTH}, a direction of 1 or -1, or 'first_sample'."
-        )
-    return state
+
+@kernel
+def _first_output(u: float, memory: tuple[Array, Array]) -> float:
+    """Return the output at an input that the memory has been started with."""
+    _, state = memory
+    return state[LAST_OUTPUT]
+
+
+preisach_inverse_start = solved_start(_first_output, preisach_start, 1)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -222,8 +227,10 @@ class Preisach(TriangularGrid):
     """
 
     kind: ClassVar[str] = "preisach"
-    kernel: ClassVar[Kernel] = preisach_kernel
-    inverse_kernel: ClassVar[Kernel] = preisach_inverse_kernel
+    kernel: ClassVar[Kernel] = preisach_step
+    start_kernel: ClassVar[Start] = preisach_start
+    inverse_kernel: ClassVar[Kernel] = preisach_inverse_step
+    inverse_start_kernel: ClassVar[Start] = preisach_inverse_start
     parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
     notation: ClassVar[Notation] = Notation(
         r"y = y_0 + \sum_{j \le i} w_{ij} \left(1 + R_{ij}[u]\right)",
@@ -257,33 +264,26 @@ class Preisach(TriangularGrid):
         return np.tril(found, -1)
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the memory before the first sample."""
-        start = self.initial if initial is None else initial
-        low, high = self.input_range
-        if start == "first_sample":
-            way = [first[0]]
-        elif start == "virgin":
-            share = np.linspace(1.0, 0.0, DEPTH // 2 - 2)
-            middle = float(np.clip(first[0], low, high))
-            ends = np.array([high, low])
-            way = [middle + part * (end - middle) for part in share for end in ends]
-        else:
-            return checked_memory(explicit_state(self, start), self.kind)
-        state = np.zeros(self.n_states)
-        state[0], state[1], state[2], state[2 + DEPTH] = 1.0, 1.0, low, self.offset
-        state[2 + 2 * DEPTH], state[3 + 2 * DEPTH] = low, self.offset
-        inputs = np.array(way)[:, np.newaxis]
-        preisach_kernel(self.coefficients(None), state, inputs, np.empty_like(inputs))
+        """Return the memory before the first sample.
+
+        Raises
+        ------
+        ModelError
+            If one given has a depth or direction that cannot be: they say where in it to go on.
+        """
+        state = super().initial_state(first, initial)
+        depth, direction = state[0], state[1]
+        if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
+            raise ModelError(
+                f"the memory of {self.kind!r} has depth {depth:g} and direction {direction:g}. Remedy: "
+                f"give a depth of 1 to {DEPTH}, a direction of 1 or -1, or 'first_sample'."
+            )
         return state
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [number of levels, levels, Everett table]."""
+        """Return [number of levels, levels, Everett table, offset]."""
         del sample_time
-        return np.array([len(self.levels), *self.levels, *self.table().ravel()])
-
-    def c_numbers(self, sample_time: float | None) -> Array:
-        """Return the coefficients, then the offset."""
-        return np.array([*self.coefficients(sample_time), self.offset])
+        return np.array([len(self.levels), *self.levels, *self.table().ravel(), self.offset])
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what it costs to find the place of an input in the table."""
@@ -307,10 +307,6 @@ class Preisach(TriangularGrid):
                 "'preisach' has no inverse: its weights must not be negative, and positive on the "
                 "diagonal. Remedy: identify it with nonnegative=true."
             )
-
-    def inverse_numbers(self, own: Array) -> Array:
-        """Return those of this model."""
-        return own
 
     @classmethod
     def example(cls) -> Self:

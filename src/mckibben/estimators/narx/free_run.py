@@ -104,7 +104,7 @@ class FreeRuns:
 
     def outputs(self, model: Narx) -> Array:
         """Return the outputs over all stretches, whether they count or not, shape (n,)."""
-        run, coefficients = type(model).kernel, model.coefficients(self.sample_time)
+        run, coefficients = model.kernel.batch, model.coefficients(self.sample_time)
         outputs = np.empty((self.counts.size, 1))
         stop = 0
         for piece in self.pieces:

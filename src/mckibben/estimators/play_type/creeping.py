@@ -18,7 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel, vector
 from mckibben.blocks.core.running import run_many
-from mckibben.blocks.dynamic.creep import Creep, creep_kernel
+from mckibben.blocks.dynamic.creep import Creep, creep_step
 from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
@@ -235,7 +235,7 @@ def with_creep(
         state = np.full(len(taus), columns[0, k])
         given = np.ascontiguousarray(columns[:, k : k + 1])
         out = np.empty_like(given)
-        creep_kernel(coefficients, state, given, out)
+        creep_step.batch(coefficients, state, given, out)
         crept[:, k] = out[:, 0]
     return crept
 

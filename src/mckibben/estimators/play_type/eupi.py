@@ -12,7 +12,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import vector
 from mckibben.blocks.play_type.eupi import EUPI, eupi_matrix
-from mckibben.blocks.play_type.memory import named_state
+from mckibben.blocks.play_type.memory import started
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.output_maps import PolynomialMap
@@ -62,7 +62,7 @@ class EUPIEstimator(SeparableEstimator):
         x = np.ascontiguousarray(run.history - low)
         radii = self.radii(data)
         operators = np.empty((x.size, radii.size))
-        state = named_state(self.starting_rule, radii, x[0], x[0])
+        state = started(radii, x[0], x[0], self.starting_rule)
         eupi_matrix(x, theta[0], theta[1], radii, state, operators)
         return np.column_stack([CUBIC.pieces(x / (high - low)), operators])
 

@@ -17,7 +17,7 @@ from mckibben.blocks.play_type.envelopes.exponential import Exponential
 from mckibben.blocks.play_type.envelopes.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.play_type.envelopes.tanh import Tanh
 from mckibben.blocks.play_type.gpi import GPI, gpi_matrix, smallest_gap
-from mckibben.blocks.play_type.memory import named_state
+from mckibben.blocks.play_type.memory import started
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.play_type.thresholds import spread
@@ -166,7 +166,7 @@ def gpi_operators(u: Array, rising: Envelope, falling: Envelope, radii: Array, r
     u = np.ascontiguousarray(u)
     up, down = rising(u), falling(u)
     operators = np.empty((u.size, radii.size))
-    gpi_matrix(u, up, down, radii, named_state(rule, radii, up[0], down[0]), operators)
+    gpi_matrix(u, up, down, radii, started(radii, up[0], down[0], rule), operators)
     return operators
 
 

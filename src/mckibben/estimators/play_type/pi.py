@@ -12,7 +12,7 @@ from annotated_types import Len
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import vector
-from mckibben.blocks.play_type.memory import named_state
+from mckibben.blocks.play_type.memory import started
 from mckibben.blocks.play_type.pi import PI
 from mckibben.blocks.play_type.play import play_matrix
 from mckibben.errors import ModelError
@@ -115,7 +115,7 @@ SHORTEST = 0.02
 def play_operators(u: Array, radii: Array, rule: str) -> Array:
     """Return play operators side by side over an input, shape (n, N)."""
     operators = np.empty((u.size, radii.size))
-    play_matrix(np.ascontiguousarray(u), radii, named_state(rule, radii, u[0], u[0]), operators)
+    play_matrix(np.ascontiguousarray(u), radii, started(radii, u[0], u[0], rule), operators)
     return operators
 
 

@@ -1,55 +1,40 @@
-"""What a primitive of C needs to know of a block: its numbers, its sizes, and how it starts.
-
-A block says all of it itself, see `mckibben.blocks.core.exportable`.
-"""
+"""What the C of a block needs: its kernels, its numbers, and how it starts."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.errors import ModelError
-
-PRIMITIVES = Path(__file__).parent / "primitives"
-
-RULES = {
-    "first_sample": "MCK_FIRST_SAMPLE",
-    "virgin": "MCK_VIRGIN",
-    "fitted": "MCK_FIRST_SAMPLE",
-}
-"""Starting memories, by what C calls them; no outputs are known there to fit one to."""
+from mckibben.export.c.language import Kernel
 
 
 @dataclass(frozen=True)
 class Part:
-    """A block that is one primitive of C.
+    """A block that is a step and, where it has memory, a start.
 
     Parameters
     ----------
     block : Block
         What it is.
-    function : str
-        Start of its functions' names, behind ``mck_``.
-    source : Path
-        Where its C is; the header is beside it.
     coefficients : array
-        Numbers, in the order that the header says.
-    rule : str
-        Macro of its starting memory.
+        What its kernels read.
+    virgin : bool
+        Whether it starts as if nothing had happened before.
     state : array or None
         The starting memory itself, where the model gives it.
+    kernels : tuple of callable
+        Those of a step, and of the start if it has memory, from which its C is translated.
     """
 
     block: Block
-    function: str
-    source: Path
     coefficients: Array
-    rule: str
+    virgin: bool
     state: Array | None
+    kernels: tuple[Kernel, ...]
 
 
 def check_single(block: Block) -> None:
@@ -79,18 +64,15 @@ def part_of(block: Block, sample_time: float | None) -> Part:
     Raises
     ------
     ModelError
-        If no C has been written for it.
+        If it has no kernel of a start.
     """
-    beside = block.c_file
-    sources = [path for path in (PRIMITIVES / beside.name, beside) if path.is_file()]
-    if not sources:
+    if not block.c_kernels:
         raise ModelError(
-            f"{block.title!r} has no C. Remedy: write {beside.name} and its header beside the block, as "
-            "those of the package are."
+            f"{block.title!r} has no C. Remedy: declare a start_kernel beside its kernel, as blocks of "
+            "the package do."
         )
-    function, start = block.title.replace("-", "_"), block.start
-    explicit = None
+    start, given = block.start, None
     if not isinstance(start, str):
-        explicit, start = block.initial_state(np.zeros(len(block.inputs))), "first_sample"
+        given = block.initial_state(np.zeros(len(block.inputs)))
     numbers = block.c_numbers(sample_time)
-    return Part(block, function, sources[0], numbers, RULES[start], explicit)
+    return Part(block, numbers, start == "virgin", given, block.c_kernels)

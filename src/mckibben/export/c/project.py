@@ -9,12 +9,14 @@ from typing import Any
 
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.core.kernels import in_scratch
 from mckibben.blocks.core.saving import to_text
 from mckibben.errors import ModelError
 from mckibben.export.c.literals import literal, rows
-from mckibben.export.c.parts import PRIMITIVES, check_single
+from mckibben.export.c.parts import check_single
 from mckibben.export.c.rounding import warn_of_rounding
 from mckibben.export.c.serving import Serving, served, served_files
+from mckibben.export.c.translator import Translation
 from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
 from mckibben.export.folders import refuse_folder, write_folder
@@ -24,7 +26,8 @@ from mckibben.export.templating import render as rendered
 TOLERANCES = {False: "1e-9", True: "1e-4"}
 """Of the self-test, relative to the range: in double and in single precision."""
 
-SHARED = ("mck.h",)
+SHARED = Path(__file__).parent / "server" / "mck.h"
+"""What all C of a model shares."""
 
 LONGEST_STEP = 1e6
 """Time between steps of an exported model [s]."""
@@ -120,11 +123,10 @@ def test_content(tests: Vectors, *, single: bool) -> dict[str, Any]:
 
 
 def source_files(content: Mapping[str, Any]) -> dict[str, str]:
-    """Return the C of a model and of the primitives that it uses, text by path."""
-    name, primitives = content["name"], content["primitives"]
-    texts = {path.name: path.read_text(encoding="utf-8") for path in primitives}
-    headers = "".join(text for file, text in texts.items() if file.endswith(".h"))
-    functions = re.findall(r"^\w[\w ]*\b\*?(mck_\w+)\(", headers, flags=re.M)
+    """Return the C of a model, and of the server if it is served, text by path."""
+    name, shared = content["name"], content["shared"]
+    texts = {path.name: path.read_text(encoding="utf-8") for path in shared}
+    functions = re.findall(r"^\w[\w ]*\b\*?(mck_\w+)\(.*;", "".join(texts.values()), flags=re.M)
     exported = {**content, "functions": sorted(set(functions))}
     return {
         f"src/{name}.h": render("model.h.j2", content),
@@ -147,18 +149,17 @@ def described(
         for call in wiring.calls:
             check_single(call.part.block)
             warn_of_rounding(call.part.block, step)
-    primitives = primitives_of(wiring.calls)
-    if name.lower() in {path.stem for path in primitives}:
-        raise ModelError(
-            f"{name!r} is what a part of the model is called. Remedy: give another --name."
-        )
+    translation = Translation(single=single)
+    if name.lower().startswith("mck"):
+        raise ModelError(f"{name!r} is the package's own name. Remedy: give another --name.")
     inputs, outputs = _told(block.inputs), _told(block.outputs)
     cost, size = wiring.cost, 4 if single else 8
     n_numbers = max(wiring.n_numbers, 1)
-    calls = [_call(call, index, single) for index, call in enumerate(wiring.calls)]
+    calls = [_call(call, index, translation) for index, call in enumerate(wiring.calls)]
     first = 0
     for told in calls:
         told["first_coefficient"] = first
+        told["adjusted"] = f"self->coefficients + {first}"
         first += max(told["n_coefficients"], 1)
     order = {id(call): told for call, told in zip(wiring.calls, calls, strict=True)}
     constants = sum(call.part.coefficients.size for call in wiring.calls)
@@ -185,9 +186,10 @@ def described(
         "adjustable": False,
         "n_states": sum(call["n_states"] for call in calls),
         "starts": _starts(wiring.calls),
-        "primitives": primitives,
-        "headers": sorted({f"{call.part.source.stem}.h" for call in wiring.calls}),
-        "sources": [f"{name}.c", *(path.name for path in primitives if path.suffix == ".c")],
+        "kernels": translation.text(),
+        "zero": "0.0f" if single else "0.0",
+        "shared": (SHARED,),
+        "sources": [f"{name}.c"],
         "ram": size * (n_numbers + len(outputs)) + size,
         "flash": size * constants + 32 * len(calls),
         "usual": cost.usual,
@@ -231,40 +233,31 @@ def own_time(block: Block) -> float | None:
     return None
 
 
-def primitives_of(calls: list[Call]) -> list[Path]:
-    """Return the files that parts need, those that they include too, by name."""
-    wanted = [PRIMITIVES / shared for shared in SHARED]
-    wanted += [call.part.source for call in calls]
-    found: dict[str, Path] = {}
-    while wanted:
-        path = wanted.pop()
-        if path.name in found:
-            continue
-        found[path.name] = path
-        if path.suffix == ".c":
-            wanted.append(path.with_suffix(".h"))
-        elif path.with_suffix(".c").is_file():
-            wanted.append(path.with_suffix(".c"))
-        for name in re.findall(r'#include "(\w+\.h)"', path.read_text(encoding="utf-8")):
-            if name != "mck_config.h":
-                own = path.with_name(name)
-                wanted.append(own if own.is_file() else PRIMITIVES / name)
-    return [found[name] for name in sorted(found)]
-
-
-def _call(call: Call, index: int, single: bool) -> dict[str, Any]:
-    part, block = call.part, call.part.block
+def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:
+    part, block, single = call.part, call.part.block, translation.single
+    name, state = f"coefficients_{index}", ("state", block.n_states)
+    numbers, sample = (name, part.coefficients.size), ("x", len(block.inputs))
+    outputs = (f"signals + {call.first_output}", len(block.outputs))
+    calls: list[str] = []
+    # a state that is given is copied, and has no start
+    for kernel in part.kernels[: 1 if part.state is not None else 2]:
+        scratch = [(f"state + {block.n_states}", block.n_scratch)] * in_scratch(kernel)
+        end = (str(int(part.virgin)), 0) if calls else outputs
+        calls.append(translation.add(kernel).call(numbers, state, *scratch, sample, end))
     given = ", ".join(said(channel.name) for channel in block.inputs)
     gives = ", ".join(said(channel.name) for channel in block.outputs)
     return {
         "index": index,
         "kind": block.title,
         "words": f"{block.title}: {given} to {gives}",
-        "function": part.function,
+        "step": calls[0],
+        "start": calls[-1],
+        "numbers": name,
+        "reads": any(name in text for text in calls),
+        "n_numbers": block.n_states + block.n_scratch,
         "inputs": call.inputs,
         "first_state": call.first_state,
         "first_output": call.first_output,
-        "rule": part.rule,
         "n_coefficients": part.coefficients.size,
         "n_states": block.n_states,
         "n_inputs": len(block.inputs),
@@ -276,10 +269,16 @@ def _call(call: Call, index: int, single: bool) -> dict[str, Any]:
 
 def _starts(calls: list[Call]) -> str:
     """Return how the memory of parts starts, in words."""
-    words = {"": "as the model gives it", "MCK_VIRGIN": "at rest, whatever its inputs"}
     parts = [call.part for call in calls if call.part.block.n_states]
-    rules = ["" if part.state is not None else part.rule for part in parts] or ["any"]
-    return " or ".join(dict.fromkeys(words.get(rule, "from its inputs") for rule in rules))
+    words = [
+        "as the model gives it"
+        if part.state is not None
+        else "at rest, whatever its inputs"
+        if part.virgin
+        else "from its inputs"
+        for part in parts
+    ]
+    return " or ".join(dict.fromkeys(words or ["from its inputs"]))
 
 
 def _told(channels: tuple[Channel, ...]) -> list[dict[str, str]]:

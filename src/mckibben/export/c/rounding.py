@@ -43,5 +43,5 @@ def _run(block: Primitive, inputs: np.ndarray, sample_time: float | None) -> np.
     kind = inputs.dtype
     state = block.initial_state(inputs[0].astype(np.float64)).astype(kind)
     outputs = np.empty((len(inputs), 1), dtype=kind)
-    type(block).kernel(block.coefficients(sample_time).astype(kind), state, inputs, outputs)
+    type(block).kernel.batch(block.coefficients(sample_time).astype(kind), state, inputs, outputs)
     return outputs.astype(np.float64)

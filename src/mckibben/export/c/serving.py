@@ -189,7 +189,7 @@ def served(
     return {
         "served": told,
         "adjustable": bool(serving.adjustable),
-        "primitives": [*content["primitives"], *SERVER],
+        "shared": [*content["shared"], *SERVER],
         "sources": [*content["sources"], SERVER[0].name, f"{content['name']}_server.c"],
     }
 

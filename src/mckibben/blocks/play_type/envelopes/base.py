@@ -4,24 +4,47 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
+from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.parametrised import Parametrised
 from mckibben.blocks.core.saving import part_from_dict
 
-EnvelopeKernel = Callable[[Array, Array, Array], None]
+
+class EnvelopeKernel(Protocol):
+    """A function of one number, ``kernel(argument, coefficients)``, compiled.
+
+    Attributes
+    ----------
+    batch : callable
+        ``batch(coefficients, arguments, values)``, which fills ``values``, shape (n,).
+    """
+
+    batch: Callable[[Array, Array, Array], None]
+
+    def __call__(self, argument: float, coefficients: Array) -> float:
+        """Return the value."""
+
+
+def envelope_kernel(function: Callable[[float, Array], float]) -> EnvelopeKernel:
+    """Compile a function of one number, and the loop over many."""
+    one: Any = kernel(function)
+
+    def batch(coefficients: Array, arguments: Array, values: Array) -> None:
+        for t in range(arguments.size):
+            values[t] = one(arguments[t], coefficients)
+
+    batch.__qualname__ = f"{function.__module__}.{function.__qualname__}"  # by which it is cached
+    one.batch = kernel(batch)
+    return cast("EnvelopeKernel", one)
 
 
 class Envelope(Parametrised):
-    """A strictly increasing function of the input, with its inverse.
-
-    The kernels have the signature ``kernel(coefficients, arguments, values)`` on one-dimensional
-    arrays and write into ``values``.
-    """
+    """A strictly increasing function of the input, with its inverse."""
 
     number: ClassVar[int]
     """What C tells it by."""
@@ -53,11 +76,11 @@ class Envelope(Parametrised):
         """Return the inputs at which the envelope has these values, any shape; NaN beyond its range."""
         return self._evaluate(type(self).inverse, values)
 
-    def _evaluate(self, kernel: EnvelopeKernel, arguments: ArrayLike) -> Array:
+    def _evaluate(self, function: EnvelopeKernel, arguments: ArrayLike) -> Array:
         given = np.asarray(arguments, dtype=np.float64)
         flat = np.ascontiguousarray(given.reshape(-1))
         values = np.empty_like(flat)
-        kernel(self.coefficients(), flat, values)
+        function.batch(self.coefficients(), flat, values)
         return values.reshape(given.shape)
 
 

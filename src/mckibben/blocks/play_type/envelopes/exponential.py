@@ -15,26 +15,23 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.fields import STRICT
-from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel
+from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel, envelope_kernel
 from mckibben.errors import ModelError
 
 
-@kernel
-def _value(coefficients: Array, inputs: Array, values: Array) -> None:
+@envelope_kernel
+def exponential_value(u: float, coefficients: Array) -> float:
+    """Return the envelope at an input; coefficients are [rate, shift, offset]."""
     rate, shift, offset = coefficients[0], coefficients[1], coefficients[2]
-    sign = math.copysign(1.0, rate)
-    for t in range(inputs.size):
-        values[t] = offset + sign * (1.0 - math.exp(shift - rate * inputs[t]))
+    return offset + math.copysign(1.0, rate) * (1.0 - math.exp(shift - rate * u))
 
 
-@kernel
-def _inverse(coefficients: Array, values: Array, inputs: Array) -> None:
+@envelope_kernel
+def exponential_inverse(value: float, coefficients: Array) -> float:
+    """Return the input at which the envelope has a value."""
     rate, shift, offset = coefficients[0], coefficients[1], coefficients[2]
-    sign = math.copysign(1.0, rate)
-    for t in range(values.size):
-        inputs[t] = (shift - math.log(1.0 - sign * (values[t] - offset))) / rate
+    return (shift - math.log(1.0 - math.copysign(1.0, rate) * (value - offset))) / rate
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -53,8 +50,8 @@ class Exponential(Envelope):
 
     kind: ClassVar[str] = "exponential"
     number: ClassVar[int] = 1
-    value: ClassVar[EnvelopeKernel] = _value
-    inverse: ClassVar[EnvelopeKernel] = _inverse
+    value: ClassVar[EnvelopeKernel] = exponential_value
+    inverse: ClassVar[EnvelopeKernel] = exponential_inverse
     parameters: ClassVar[tuple[str, ...]] = ("rate", "shift", "offset")
     notation: ClassVar[Notation] = Notation(
         r"\gamma(u) = c + \operatorname{sgn}(a) \left(1 - e^{b - a u}\right)",

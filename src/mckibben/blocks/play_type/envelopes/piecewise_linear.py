@@ -13,24 +13,23 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.fields import STRICT, Vector
-from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
-from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel
+from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel, envelope_kernel
 
 
-@kernel
-def _value(coefficients: Array, inputs: Array, values: Array) -> None:
+@envelope_kernel
+def piecewise_linear_value(u: float, coefficients: Array) -> float:
+    """Return the envelope at an input; coefficients are [knots, values]."""
     n = coefficients.size // 2
-    for t in range(inputs.size):
-        values[t] = interpolate(inputs[t], coefficients[:n], coefficients[n:])
+    return interpolate(u, coefficients[:n], coefficients[n:])
 
 
-@kernel
-def _inverse(coefficients: Array, values: Array, inputs: Array) -> None:
+@envelope_kernel
+def piecewise_linear_inverse(value: float, coefficients: Array) -> float:
+    """Return the input at which the envelope has a value."""
     n = coefficients.size // 2
-    for t in range(values.size):
-        inputs[t] = interpolate(values[t], coefficients[n:], coefficients[:n])
+    return interpolate(value, coefficients[n:], coefficients[:n])
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -47,8 +46,8 @@ class PiecewiseLinear(Envelope):
 
     kind: ClassVar[str] = "piecewise-linear"
     number: ClassVar[int] = 2
-    value: ClassVar[EnvelopeKernel] = _value
-    inverse: ClassVar[EnvelopeKernel] = _inverse
+    value: ClassVar[EnvelopeKernel] = piecewise_linear_value
+    inverse: ClassVar[EnvelopeKernel] = piecewise_linear_inverse
     increasing = ("knots", "values")
     parameters: ClassVar[tuple[str, ...]] = ("values",)
     notation: ClassVar[Notation] = Notation(

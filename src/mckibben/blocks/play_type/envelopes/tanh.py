@@ -18,23 +18,20 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.fields import STRICT
-from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel
+from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel, envelope_kernel
 
 
-@kernel
-def _value(coefficients: Array, inputs: Array, values: Array) -> None:
-    slope, shift, offset = coefficients[0], coefficients[1], coefficients[2]
-    for t in range(inputs.size):
-        values[t] = math.tanh(slope * inputs[t] + shift) + offset
+@envelope_kernel
+def tanh_value(u: float, coefficients: Array) -> float:
+    """Return the envelope at an input; coefficients are [slope, shift, offset]."""
+    return math.tanh(coefficients[0] * u + coefficients[1]) + coefficients[2]
 
 
-@kernel
-def _inverse(coefficients: Array, values: Array, inputs: Array) -> None:
-    slope, shift, offset = coefficients[0], coefficients[1], coefficients[2]
-    for t in range(values.size):
-        inputs[t] = (math.atanh(values[t] - offset) - shift) / slope
+@envelope_kernel
+def tanh_inverse(value: float, coefficients: Array) -> float:
+    """Return the input at which the envelope has a value."""
+    return (math.atanh(value - coefficients[2]) - coefficients[1]) / coefficients[0]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -53,8 +50,8 @@ class Tanh(Envelope):
 
     kind: ClassVar[str] = "tanh"
     number: ClassVar[int] = 0
-    value: ClassVar[EnvelopeKernel] = _value
-    inverse: ClassVar[EnvelopeKernel] = _inverse
+    value: ClassVar[EnvelopeKernel] = tanh_value
+    inverse: ClassVar[EnvelopeKernel] = tanh_inverse
     parameters: ClassVar[tuple[str, ...]] = ("slope", "shift", "offset")
     notation: ClassVar[Notation] = Notation(
         r"\gamma(u) = \tanh(a u + b) + c",

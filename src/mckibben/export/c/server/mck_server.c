@@ -204,7 +204,7 @@ static void step(mck_server *self)
     self->steps++;
     self->notes = status == 0 ? 0u : (uint8_t)(status == 1 ? NOTE_BAD_INPUT : NOTE_BAD_OUTPUT);
     for (int i = 0; i < self->served->n_outputs; i++) {
-        const mck_real limited = mck_clip(self->out[i], outputs[i].low, outputs[i].high);
+        const mck_real limited = mck_min(mck_max(self->out[i], outputs[i].low), outputs[i].high);
         if (limited < self->out[i] || limited > self->out[i]) {
             self->notes |= (uint8_t)NOTE_LIMITED;
         }

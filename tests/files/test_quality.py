@@ -146,8 +146,8 @@ def test_what_was_measured_is_read(tmp_path: Path, name: str) -> None:
 
 def test_zeros_that_were_measured_are_read_raw(tmp_path: Path) -> None:
     path = table(tmp_path, "pressure_bar,displacement_mm", NOISY, MOVED)
-    assert "--gaps raw" in refused(path).remedy
-    recording = one(path, gaps="raw")
+    assert "--raw" in refused(path).remedy
+    recording = one(path, raw=True)
     assert recording["pressure"] == pytest.approx(NOISY)
     assert recording["displacement"] == pytest.approx(MOVED)
 

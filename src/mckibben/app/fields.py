@@ -13,9 +13,10 @@ GAPS = {
     "error": "refuse",
     "split": "split there",
     "interpolate": "bridge by straight lines",
-    "raw": "refuse, read codes as numbers",
 }
 """What is done about gaps, in words."""
+
+RAW = "Codes for missing samples, and wraps, as measured"
 
 READING = "How it was read"
 """What stands on the button that opens the dialog on a file."""
@@ -25,7 +26,7 @@ _WAYS = (
     (r"--gaps interpolate or split", f"“{GAPS['interpolate']}” or “{GAPS['split']}”"),
     (r"--gaps split", f"“{GAPS['split']}”"),
     (r"--gaps interpolate", f"“{GAPS['interpolate']}”"),
-    (r"--gaps raw", f"“{GAPS['raw']}”"),
+    (r"--raw", f"“{RAW}”"),
     (r"say --unit CHANNEL=UNIT", f"give units by “{READING}”"),
     (r"say --unit (\w+)=UNIT", rf"give the unit of \1 by “{READING}”"),
     (r"--unit (\w+)=UNIT", r"the field Unit of \1"),

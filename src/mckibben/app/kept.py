@@ -56,7 +56,8 @@ class Reading(Kept):
     calibration: dict[Text, tuple[float, float]] = {}
     constants: dict[Text, tuple[float, Text]] = {}
     rate: Number = None
-    gaps: Literal["error", "split", "interpolate", "raw"] = "error"
+    gaps: Literal["error", "split", "interpolate"] = "error"
+    raw: bool = False
     channels: list[Text] | None = None
 
     model_config = ConfigDict(extra="ignore", strict=False)  # JSON has lists for pairs

@@ -25,7 +25,6 @@ class Gaps(StrEnum):
     ERROR = "error"
     SPLIT = "split"
     INTERPOLATE = "interpolate"
-    RAW = "raw"
 
 
 Files = Annotated[
@@ -97,7 +96,10 @@ Rate = Annotated[
     typer.Option("--rate", metavar="HZ", help="Samples per second, without a time column."),
 ]
 GapPolicy = Annotated[
-    Gaps, typer.Option("--gaps", help="What to do about gaps and codes for missing samples.")
+    Gaps, typer.Option("--gaps", help="What to do about gaps and missing samples.")
+]
+Raw = Annotated[
+    bool, typer.Option("--raw", help="Read codes for missing samples, and wraps, as measured.")
 ]
 Resample = Annotated[
     float | None,
@@ -177,6 +179,7 @@ class Reading:
     most: Most = "2GB"
     rate: Rate = None
     gaps: GapPolicy = Gaps.ERROR
+    raw: Raw = False
     resample: Resample = None
     zero: Zero = None
 
@@ -195,6 +198,7 @@ class Reading:
             "constants": _constants(self.constant),
             "rate": self.rate,
             "gaps": self.gaps.value,
+            "raw": self.raw,
             "most": _bytes(self.most),
         }
 

@@ -162,7 +162,7 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
     unit = standard if own or standard is not None else read_in.target
     unit = read_in.name if unit is None else unit
     samples = convert(values, read_in.name, unit)
-    if not own and source.request.gaps != "raw":
+    if not own and not source.request.raw:
         if not channel.startswith(("voltage", "command_")):  # a sawtooth can be commanded
             quality.refuse_wraps(channel, raw, source)
         samples = quality.without_codes(channel, samples, raw, source)

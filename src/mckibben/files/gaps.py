@@ -17,9 +17,6 @@ from mckibben.files.units import convert
 
 Channels = dict[str, Array]
 
-REFUSED = ("error", "raw")
-"""Policies by which gaps are refused."""
-
 
 @dataclass(frozen=True)
 class Piece:
@@ -110,11 +107,11 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
         if n == missing.size:
             remedy = f"name a column that holds numbers with --column {name}=COLUMN"
             raise source.error("all of its samples are missing", remedy, name, 0)
-        if n and source.request.gaps in REFUSED:
+        if n and source.request.gaps == "error":
             problem = f"{n} of {missing.size} samples are missing or not finite"
             remedy = (
-                "use --gaps interpolate to bridge them, --gaps split to cut them out, or --gaps raw "
-                "where they are numbers that were measured"
+                "use --gaps interpolate to bridge them, --gaps split to cut them out, or --raw where "
+                "they are numbers that were measured"
             )
             raise source.error(problem, remedy, name, int(np.argmax(missing)))
         found[name] = missing
@@ -148,7 +145,7 @@ def _judge_gaps(cuts: NDArray[np.intp], times: Times, source: Source) -> None:
     """Refuse gaps in time, or note that they are bridged."""
     lengths = convert(times.values[cuts] - times.values[cuts - 1], times.unit, "s")
     total = f"{len(cuts)} gap(s) in time, {lengths.sum():.6g} s in all"
-    if source.request.gaps in REFUSED:
+    if source.request.gaps == "error":
         problem = f"there is a gap of {lengths[0]:.6g} s before this row ({total})"
         remedy = "use --gaps split to cut there or --gaps interpolate to bridge them"
         raise source.error(problem, remedy, "time", int(cuts[0]))

@@ -90,7 +90,7 @@ def refuse_wraps(channel: str, recorded: Array, source: Source) -> None:
     if found is not None:
         raise source.error(
             f"it jumps by almost {found[0]:.0f} there: an integer counter that wraps",
-            f"add {found[0]:.0f} after each wrap, or use --gaps raw where that was measured",
+            f"add {found[0]:.0f} after each wrap, or use --raw where that was measured",
             channel,
             int(np.flatnonzero(finite)[np.flatnonzero(found[1])[0] + 1]),
         )
@@ -115,7 +115,7 @@ def without_codes(channel: str, values: Array, recorded: Array, source: Source) 
     source.warn(
         f"channel {channel!r}: {coded.sum()} sample(s) are {found}, a code for missing ones "
         f"(first in row {source.table.row(int(np.argmax(coded)))}); "
-        "use --gaps raw where that was measured"
+        "use --raw where that was measured"
     )
     return np.where(coded, np.nan, values)
 

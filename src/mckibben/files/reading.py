@@ -38,6 +38,7 @@ def read(
     calibration: Mapping[str, tuple[float, float]] | None = None,
     constants: Mapping[str, tuple[float, str]] | None = None,
     most: float = MOST_BYTES,
+    raw: bool = False,
 ) -> list[Recording]:
     """Read the recordings in a file, by its ending, or in a folder.
 
@@ -59,11 +60,10 @@ def read(
         Samples per second, positive, where there is no column of times. Without either, a scalar
         beside the samples may state it, such as ``fs``, or the recording has no time. Channels with
         times of their own are put on a clock of this rate.
-    gaps : {"error", "split", "interpolate", "raw"}
+    gaps : {"error", "split", "interpolate"}
         What to do where time is missing (a step of more than three median steps) or a sample is
         (blank, NaN, infinite, or a code such as -9999): refuse, cut into several recordings, or bridge
         linearly. Bridged samples are not fitted: ``meta["bridged"]`` has their first and last times.
-        ``"raw"`` refuses, but reads codes, and counters that seem to wrap, as numbers measured.
     channels : sequence of str, optional
         Channels that must be there and whole. Others are left out, with a `DataWarning`, if samples of
         theirs are missing. By default all must be whole.
@@ -79,6 +79,8 @@ def read(
         ``{"force": (200, "g")}``: a mass is the weight that it hangs with. Override columns.
     most : float
         Largest file that is read [bytes].
+    raw : bool
+        Whether codes for missing samples, and counters that seem to wrap, are read as measured.
 
     Returns
     -------
@@ -111,6 +113,7 @@ def read(
         calibration or {},
         constants or {},
         most,
+        raw,
     )
     request.check(Path(path))
     return [each for one in sources.inside(Path(path)) for each in _read(one, request)[0]]

@@ -19,7 +19,7 @@ from mckibben.files.table import Table
 FEWEST = 10
 """Fewest samples of a recording, or of a stretch of one, that can show a loop."""
 
-Gaps = Literal["error", "split", "interpolate", "raw"]
+Gaps = Literal["error", "split", "interpolate"]
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Request:
     calibration: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     constants: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     most: float = MOST_BYTES
+    raw: bool = False
     described: Described = field(default_factory=Described)
 
     @property

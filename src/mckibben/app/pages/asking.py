@@ -11,7 +11,7 @@ from nicegui import ui
 
 from mckibben.app.adding import Problem, add, alike, replaced, source, understood
 from mckibben.app.desk import LONGEST, Desk, guarded, named, tell
-from mckibben.app.fields import GAPS, said
+from mckibben.app.fields import GAPS, RAW, said
 from mckibben.app.kept import Reading
 from mckibben.app.pages.columns import ReadingFields
 from mckibben.app.reading import AS_FOUND, columns
@@ -93,6 +93,7 @@ async def ask(
                 ).classes("w-56"),
                 "gaps",
             )
+            raw = named(ui.checkbox(RAW, value=reading.raw), "raw")
             title_field = None
             if name is not None:
                 title_field = named(ui.input("Name", value=name).classes("w-56"), "rename")
@@ -153,7 +154,9 @@ async def ask(
 
         async def again() -> None:
             try:
-                chosen = fields.reading(rate.value, gaps.value, explicit=error is not None)
+                chosen = fields.reading(
+                    rate.value, gaps.value, raw=bool(raw.value), explicit=error is not None
+                )
                 same = name is not None and chosen == reading and not so_too.value
                 read = {} if same else await read_so(chosen)
                 if name is not None and title_field and title_field.value not in ("", name):

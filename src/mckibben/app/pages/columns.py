@@ -62,13 +62,15 @@ class ReadingFields:
         self._held = [each for each in self._held if each is not fields]
         row.delete()
 
-    def reading(self, rate: float | None, gaps: Any, *, explicit: bool) -> Reading:
+    def reading(self, rate: float | None, gaps: Any, *, raw: bool, explicit: bool) -> Reading:
         """Return what the fields say; what goes without saying is left unsaid.
 
         Parameters
         ----------
         rate : float, optional
         gaps : str
+        raw : bool
+            Whether codes for missing samples are numbers.
         explicit : bool
             Whether to map columns that are found without it, too.
 
@@ -114,6 +116,7 @@ class ReadingFields:
             constants=constants,
             rate=float(rate) if rate else None,
             gaps=gaps,
+            raw=raw,
             channels=[*signals, *constants] if dropped else None,
         )
 

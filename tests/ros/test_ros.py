@@ -135,7 +135,7 @@ def test_a_late_reference_is_held_and_silence_is_safe() -> None:
     assert (one.silences, one.refused) == (1, 20)
 
 
-@pytest.mark.filterwarnings("ignore:.*not read:mckibben.DataWarning")
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 def test_a_run_is_recorded_and_its_end_is_safe(tmp_path: Path) -> None:
     lines, at = Lines(), list[int]()
     fluid = Topic("p", KINDS["FluidPressure"])

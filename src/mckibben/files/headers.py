@@ -204,8 +204,8 @@ def foreign_words(text: str) -> int:
 def unknown_ending(text: str) -> str:
     """Return the first word behind a channel's name that may be a unit nobody knows; empty if none.
 
-    >>> unknown_ending("pressure_mmH2O"), unknown_ending("Inlet pressure 2"), unknown_ending("data")
-    ('mmh', '', '')
+    >>> unknown_ending("pressure_qux"), unknown_ending("Inlet pressure 2"), unknown_ending("data")
+    ('qux', '', '')
     """
     known = {part for word in (*_CHANNELS, *_ROLES) for part in word.split("_")} | _EXTENSOR
     words = re.findall(r"[^\W\d_]+", snake_case(text.rpartition("/")[2]))  # not of a topic

@@ -66,7 +66,8 @@ def _own(data: bytes, path: Path) -> Table | own.Stored | None:
     except DataError as error:
         description = error.problem
     header = data.partition(b"\n")[0].decode("utf-8", "replace")
-    dialect = Dialect("\t" if "\t" in header else ",", ".")
+    tabs = "\t" in header or path.suffix.casefold() == ".tsv"
+    dialect = Dialect("\t" if tabs else ",", ".")
     names = next(csv.reader([header], delimiter=dialect.separator or ","), [])
     if isinstance(description, str):
         problem = f"is not a description by this package ({description})"

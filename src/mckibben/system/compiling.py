@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache, partial, update_wrapper
 from hashlib import sha256
+from importlib import import_module
 from pickle import UnpicklingError
 from types import CodeType, ModuleType
 from typing import Any, TypeVar, cast
@@ -62,12 +63,31 @@ class Deferred:
         return self.dispatcher._numba_type_  # type: ignore[attr-defined]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what it is made of, by which numba finds a function that calls it in its cache."""
+        """Return how it is found elsewhere, and what it is made of, by which numba keeps its callers.
+
+        One that another function made stays in its process.
+        """
+        module, name = self.py_func.__module__, self.py_func.__qualname__
+        found = getattr(import_module(module), name, None)
+        if found is self:
+            return _named, (module, name, made_of(self))
+        if found is self.py_func:
+            return _again, (found, self.targetoptions, made_of(self))
         return str, (made_of(self),)
 
     def __call__(self, *arguments: Any) -> Any:
         """Run it, compiled."""
         return self.dispatcher(*arguments)
+
+
+def _named(module: str, name: str, digest: str) -> Any:
+    del digest
+    return getattr(import_module(module), name)
+
+
+def _again(function: Callable[..., Any], options: dict[str, Any], digest: str) -> Deferred:
+    del digest
+    return Deferred(function, options)
 
 
 def deferred(function: Function, **options: Any) -> Function:

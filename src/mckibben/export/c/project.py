@@ -149,7 +149,8 @@ def described(
         for call in wiring.calls:
             check_single(call.part.block)
             warn_of_rounding(call.part.block, step)
-    translation = Translation(single=single)
+    own = (f"{name}_{end}" for end in ("init", "reset", "step", "model"))
+    translation = Translation(single=single, taken=own)
     if name.lower().startswith("mck"):
         raise ModelError(f"{name!r} is the package's own name. Remedy: give another --name.")
     inputs, outputs = _told(block.inputs), _told(block.outputs)

@@ -12,7 +12,7 @@ import ast
 import inspect
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -190,12 +190,14 @@ class Translation:
     ----------
     single : bool
         In single instead of double precision.
+    taken : iterable of str
+        Names that others have.
     """
 
-    def __init__(self, *, single: bool = False) -> None:
+    def __init__(self, *, single: bool = False, taken: Iterable[str] = ()) -> None:
         self.single = single
         self.constants: dict[str, str] = {}
-        self.names: set[str] = set()
+        self.names = set(taken)
         self._functions: dict[tuple[Any, ...], Function] = {}
         self._open: list[Source] = []
 

@@ -29,7 +29,7 @@ from mckibben import (
     load_rig,
     registry,
 )
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.play_type.envelopes.tanh import Tanh
 from mckibben.rigs import record
 from mckibben.signals import decaying_triangle

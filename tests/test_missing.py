@@ -10,7 +10,7 @@ import pytest
 from pydantic.dataclasses import dataclass
 
 import mckibben.missing
-from mckibben.blocks.core.fields import STRICT, Vector
+from mckibben.blocks.fields import STRICT, Vector
 from mckibben.blocks.memoryless.negative import Negative
 from mckibben.missing import missing
 from mckibben.registry import names

@@ -15,8 +15,8 @@ import mckibben
 from making.pages import DOCS, MADE, equation, inline, plain, table, toctree, write
 from making.settings import settings_table
 from mckibben import registry
-from mckibben.blocks.core.notation import Written, unit_tex
-from mckibben.blocks.core.writing import quantities, written
+from mckibben.blocks.equations import quantities, written
+from mckibben.blocks.notation import Written, unit_tex
 from mckibben.comparison.limits import limits
 from mckibben.comparison.needs import needs
 from mckibben.errors import MckibbenError

@@ -21,18 +21,12 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    StoredInitial,
-)
-from mckibben.blocks.core.kernels import SLACK, kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import Ranged, check_input_range
-from mckibben.blocks.core.solved_inverse import solved_start
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, StoredInitial
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import SLACK, kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import solved_start
 from mckibben.errors import ModelError
 
 
@@ -95,7 +89,7 @@ elastic_plastic_inverse_start = solved_start(_first_output, elastic_plastic_star
 # --- A block is a frozen dataclass of its parameters. STRICT refuses unknown fields, numbers that are
 # --- not finite, and silent conversions: that is what makes saved files safe to load.
 @dataclass(frozen=True, config=STRICT)
-class ElasticPlastic(Ranged):
+class ElasticPlastic(Invertible):
     """Elastic-plastic model.
 
     Parameters

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from my_block import ElasticPlastic
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, Array, SeparableEstimator
 

@@ -6,12 +6,11 @@ from . import muscles as muscles
 from . import rigs as rigs
 from . import signals as signals
 from .blocks.bands.banded import Banded as Banded
+from .blocks.base import Block as Block
 from .blocks.compose import Parallel as Parallel
 from .blocks.compose import PerChannel as PerChannel
 from .blocks.compose import Series as Series
-from .blocks.core.block import Block as Block
-from .blocks.core.fields import Channel as Channel
-from .blocks.core.saving import load as load
+from .blocks.fields import Channel as Channel
 from .blocks.laws.check import check_block as check_block
 from .blocks.memoryless.affine import Affine as Affine
 from .blocks.memoryless.piecewise_linear import PiecewiseLinear as PiecewiseLinear
@@ -21,6 +20,7 @@ from .blocks.play_type.gpi import GPI as GPI
 from .blocks.play_type.pi import PI as PI
 from .blocks.play_type.play import Play as Play
 from .blocks.play_type.rate_dependent_pi import RateDependentPI as RateDependentPI
+from .blocks.saving import load as load
 from .characterization import characterize as characterize
 from .comparison.calibrating import calibrate as calibrate
 from .comparison.orders import identify as identify

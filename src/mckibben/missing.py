@@ -17,10 +17,10 @@ from typing import Literal
 import numpy as np
 
 from mckibben import registry
-from mckibben.blocks.core.block import Block, Primitive
-from mckibben.blocks.core.composition import Composition
-from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.writing import quantities, undeclared
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Composition
+from mckibben.blocks.equations import quantities, undeclared
+from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.laws.check import LAWS
 from mckibben.blocks.laws.trial import Trial
 from mckibben.comparison.limits import limits
@@ -269,7 +269,7 @@ def _tests(block: Block) -> Finding:
     twins = Path("tests", "twins.py")
     if not twins.is_file():
         return Finding("tests", "none", f"not looked for: there is no {twins} here")
-    kernel = isinstance(block, Primitive) and isinstance(getattr(block, "kernel", None), Deferred)
+    kernel = isinstance(getattr(block, "kernel", None), Deferred)
     if kernel and f'"{block.kind}"' not in read_text(twins, most=MOST_TEXT):
         return Finding("tests", "missing", f"a plain loop of each kernel, in {twins}")
     return Finding(

@@ -56,7 +56,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
             "mckibben.blocks.differential.generalized_bouc_wen:GeneralizedBoucWen"
         ),
         "gpi": "mckibben.blocks.play_type.gpi:GPI",
-        "inverse": "mckibben.blocks.core.inverse:Inverse",
+        "inverse": "mckibben.blocks.inverse:Inverse",
         "krasnoselskii-pokrovskii": (
             "mckibben.blocks.preisach_type.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskii"
         ),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mckibben import EUPI, GPI, PI, RateDependentPI, Series
 from mckibben import PiecewiseLinear as Curve
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.fields import vector
 from mckibben.blocks.laws.trial import through
 from mckibben.blocks.play_type.envelopes.base import Envelope
 from mckibben.blocks.play_type.envelopes.exponential import Exponential

@@ -20,11 +20,11 @@ from mckibben import (
     Series,
     check_block,
 )
-from mckibben.blocks.core.fields import vector
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
 from mckibben.blocks.dynamic.air import LONGEST_DEAD_TIME, Air
 from mckibben.blocks.dynamic.state_network import StateNetwork
+from mckibben.blocks.fields import vector
 from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.play_type.envelopes.exponential import Exponential
 from mckibben.blocks.play_type.envelopes.tanh import Tanh

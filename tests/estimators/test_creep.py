@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Recording
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
 from mckibben.blocks.memoryless.negative import Negative

@@ -12,7 +12,7 @@ from sklearn.base import clone, is_classifier, is_regressor
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from mckibben import GPI, DataError, ModelError, RateDependentPI, Recording
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.offered import defaults
 from mckibben.estimators.core.searching import SearchingEstimator
 from mckibben.estimators.core.settings import Setting, settings_with_defaults

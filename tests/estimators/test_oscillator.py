@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import DataError, ModelError, Recording
-from mckibben.blocks.core.fields import vector
 from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
 from mckibben.blocks.differential.duhem_oscillator import DuhemOscillator
+from mckibben.blocks.fields import vector
 from mckibben.estimators.differential.bouc_wen_oscillator import BoucWenOscillatorEstimator
 from mckibben.estimators.differential.duhem_oscillator import DuhemOscillatorEstimator
 from mckibben.estimators.differential.oscillator_slopes import follow_bouc_wen, follow_duhem

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Recording
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import DataError, ModelError
 from mckibben.excitation.candidates import random_motion
 from mckibben.excitation.information import Slopes, standard_errors

@@ -18,7 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mckibben import registry
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
 from mckibben.outputs import Results

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from mckibben import Recording
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.laws.examples import examples
 from mckibben.validation.describing import describe

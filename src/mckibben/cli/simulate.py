@@ -53,7 +53,7 @@ def simulate(
     from dataclasses import asdict
 
     from mckibben.bands.beyond import beyond_calibrated
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.saving import load
     from mckibben.control.beyond import beyond_known
     from mckibben.files import write
     from mckibben.metrics import score

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
 from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.blocks.dynamic.repeating import Repeating

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.coverage import OffTraining

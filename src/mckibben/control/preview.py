@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 

@@ -12,7 +12,7 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.bands.banded import inside
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError, ModelError
 from mckibben.excitation.candidates import random_plan

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST
 from mckibben.excitation.unmodelled import Unmodelled
 

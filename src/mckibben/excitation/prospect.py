@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.writing import quantities
+from mckibben.blocks.base import Block
+from mckibben.blocks.equations import quantities
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.balance_prior import noise_of
 from mckibben.estimators.coupled.balance_starts import LARGER, opening

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.play_type.eupi import EUPI
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI

@@ -12,8 +12,8 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.bands.held import memory_of
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
 from mckibben.comparison.bootstrap import BlockBootstrap, interval
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.splits import Fold, folds

@@ -17,8 +17,8 @@ from mckibben.app.jobs import ENDED
 from mckibben.app.pages import closing, forces, leaderboard, logs, loops
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.app.recorded import at_rest, held_for, pace, reached
-from mckibben.blocks.core.commanding import COMMANDS
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.inverse import COMMANDS
 from mckibben.comparison.recognising import FORCE
 from mckibben.errors import MckibbenError
 from mckibben.files import read

@@ -29,8 +29,8 @@ from mckibben.app.pages.judging import (
     unvalidated,
 )
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.writing import quantities
+from mckibben.blocks.base import Block
+from mckibben.blocks.equations import quantities
 from mckibben.comparison import limits
 from mckibben.comparison.columns import Column, columns_of
 from mckibben.comparison.free_run import run_free

@@ -13,8 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.core.linear_system import eliminate
 from mckibben.blocks.coupled.balance_terms import (
     AT_REST,
     FROM_REST,
@@ -29,6 +27,8 @@ from mckibben.blocks.coupled.balance_terms import (
     rubbed,
     sprung,
 )
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.solving import eliminate
 
 NEVER = 1e30
 """Force at which what never goes slack would."""

@@ -22,12 +22,12 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, StoredInitial
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
+from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.differential.oscillator import Oscillator, Positive, oscillate, settle
 from mckibben.blocks.dynamic.repeating import Hold, Substeps
+from mckibben.blocks.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, StoredInitial
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 
 
 @kernel

@@ -23,8 +23,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.differential.loop import Loop
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -32,12 +33,11 @@ from mckibben.blocks.core.fields import (
     Coefficients,
     StoredInitial,
 )
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import check_input_range
-from mckibben.blocks.core.solved_inverse import solve_sample, solved_start
-from mckibben.blocks.differential.loop import Loop
+from mckibben.blocks.inverse import check_input_range
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.memoryless.reversible import polynomial_at
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import solve_sample, solved_start
 from mckibben.errors import ModelError
 
 
@@ -78,7 +78,7 @@ def duhem_step(coefficients: Array, state: Array, inputs: Array, outputs: Array)
 
 @step
 def duhem_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
+    """Solve for the input; see `mckibben.blocks.solving`."""
     solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
 
 
@@ -186,7 +186,7 @@ class Duhem(Loop):
 
         The output stays between the curves that it tends to when rising and when falling.
         """
-        x = (np.linspace(*self.limits, 201) - self.centre) / self.scale
+        x = (np.linspace(*self.input_limits, 201) - self.centre) / self.scale
         value = np.polynomial.polynomial.polyval
         f, g = value(x, self.target), value(x, self.slope)
         ends = [value(x, particular(self.alpha, self.target, self.slope, s)) for s in (1.0, -1.0)]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.kernels import kernel
 
 
 @kernel

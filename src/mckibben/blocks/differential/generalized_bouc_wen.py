@@ -25,8 +25,10 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.differential.flow import flow
+from mckibben.blocks.differential.loop import BoucWenLoop, bouc_wen_start
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -35,12 +37,10 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.solved_inverse import solve_sample, solved_start
-from mckibben.blocks.differential.flow import flow
-from mckibben.blocks.differential.loop import BoucWenLoop, bouc_wen_start
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import solve_sample, solved_start
 from mckibben.errors import ModelError
 
 
@@ -104,7 +104,7 @@ def generalized_bouc_wen_step(
 def generalized_bouc_wen_inverse_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
+    """Solve for the input; see `mckibben.blocks.solving`."""
     solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
 
 
@@ -187,7 +187,7 @@ class GeneralizedBoucWen(BoucWenLoop):
         """Return a lower bound of the slope of the output by the input."""
         away = (1.0 + self.asymmetry) * self.bound**self.exponent - 1.0
         shallowest = -self.rate * away
-        reversible = least_slope(self.polynomial, self.centre, self.scale, self.limits)
+        reversible = least_slope(self.polynomial, self.centre, self.scale, self.input_limits)
         return reversible + min(self.weight * shallowest, self.weight * self.steepest, 0.0)
 
     @property

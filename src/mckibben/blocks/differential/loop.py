@@ -7,11 +7,10 @@ from typing import ClassVar
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Start
-from mckibben.blocks.core.fields import StoredInitial
-from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.core.single_channel import check_input_range
-from mckibben.blocks.core.solved_inverse import Solved
+from mckibben.blocks.base import Start
+from mckibben.blocks.fields import StoredInitial
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import kernel
 from mckibben.errors import ModelError
 
 
@@ -22,8 +21,11 @@ def bouc_wen_start(coefficients: Array, state: Array, inputs: Array, virgin: boo
     state[1] = inputs[0]
 
 
-class Loop(Solved):
+class Loop(Invertible):
     """A block whose state is one memory and the previous input."""
+
+    solved: ClassVar[bool] = True
+    inverse_remembers = "input"
 
     @property
     def n_states(self) -> int:
@@ -32,7 +34,7 @@ class Loop(Solved):
 
     def peaks(self) -> Array:
         """Return peaks spread over the input range."""
-        return np.linspace(*self.limits, 33)
+        return np.linspace(*self.input_limits, 33)
 
 
 class BoucWenLoop(Loop):
@@ -41,6 +43,7 @@ class BoucWenLoop(Loop):
     start_kernel: ClassVar[Start] = bouc_wen_start
 
     polynomial: tuple[float, ...]
+    input_range: tuple[float, float] | None
     initial: StoredInitial
 
     def __post_init__(self) -> None:

@@ -26,12 +26,9 @@ from annotated_types import Gt
 from pydantic import FiniteFloat
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Primitive, Run
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.kernels import inlined
-from mckibben.blocks.core.refusals import needs_sample_time
-from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.base import Cost, Run, needs_sample_time
 from mckibben.blocks.dynamic.repeating import Repeating
+from mckibben.blocks.kernels import inlined
 from mckibben.errors import ModelError
 
 Positive = Annotated[FiniteFloat, Gt(0)]
@@ -108,7 +105,7 @@ def _share(slope: Any, z: float, force: float, k: float, own: Array) -> float:
     return stiffness / (k + stiffness)
 
 
-class Oscillator(Repeating, SingleChannel, Primitive):
+class Oscillator(Repeating):
     """A block with the fields of an oscillator, whose element a class adds."""
 
     rate_dependent: ClassVar[bool] = True

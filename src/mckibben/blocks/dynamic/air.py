@@ -27,18 +27,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
-    PRESSURE,
-    STRICT,
-    Channel,
-    ChannelField,
-    StoredInitial,
-)
-from mckibben.blocks.core.kernels import ROUNDING, SLACK, kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import needs_sample_time
-from mckibben.blocks.core.single_channel import Ranged, check_input_range
+from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.fields import PRESSURE, STRICT, Channel, ChannelField, StoredInitial
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError, ModelWarning
 
 LONGEST_DEAD_TIME = 254
@@ -138,7 +131,7 @@ def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: 
 
 
 @dataclass(frozen=True, config=STRICT)
-class Air(Ranged):
+class Air(Invertible):
     """Valve or regulator, and the air behind it, from command to measured pressure.
 
     Parameters
@@ -301,14 +294,12 @@ class Air(Ranged):
         With lags the ends of the range are only approached: a twentieth is left out at both. How
         fast references may change there depends on the lags.
         """
-        low, high = self.limits
+        low, high = self.input_limits
         ends = sorted([self.goal(low, -1), self.goal(high, 1)])
         lowest, highest = np.array(ends)
         lags = self.filling_time > 0 or self.venting_time > 0
         left = APPROACHED * (highest - lowest) if lags and np.isfinite(ends).all() else 0.0
         return np.array([lowest + left]), np.array([highest - left])
-
-    inverse_counts: ClassVar[bool] = True
 
     def inverse_complaint(self, state: Array) -> str:
         """Tell of references that were clipped."""

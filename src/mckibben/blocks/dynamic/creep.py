@@ -14,14 +14,12 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Vector
-from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.linear import LinearSystem
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import needs_sample_time
-from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Vector
+from mckibben.blocks.inverse import Invertible
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.linear import LinearSystem
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 
@@ -69,7 +67,7 @@ def creep_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin
 
 
 @dataclass(frozen=True, config=STRICT)
-class Creep(SingleChannel, Invertible):
+class Creep(Invertible):
     """Visco-elastic creep behind a model of the immediate response.
 
     Parameters
@@ -91,6 +89,7 @@ class Creep(SingleChannel, Invertible):
     inverse_kernel: ClassVar[Kernel] = creep_inverse_step
     inverse_start_kernel: ClassVar[Start] = creep_inverse_start
     rate_dependent: ClassVar[bool] = True
+    counts_clipped: ClassVar[bool] = False
     parameters: ClassVar[tuple[str, ...]] = ("compliances", "time_constants")
     notation: ClassVar[Notation] = Notation(
         r"y = u + \sum_k c_k x_k,\quad \tau_k \dot{x}_k = u - x_k",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.dynamic.linear_start import Mask, told_by
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import FittedInitial, Initial
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import FittedInitial, Initial
 from mckibben.recording import Recording
 
 Mask = NDArray[np.bool_]

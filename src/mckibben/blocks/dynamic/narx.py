@@ -20,8 +20,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Primitive
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Block, own_sample_time
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -29,9 +29,7 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import inlined, kernel
-from mckibben.blocks.core.refusals import own_sample_time
-from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.kernels import inlined, kernel
 from mckibben.blocks.play_type.memory import start_operators
 from mckibben.errors import ModelError
 
@@ -115,7 +113,7 @@ def start_resting(
 
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
-class Narx(SingleChannel, Primitive):
+class Narx(Block):
     """Fields and states of NARX models.
 
     Parameters

@@ -15,11 +15,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import STRICT, Vector
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
+from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, start_resting, take_input
+from mckibben.blocks.fields import STRICT, Vector
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 

@@ -22,8 +22,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Block, Kernel, Start, needs_sample_time
+from mckibben.blocks.dynamic.linear_start import LinearStart
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -31,12 +32,9 @@ from mckibben.blocks.core.fields import (
     FittedInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.linear import LinearSystem, Polynomials
-from mckibben.blocks.core.notation import Notation, tex
-from mckibben.blocks.core.refusals import needs_sample_time
-from mckibben.blocks.core.single_channel import SingleChannel
-from mckibben.blocks.dynamic.linear_start import LinearStart
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.linear import LinearSystem, Polynomials
+from mckibben.blocks.notation import Notation, tex
 from mckibben.errors import ModelError
 
 LONGEST_DELAY = 254
@@ -82,7 +80,7 @@ def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin
 
 
 @dataclass(frozen=True, config=STRICT)
-class ProcessModel(LinearStart, SingleChannel, Primitive):
+class ProcessModel(LinearStart):
     """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
 
     Parameters

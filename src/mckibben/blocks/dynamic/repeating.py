@@ -8,8 +8,7 @@ from typing import Annotated, Literal, Self, cast
 import numpy as np
 from annotated_types import Interval
 
-from mckibben.blocks.core.block import Primitive
-from mckibben.blocks.core.refusals import needs_sample_time
+from mckibben.blocks.base import Block, needs_sample_time
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.signals.periodic import band_limited
@@ -24,7 +23,7 @@ BETWEEN = 2
 """Samples put into a substep where the input is band-limited: straight lines join them."""
 
 
-class Repeating(Primitive):
+class Repeating(Block):
     """A block of one input and one output whose last state is the last input."""
 
     substeps: int

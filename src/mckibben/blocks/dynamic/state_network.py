@@ -22,21 +22,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import (
-    DISPLACEMENT,
-    FORCE,
-    STRICT,
-    ChannelField,
-    Rows,
-    StoredInitial,
-)
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import needs_sample_time
-from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.base import Cost, Kernel, Start, needs_sample_time
 from mckibben.blocks.dynamic.repeating import Hold, Repeating, Substeps
+from mckibben.blocks.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, Rows, StoredInitial
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 Positive = Annotated[FiniteFloat, Gt(0)]
@@ -129,7 +119,7 @@ def state_network_start(
 
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
-class StateNetwork(Repeating, SingleChannel):
+class StateNetwork(Repeating):
     """State-space model of a linear part and tanh units.
 
     Parameters

@@ -19,8 +19,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Primitive, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start, own_sample_time
+from mckibben.blocks.dynamic.linear_start import LinearStart
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -28,12 +29,9 @@ from mckibben.blocks.core.fields import (
     Coefficients,
     FittedInitial,
 )
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.linear import LinearSystem, Polynomials
-from mckibben.blocks.core.notation import FEW, Notation, summed
-from mckibben.blocks.core.refusals import own_sample_time
-from mckibben.blocks.core.single_channel import SingleChannel
-from mckibben.blocks.dynamic.linear_start import LinearStart
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.linear import LinearSystem, Polynomials
+from mckibben.blocks.notation import FEW, Notation, summed
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 
@@ -70,7 +68,7 @@ def transfer_function_start(coefficients: Array, state: Array, inputs: Array, vi
 
 
 @dataclass(frozen=True, config=STRICT)
-class TransferFunction(LinearStart, SingleChannel, Primitive):
+class TransferFunction(LinearStart):
     """Discrete transfer function about an operating point.
 
     Parameters

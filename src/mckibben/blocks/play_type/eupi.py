@@ -24,8 +24,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -33,15 +33,15 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, step, summing_step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import check_input_range
-from mckibben.blocks.core.solved_inverse import Solved, solve_sample, solved_start
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.play_type.memory import check_thresholds, start_operators
+from mckibben.blocks.solving import solve_sample, solved_start
 from mckibben.errors import ModelError
 
 
-@kernel
+@inlined
 def unparallel_play(s: float, x: float, r: float, alpha: float, beta: float) -> float:
     """Move an operator whose edges differ in slope."""
     return max(min(s, alpha * x + beta * r), x - r)
@@ -95,7 +95,7 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
 
 @step
 def eupi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
+    """Solve for the input; see `mckibben.blocks.solving`."""
     solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
 
 
@@ -110,7 +110,7 @@ eupi_inverse_start = solved_start(_trial, eupi_start)
 
 
 @dataclass(frozen=True, config=STRICT)
-class EUPI(Solved):
+class EUPI(Invertible):
     """Extended unparallel Prandtl-Ishlinskii model.
 
     Parameters
@@ -136,6 +136,8 @@ class EUPI(Solved):
     """
 
     kind: ClassVar[str] = "eupi"
+    solved: ClassVar[bool] = True
+    inverse_remembers = "input"
     kernel: ClassVar[Kernel] = eupi_step
     start_kernel: ClassVar[Start] = eupi_start
     inverse_kernel: ClassVar[Kernel] = eupi_inverse_step

@@ -31,8 +31,8 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.learning import start_learning
 from mckibben.blocks.adaptive.operators import LearntOperators, follow_learning, inverse_at
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -40,9 +40,9 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import Step, kernel, step, summing_step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import check_input_range
+from mckibben.blocks.inverse import check_input_range
+from mckibben.blocks.kernels import Step, kernel, step, summing_step
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.play_type.envelopes.base import Envelope, nested_envelope
 from mckibben.blocks.play_type.envelopes.tanh import Tanh
 from mckibben.blocks.play_type.memory import (
@@ -305,7 +305,7 @@ class GPI(LearntOperators):
 
     def peaks(self) -> Array:
         """Return the peaks from which the operators just come back to the lowest input."""
-        low, high = self.limits
+        low, high = self.input_limits
         edges = self.falling(low) + 2 * np.array(self.thresholds)
         inside = edges[edges < self.rising(high)]
         return np.asarray(self.rising.solve(inside))
@@ -328,7 +328,7 @@ class GPI(LearntOperators):
 
     def inverse_numbers(self, own: Array) -> Array:
         """Return [lowest, highest input], then this model's."""
-        return np.array([*self.limits, *own])
+        return np.array([*self.input_limits, *own])
 
     def remembered(self, state: Array) -> tuple[float, ...]:
         """Return the output."""

@@ -22,8 +22,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -32,12 +32,12 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import accumulate, kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import check_input_range
-from mckibben.blocks.core.solved_inverse import Solved, solve_input, solved_start
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.play_type.memory import check_thresholds
+from mckibben.blocks.solving import solve_input, solved_start
 from mckibben.errors import ModelError
 
 
@@ -116,7 +116,7 @@ def maxwell_slip_step(
 def maxwell_slip_inverse_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
+    """Solve for the input; see `mckibben.blocks.solving`."""
     u = solve_input(_trial, coefficients, state, inputs)
     _advance(u, coefficients[:-2], state[:-2], scratch)
     outputs[0] = u
@@ -135,7 +135,7 @@ maxwell_slip_inverse_start = solved_start(_trial, maxwell_slip_start)
 
 
 @dataclass(frozen=True, config=STRICT)
-class MaxwellSlip(Solved):
+class MaxwellSlip(Invertible):
     """Springs that slip, beside a reversible polynomial.
 
     Parameters
@@ -162,6 +162,8 @@ class MaxwellSlip(Solved):
     """
 
     kind: ClassVar[str] = "maxwell-slip"
+    solved: ClassVar[bool] = True
+    inverse_remembers = "input"
     kernel: ClassVar[Kernel] = maxwell_slip_step
     start_kernel: ClassVar[Start] = maxwell_slip_start
     inverse_kernel: ClassVar[Kernel] = maxwell_slip_inverse_step
@@ -227,11 +229,11 @@ class MaxwellSlip(Solved):
     def least_slope(self) -> float:
         """Return a lower bound of the slope of the output by the input."""
         softening = float(np.minimum(self.weights, 0.0).sum()) * max(1.0, self.stiffness_ratio)
-        return least_slope(self.polynomial, self.centre, self.scale, self.limits) + softening
+        return least_slope(self.polynomial, self.centre, self.scale, self.input_limits) + softening
 
     def peaks(self) -> Array:
         """Return the peaks at which one spring more slips."""
-        low, _ = self.limits
+        low, _ = self.input_limits
         return low + 2.0 * np.array(self.breakaways)
 
     @classmethod

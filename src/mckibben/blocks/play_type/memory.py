@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import ROUNDING, SLACK, kernel
-from mckibben.blocks.core.refusals import VIRGIN
+from mckibben.blocks.base import VIRGIN
+from mckibben.blocks.kernels import ROUNDING, SLACK, kernel
 from mckibben.errors import ModelError
 
 

@@ -20,8 +20,8 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.learning import start_learning
 from mckibben.blocks.adaptive.operators import LearntOperators, follow_learning, inverse_at
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -29,9 +29,9 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, step, summing_step
-from mckibben.blocks.core.notation import FEW, Notation, summed, tex
-from mckibben.blocks.core.single_channel import check_input_range
+from mckibben.blocks.inverse import check_input_range
+from mckibben.blocks.kernels import kernel, step, summing_step
+from mckibben.blocks.notation import FEW, Notation, summed, tex
 from mckibben.blocks.play_type.memory import (
     check_invertible_sum,
     check_thresholds,
@@ -178,7 +178,7 @@ class PI(LearntOperators):
 
     def peaks(self) -> Array:
         """Return the peaks from which the operators just come back to the lowest input."""
-        return self.limits[0] + 2 * np.array(self.thresholds)
+        return self.input_limits[0] + 2 * np.array(self.thresholds)
 
     def check_invertible(self) -> None:
         """Demand a first threshold of 0, and partial sums of the weights that are positive."""
@@ -191,7 +191,7 @@ class PI(LearntOperators):
 
     def inverse_numbers(self, own: Array) -> Array:
         """Return [lowest, highest input, offset, thresholds, weights]."""
-        return np.array([*self.limits, *own])
+        return np.array([*self.input_limits, *own])
 
     def remembered(self, state: Array) -> tuple[float, ...]:
         """Return the output."""

@@ -15,17 +15,10 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Primitive, Start
-from mckibben.blocks.core.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    StoredInitial,
-)
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, StoredInitial
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.play_type.memory import check_thresholds, start_operators
 
 
@@ -59,7 +52,7 @@ def play_matrix(u: Array, r: Array, s: Array, operators: Array) -> None:
 
 
 @dataclass(frozen=True, config=STRICT)
-class Play(SingleChannel, Primitive):
+class Play(Block):
     """One play operator.
 
     Parameters

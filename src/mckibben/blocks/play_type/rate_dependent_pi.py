@@ -22,23 +22,18 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Rule,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, step, summing_step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import needs_sample_time
-from mckibben.blocks.core.root import solve_near
-from mckibben.blocks.core.single_channel import Ranged, check_input_range
-from mckibben.blocks.core.solved_inverse import solved_cost
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import kernel, step, summing_step
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.play_type.memory import (
     check_invertible_sum,
     check_thresholds,
@@ -46,7 +41,7 @@ from mckibben.blocks.play_type.memory import (
     start_sum,
 )
 from mckibben.blocks.play_type.pi import PI
-from mckibben.errors import ModelError
+from mckibben.blocks.solving import solve_near
 
 
 @summing_step
@@ -133,7 +128,7 @@ def rate_dependent_pi_inverse_start(
 
 
 @dataclass(frozen=True, config=STRICT)
-class RateDependentPI(Ranged):
+class RateDependentPI(Invertible):
     """Prandtl-Ishlinskii model whose weights are linear in the input's rate.
 
     Parameters
@@ -157,6 +152,7 @@ class RateDependentPI(Ranged):
     """
 
     kind: ClassVar[str] = "rate-dependent-pi"
+    solved: ClassVar[bool] = True
     kernel: ClassVar[Kernel] = rate_dependent_pi_step
     start_kernel: ClassVar[Start] = rate_dependent_pi_start
     inverse_kernel: ClassVar[Kernel] = rate_dependent_pi_inverse_step
@@ -211,23 +207,7 @@ class RateDependentPI(Ranged):
     def check_invertible(self) -> None:
         """Demand an input range, a first threshold of 0, and an output that rises at rest."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
-        if self.input_range is None:
-            raise ModelError(
-                f"{self.kind!r} has no inverse without an input range. Remedy: give input_range."
-            )
-
-    def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return what trials cost, of which there are few on smooth references."""
-        return solved_cost(self.cost(sample_time))
-
-    def inverse_start(self, first: Array, start: Rule) -> Array:
-        """Return the inverse's state at rest."""
-        if start == "virgin":
-            raise ModelError(
-                f"the inverse of {self.kind!r} cannot start virgin. "
-                "Remedy: start it from 'first_sample' or a state."
-            )
-        return super().inverse_start(first, start)
+        super().check_invertible()
 
     def reachable(self) -> tuple[Array, Array]:
         """Return the outputs that can be reached at rest whatever happened before."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.single_channel import Ranged, check_input_range
+from mckibben.blocks.inverse import Invertible, check_input_range
 from mckibben.errors import ModelError
 
 
-class TriangularGrid(Ranged):
+class TriangularGrid(Invertible):
     """A block of L + 1 levels and L (L + 1) / 2 weights, its input between the first and last level."""
 
     increasing = ("levels",)
@@ -31,7 +31,7 @@ class TriangularGrid(Ranged):
             )
 
     @property
-    def input_range(self) -> tuple[float, float]:  # type: ignore[override]
+    def input_range(self) -> tuple[float, float]:
         """The first and last level."""
         return self.levels[0], self.levels[-1]
 

@@ -18,8 +18,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -27,10 +27,11 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.solved_inverse import Solved, solve_sample, solved_start
+from mckibben.blocks.inverse import Invertible
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.preisach_type.grid import TriangularGrid
+from mckibben.blocks.solving import solve_sample, solved_start
 
 
 @kernel
@@ -87,7 +88,7 @@ def krasnoselskii_pokrovskii_step(
 def krasnoselskii_pokrovskii_inverse_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
+    """Solve for the input; see `mckibben.blocks.solving`."""
     solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
 
 
@@ -112,7 +113,7 @@ krasnoselskii_pokrovskii_inverse_start = solved_start(_trial, krasnoselskii_pokr
 
 
 @dataclass(frozen=True, config=STRICT)
-class KrasnoselskiiPokrovskii(TriangularGrid, Solved):
+class KrasnoselskiiPokrovskii(TriangularGrid, Invertible):
     """Krasnosel'skii-Pokrovskii model on a triangular grid.
 
     Parameters
@@ -132,6 +133,8 @@ class KrasnoselskiiPokrovskii(TriangularGrid, Solved):
     """
 
     kind: ClassVar[str] = "krasnoselskii-pokrovskii"
+    solved: ClassVar[bool] = True
+    inverse_remembers = "input"
     kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_step
     start_kernel: ClassVar[Start] = krasnoselskii_pokrovskii_start
     inverse_kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_inverse_step

@@ -24,9 +24,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Cost, Kernel, Start
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -35,10 +34,10 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import ROUNDING, SLACK, kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.solved_inverse import solved_start
+from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.preisach_type.grid import TriangularGrid
+from mckibben.blocks.solving import solved_start
 from mckibben.errors import ModelError
 
 DEPTH = 64

@@ -13,7 +13,7 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import ModelWarning
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.parameters import Parametrised

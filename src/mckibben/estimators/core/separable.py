@@ -15,7 +15,7 @@ import numpy as np
 from annotated_types import Ge
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.searching import SearchingEstimator

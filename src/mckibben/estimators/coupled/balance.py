@@ -16,10 +16,10 @@ import numpy as np
 from annotated_types import Gt, Interval
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import rows
 from mckibben.blocks.coupled.load_estimate import parts_of
+from mckibben.blocks.fields import rows
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import LOST, Contact
 from mckibben.errors import ModelError

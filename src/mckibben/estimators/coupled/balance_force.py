@@ -12,10 +12,10 @@ from typing import Annotated, ClassVar
 
 from annotated_types import Interval
 
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.load_estimate import load_of
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import ErrorsUnknown

@@ -14,11 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import rows
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_in import balance_in
+from mckibben.blocks.fields import rows
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_checks import held

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import Channel, rows, vector
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_law import NEVER
+from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.estimators.coupled.balance_own import Own
 
 GRID = 21

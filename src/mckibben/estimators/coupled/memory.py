@@ -13,9 +13,9 @@ import numpy as np
 from annotated_types import Gt, Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import rows, vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
+from mckibben.blocks.fields import rows, vector
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker

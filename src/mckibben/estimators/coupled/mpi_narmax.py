@@ -17,8 +17,8 @@ from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
 from mckibben import registry
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, rows, vector
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
+from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.blocks.kernels import kernel
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors

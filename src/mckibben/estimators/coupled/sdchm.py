@@ -18,11 +18,11 @@ from annotated_types import Ge, Interval
 
 from mckibben import registry
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, rows, vector
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.play_type.pi import PI
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.differential.bouc_wen import BoucWen
+from mckibben.blocks.fields import vector
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.differential.loops import DifferentialLoopEstimator
 

@@ -9,9 +9,9 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.differential.duhem import Duhem
+from mckibben.blocks.fields import vector
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 

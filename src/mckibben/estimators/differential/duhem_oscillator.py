@@ -10,9 +10,9 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import vector
 from mckibben.blocks.differential.duhem_oscillator import DuhemOscillator
 from mckibben.blocks.differential.oscillator import Oscillator
+from mckibben.blocks.fields import vector
 from mckibben.estimators.differential.oscillator import OscillatorEstimator
 from mckibben.estimators.differential.oscillator_slopes import follow_duhem
 

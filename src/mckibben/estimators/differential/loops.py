@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.differential.bouc_wen import BoucWen
 from mckibben.blocks.differential.generalized_bouc_wen import GeneralizedBoucWen
 from mckibben.estimators.core.best_of import best_of_settings

@@ -17,7 +17,7 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.differential.oscillator import Oscillator
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import inlined, kernel
 from mckibben.blocks.differential.bouc_wen_oscillator import bouc_wen_slope
 from mckibben.blocks.differential.duhem_oscillator import knot_before
+from mckibben.blocks.kernels import inlined, kernel
 
 OWN = 3
 """Parameters before those of the element: inertia, damping, stiffness."""

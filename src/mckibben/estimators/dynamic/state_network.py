@@ -17,9 +17,9 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import rows
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.state_network import StateNetwork
+from mckibben.blocks.fields import rows
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.single import SingleEstimator

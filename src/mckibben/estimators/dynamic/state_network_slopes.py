@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import summing_kernel
+from mckibben.blocks.kernels import summing_kernel
 
 LARGEST = 1e6
 """State, in units of the output's scale, that is out of all bounds: the run ends there."""

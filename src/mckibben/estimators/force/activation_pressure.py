@@ -14,8 +14,8 @@ import numpy as np
 from annotated_types import Ge
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
 from mckibben.blocks.force.activation_pressure import ActivationPressure
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.searching import SearchingEstimator

@@ -9,8 +9,8 @@ import numpy as np
 from annotated_types import Gt
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.chou_hannaford import ChouHannaford
 from mckibben.blocks.force.polynomial_force import PolynomialForce

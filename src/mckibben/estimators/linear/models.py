@@ -10,9 +10,9 @@ import numpy as np
 from annotated_types import Interval, Len
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.fields import vector
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.uncertainty import inverted, told_by_runs

@@ -10,7 +10,7 @@ import numpy as np
 from annotated_types import Ge
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.process_model import LONGEST_DELAY, ProcessModel
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator

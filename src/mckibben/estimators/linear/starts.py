@@ -10,7 +10,7 @@ from typing import Literal, Self
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.single import SingleEstimator

@@ -13,7 +13,7 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.narx import Narx
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData

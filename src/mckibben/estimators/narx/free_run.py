@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.dynamic.narx import Narx
+from mckibben.blocks.kernels import kernel
 from mckibben.blocks.play_type.play import play_matrix
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.play_type.pi import play_operators

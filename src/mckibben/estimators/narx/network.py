@@ -9,9 +9,9 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import vector
 from mckibben.blocks.dynamic.narx import Narx
 from mckibben.blocks.dynamic.narx_network import NarxNetwork, activated
+from mckibben.blocks.fields import vector
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.narx.base import LEAST_GAIN, NarxEstimator
 from mckibben.estimators.narx.regressors import Lags

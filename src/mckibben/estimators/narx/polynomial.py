@@ -8,9 +8,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 from annotated_types import Interval
 
-from mckibben.blocks.core.fields import vector
 from mckibben.blocks.dynamic.narx import Narx
 from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial, products
+from mckibben.blocks.fields import vector
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.narx.base import NarxEstimator

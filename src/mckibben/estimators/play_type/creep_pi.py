@@ -13,9 +13,9 @@ import numpy as np
 from annotated_types import Ge, Interval
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.fields import vector
 from mckibben.blocks.memoryless.logarithm import Logarithm
 from mckibben.blocks.play_type.pi import PI
 from mckibben.estimators.core.data import Run, TrainingData

@@ -15,11 +15,11 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, vector
-from mckibben.blocks.core.running import run_many
+from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.creep import Creep, creep_step
 from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
+from mckibben.blocks.fields import Channel, vector
+from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import (

@@ -10,8 +10,8 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
 from mckibben.blocks.play_type.envelopes.base import Envelope
 from mckibben.blocks.play_type.envelopes.exponential import Exponential
 from mckibben.blocks.play_type.envelopes.piecewise_linear import PiecewiseLinear

@@ -16,7 +16,7 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.output_maps import PolynomialMap
 from mckibben.estimators.core.separable import SeparableEstimator

@@ -8,8 +8,8 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
 from mckibben.blocks.play_type.maxwell_slip import MaxwellSlip, slip_matrix
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators

@@ -10,8 +10,8 @@ import numpy as np
 from annotated_types import Len
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
 from mckibben.blocks.play_type.memory import started
 from mckibben.blocks.play_type.pi import PI
 from mckibben.blocks.play_type.play import play_matrix

@@ -9,8 +9,8 @@ import numpy as np
 from annotated_types import Ge
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
 from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 from mckibben.estimators.core.best_of import best_of_settings
 from mckibben.estimators.core.data import Run, TrainingData

@@ -9,8 +9,8 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
 from mckibben.blocks.preisach_type.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
 from mckibben.blocks.preisach_type.preisach import Preisach
 from mckibben.estimators.core.data import Run, TrainingData

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
-from mckibben.blocks.core.kernels import SINGLE
+from mckibben.blocks.kernels import SINGLE
 from mckibben.errors import ModelError
 
 REAL, INT, VIEW = "mck_real", "int", "view"

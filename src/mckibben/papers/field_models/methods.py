@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.narx.network import NarxNetworkEstimator
 from mckibben.estimators.play_type.pi import PIEstimator

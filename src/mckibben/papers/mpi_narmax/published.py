@@ -16,7 +16,7 @@ identified. It is printed for 0.1 Hz; at other rates it extrapolates.
 from __future__ import annotations
 
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.fields import DISPLACEMENT, Channel
+from mckibben.blocks.fields import DISPLACEMENT, Channel
 from mckibben.blocks.memoryless.polynomial import Polynomial
 from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 

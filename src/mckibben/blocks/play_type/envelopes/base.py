@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.core.parametrised import Parametrised
-from mckibben.blocks.core.saving import part_from_dict
+from mckibben.blocks.kernels import inlined, kernel
+from mckibben.blocks.parameters import Parametrised
+from mckibben.blocks.saving import part_from_dict
 
 
 class EnvelopeKernel(Protocol):
@@ -32,7 +32,7 @@ class EnvelopeKernel(Protocol):
 
 def envelope_kernel(function: Callable[[float, Array], float]) -> EnvelopeKernel:
     """Compile a function of one number, and the loop over many."""
-    one: Any = kernel(function)
+    one: Any = inlined(function)  # so that what calls it is compiled alike, whatever was before
 
     def batch(coefficients: Array, arguments: Array, values: Array) -> None:
         for t in range(arguments.size):

@@ -12,9 +12,9 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import STRICT, Vector
-from mckibben.blocks.core.notation import Notation
+from mckibben.blocks.fields import STRICT, Vector
 from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel, envelope_kernel
 
 

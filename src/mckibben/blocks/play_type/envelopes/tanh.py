@@ -17,8 +17,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import STRICT
-from mckibben.blocks.core.notation import Notation
+from mckibben.blocks.fields import STRICT
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel, envelope_kernel
 
 

@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
-from mckibben.blocks.core.commanding import commands
-from mckibben.blocks.core.inverse import Inverse
-from mckibben.blocks.core.notation import (
+from mckibben.blocks.inverse import Inverse, commands
+from mckibben.blocks.notation import (
     FEW,
     MANY,
     Written,
@@ -25,8 +24,8 @@ from mckibben.blocks.core.notation import (
 )
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.block import Block
-    from mckibben.blocks.core.parametrised import Parametrised
+    from mckibben.blocks.base import Block
+    from mckibben.blocks.parameters import Parametrised
 
 Units = dict[str, str]
 

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import Initial
+from mckibben.blocks.fields import Initial
 from mckibben.errors import DataError, ModelError
 from mckibben.system.threads import cores
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
 
 
 class Stream:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.checked import Checked
-from mckibben.errors import ModelError
 from mckibben.system.extras import demand
 
 if TYPE_CHECKING:
     from scipy.signal import dlti, lti
 
     from control import StateSpace, TransferFunction
+    from mckibben.blocks.base import Block
 
 
 @dataclass(frozen=True)
@@ -101,97 +100,61 @@ class LinearSystem:
         return np.asarray(self.c @ np.linalg.solve(inner, self.b.astype(complex)) + self.d)
 
 
-class HandsOver(metaclass=Checked):
-    """What a block that is linear gives to other tools."""
+def as_scipy(block: Block, sample_time: float | None = None) -> dlti | lti:
+    """Return a linear model as a system of SciPy, of deviations from its operating point.
 
-    kind: ClassVar[str]
+    Simulated there, u - u_0 gives y - y_0; noise models stay behind. Without a sample time, what
+    is continuous in time comes as ``lti``; all else as ``dlti``, which holds the dead time too,
+    and what the input does between samples.
 
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return a linear block as a state-space system; its state is 0 at the operating point.
+    Parameters
+    ----------
+    sample_time : float, optional
+        Time between samples [s].
 
-        Parameters
-        ----------
-        sample_time : float, optional
-            Time between samples [s]; needed by blocks that are continuous in time.
+    Raises
+    ------
+    ModelError
+        If it is not linear, or has a dead time and no sample time is given.
+    """
+    from scipy import signal
 
-        Raises
-        ------
-        ModelError
-            If it is not linear.
-        """
-        del sample_time
-        raise ModelError(
-            f"{self.kind!r} is not linear, so it has no transfer function. Remedy: hand over a linear "
-            "model (oe, arx, armax, bj, p1 to p3), or look at its describing function."
-        )
-
-    def continuous(self) -> Polynomials | None:
-        """Return the transfer function of what is continuous in time, without dead time; else None."""
-        return None
-
-    def to_scipy(self, sample_time: float | None = None) -> dlti | lti:
-        """Return a linear model as a system of SciPy, of deviations from its operating point.
-
-        Simulated there, u - u_0 gives y - y_0; noise models stay behind. Without a sample time, what
-        is continuous in time comes as ``lti``; all else as ``dlti``, which holds the dead time too,
-        and what the input does between samples.
-
-        Parameters
-        ----------
-        sample_time : float, optional
-            Time between samples [s].
-
-        Raises
-        ------
-        ModelError
-            If it is not linear, or has a dead time and no sample time is given.
-        """
-        from scipy import signal
-
-        systems: Any = signal
-
-        continuous = self.continuous() if sample_time is None else None
-        if continuous is not None:
-            return systems.lti(continuous.numerator, continuous.denominator)
-        system = self.linear_system(sample_time)
-        step: Any = system.sample_time or sample_time or True
-        if system.polynomials is not None:
-            return systems.dlti(
-                system.polynomials.numerator, system.polynomials.denominator, dt=step
-            )
-        return systems.dlti(*_matrices(system), dt=step)
-
-    def to_control(self, sample_time: float | None = None) -> StateSpace | TransferFunction:
-        """Return a linear model as a system of python-control, as `to_scipy` does.
-
-        Parameters
-        ----------
-        sample_time : float, optional
-            Time between samples [s].
-
-        Raises
-        ------
-        ModelError
-            As of `to_scipy`.
-        DataError
-            Without python-control.
-        """
-        demand("control", "control", "transfer functions of python-control")
-        import control
-
-        continuous = self.continuous() if sample_time is None else None
-        if continuous is not None:
-            return control.tf(continuous.numerator, continuous.denominator)
-        system = self.linear_system(sample_time)
-        step: Any = system.sample_time or sample_time or True
-        if system.polynomials is not None:
-            return control.tf(system.polynomials.numerator, system.polynomials.denominator, step)
-        return control.ss(*_matrices(system), step, remove_useless_states=False)
+    systems: Any = signal
+    continuous = block.continuous() if sample_time is None else None
+    if continuous is not None:
+        return systems.lti(continuous.numerator, continuous.denominator)
+    return systems.dlti(*(parts := _discrete(block, sample_time))[:-1], dt=parts[-1])
 
 
-def _matrices(system: LinearSystem) -> tuple[Array, Array, Array, Array]:
-    """Return A, B, C and D, with a state that nothing reads where there would be none."""
+def as_control(block: Block, sample_time: float | None = None) -> StateSpace | TransferFunction:
+    """Return a linear model as a system of python-control, as `as_scipy` does.
+
+    Raises
+    ------
+    ModelError
+        As of `as_scipy`.
+    DataError
+        Without python-control.
+    """
+    demand("control", "control", "transfer functions of python-control")
+    import control
+
+    continuous = block.continuous() if sample_time is None else None
+    if continuous is not None:
+        return control.tf(continuous.numerator, continuous.denominator)
+    parts = _discrete(block, sample_time)
+    if len(parts) == 3:
+        return control.tf(*parts)
+    return control.ss(*parts, remove_useless_states=False)
+
+
+def _discrete(block: Block, sample_time: float | None) -> tuple[Any, ...]:
+    """Return numerator and denominator, or A, B, C and D, then the sample time or True."""
+    system = block.linear_system(sample_time)
+    step = system.sample_time or sample_time or True
+    if system.polynomials is not None:
+        return system.polynomials.numerator, system.polynomials.denominator, step
     if len(system.a):
-        return system.a, system.b, system.c, system.d
-    m, k = system.d.shape
-    return np.zeros((1, 1)), np.zeros((1, k)), np.zeros((m, 1)), system.d
+        return system.a, system.b, system.c, system.d, step
+    m, k = system.d.shape  # with a state that nothing reads where there would be none
+    return np.zeros((1, 1)), np.zeros((1, k)), np.zeros((m, 1)), system.d, step

@@ -22,7 +22,7 @@ from mckibben.system.atomic import write_text
 from mckibben.system.ordinary import read_text
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
 
 FORMAT = "mckibben-model"
 VERSION = 1

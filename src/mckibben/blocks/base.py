@@ -1,40 +1,85 @@
 """What a block is: an immutable parameter set with dynamics.
 
-A concrete block is either a `Primitive`, which is one compiled kernel with its coefficients, or
-composes other blocks. Both kinds say how they *bind*: given state, input and output arrays they
-return a function without arguments that runs them, and everything else here is built on that.
+A block is one compiled kernel with its coefficients, or composes other blocks. Both kinds *bind*: given
+state, input and output arrays they return a function without arguments that runs them, and everything
+else here is built on that.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.blocks.core import saving
-from mckibben.blocks.core.exportable import Exportable
-from mckibben.blocks.core.fields import Channel, Initial
-from mckibben.blocks.core.kernels import Step, in_scratch
-from mckibben.blocks.core.linear import HandsOver
-from mckibben.blocks.core.parametrised import Parametrised
-from mckibben.blocks.core.refusals import VIRGIN, explicit_state
-from mckibben.blocks.core.running import Stream, refuse_time, run_many
+from mckibben.blocks import saving
+from mckibben.blocks.fields import Channel, Initial
+from mckibben.blocks.kernels import Step, in_scratch
+from mckibben.blocks.linear import LinearSystem, Polynomials, as_control, as_scipy
+from mckibben.blocks.parameters import Parametrised
+from mckibben.blocks.running import Stream, refuse_time, run_many
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.system.compiling import bound
 from mckibben.system.showing import DrawsItself
 
+if TYPE_CHECKING:
+    from scipy.signal import dlti, lti
+
+    from control import StateSpace, TransferFunction
+
 Run = Callable[[], None]
 Kernel = Step
 Start = Callable[..., None]
 
+VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
+"""Named starts, and whether a start kernel takes them as if nothing had happened before.
 
-class Block(DrawsItself, Exportable, Parametrised, HandsOver):
+"fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamic.linear_start`."""
+
+Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+"""Names of fields of channels: driven, scheduling, and given."""
+
+SEVERAL: Ports = ("driven",), ("scheduled",), ("given",)
+"""Of blocks of several channels."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Arithmetic operations of a step, roughly: usual and at worst."""
+
+    usual: int
+    worst: int
+
+    def __add__(self, other: Cost) -> Cost:
+        return Cost(self.usual + other.usual, self.worst + other.worst)
+
+    @classmethod
+    def of(cls, numbers: Array, n_states: int) -> Cost:
+        """Return the cost of one pass: about two operations a number, four a state."""
+        operations = 2 * numbers.size + 4 * n_states
+        return cls(operations, operations)
+
+
+class Board(Protocol):
+    """Where blocks are laid out as calls in order; signals are named by text."""
+
+    def call(self, block: Block, given: Sequence[str]) -> list[str]:
+        """Run a block on signals, and return those that it gives."""
+
+    def add(self, terms: Sequence[str]) -> str:
+        """Return the sum of signals."""
+
+    def resume(self, state: Sequence[float]) -> None:
+        """Start the blocks called last from a state of them all."""
+
+
+class Block(DrawsItself, Parametrised):
     """An immutable parameter set with dynamics.
 
     Concrete blocks are frozen dataclasses, registered under `kind`. They know their inputs and
@@ -43,6 +88,16 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
     """
 
     face: ClassVar[str] = "block"
+
+    kernel: ClassVar[Kernel]
+    """Advances one sample, ``kernel(coefficients, state, inputs, outputs)``. One with a parameter
+    ``scratch`` behind the state is given `n_scratch` numbers to compute in."""
+
+    start_kernel: ClassVar[Start | None] = None
+    """Fills the state, ``start_kernel(coefficients, state, first inputs, virgin)``, by a named rule."""
+
+    ports: ClassVar[Ports] = ("input",), (), ("output",)
+    """Fields of the channels driven, of those that schedule, and of those given."""
 
     rate_dependent: ClassVar[bool] = False
     """Whether the sample time matters to any block of this class."""
@@ -58,6 +113,12 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
     undoing: ClassVar[bool] = False
     """Whether blocks of this class undo another, which `undone` gives."""
 
+    increasing: ClassVar[tuple[str, ...]] = ()
+    """Fields of numbers in increasing order, which single precision must not make one."""
+
+    filters: ClassVar[bool] = False
+    """Whether it is linear with poles of its own, which may be too slow for single precision."""
+
     sample_time: float | None = None
     """Time between samples that a discrete block is bound to [s]; None for any."""
 
@@ -68,26 +129,77 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
     """By how long outputs come late, which its inverse leaves as it is [s]."""
 
     @property
-    @abstractmethod
-    def inputs(self) -> tuple[Channel, ...]:
-        """Driven inputs, then scheduling inputs."""
+    def title(self) -> str:
+        """What the block is called among blocks: its kind, and of an inverse, of what."""
+        return self.kind
 
     @property
-    @abstractmethod
+    def needs_double(self) -> str:
+        """Why single precision will not do, as part of a sentence; empty where it does."""
+        return ""
+
+    # -- channels ----------------------------------------------------------------------------
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Driven inputs, then scheduling inputs."""
+        driven, scheduling, _ = self.ports
+        return self._channels(*driven, *scheduling)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Names of the inputs that schedule the block but are not driven through it."""
+        return tuple(channel.name for channel in self._channels(*self.ports[1]))
+
+    @property
     def outputs(self) -> tuple[Channel, ...]:
         """Outputs."""
+        return self._channels(*self.ports[2])
+
+    def _channels(self, *fields: str) -> tuple[Channel, ...]:
+        found: list[Channel] = []
+        for field in fields:
+            value = getattr(self, field)
+            found += value if isinstance(value, tuple) else [value]
+        return tuple(found)
+
+    def check_channels(self) -> None:
+        """Refuse names that repeat, or no channels at all."""
+        for channels in (self.inputs, self.outputs):
+            names = [channel.name for channel in channels]
+            if not names or len(set(names)) < len(names):
+                raise ModelError(
+                    f"channels of {self.kind!r} are {names}. Remedy: give each a name of its own."
+                )
+
+    @property
+    def input_limits(self) -> tuple[float, float]:
+        """Lowest and highest input; infinite where the block has no field ``input_range``."""
+        ends: tuple[float, float] | None = getattr(self, "input_range", None)
+        return (-np.inf, np.inf) if ends is None else ends
 
     @property
     def n_missable(self) -> int:
         """How many of the last inputs may be absent: NaN, in a stream, in C, and in arrays."""
         return 0
 
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """Names of the inputs that schedule the block but are not driven through it."""
-        return ()
+    # -- memory ------------------------------------------------------------------------------
 
-    @abstractmethod
+    @property
+    def n_states(self) -> int:
+        """Length of the state vector."""
+        return 0
+
+    @property
+    def n_scratch(self) -> int:
+        """How many numbers a step computes in beside the state, for code that cannot allocate."""
+        return 0
+
+    @property
+    def start(self) -> Initial:
+        """Memory before the first sample that is used where none is given."""
+        return getattr(self, "initial", "first_sample")
+
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the state before the first sample, shape (n_states,), a new array.
 
@@ -99,19 +211,82 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
             As if the input had only risen to the first sample; as if nothing had ever happened; or
             the state itself. Default is the block's own.
         """
+        start = self.start if initial is None else initial
+        if not isinstance(start, str) or start not in VIRGIN:
+            return explicit_state(self, start)
+        state = np.zeros(self.n_states)
+        kernel = self.start_kernel
+        if kernel is not None:
+            given = np.ascontiguousarray(first, dtype=np.float64)
+            scratch = scratch_of(kernel, self.n_scratch)
+            kernel(self.start_numbers(), state, *scratch, given, VIRGIN[start])
+        return state
 
-    @abstractmethod
+    def start_numbers(self) -> Array:
+        """Return the coefficients as starts read them, which no sample time changes."""
+        return self.coefficients(self.sample_time or 1.0)
+
+    def state_at(self, first: Array, output: Array) -> Array | None:
+        """Return the state at rest at a first input where the output is known, for models of it.
+
+        None, by default, where past outputs are no part of the state.
+        """
+        del first, output
+        return None
+
+    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
+        """Return the start to use on a recording, which some rules look at; by default as given."""
+        del recording
+        return initial
+
+    # -- its kernel --------------------------------------------------------------------------
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return the numbers that the kernel reads, one-dimensional; by default the parameters.
+
+        Raises
+        ------
+        ModelError
+            If the block has no kernel: it is composed of others, each of which has its own.
+        """
+        del sample_time
+        if getattr(self, "kernel", None) is None:
+            raise ModelError(
+                f"{self.kind!r} is neither one kernel nor a composition, so it cannot be exported. "
+                "Remedy: compose it of blocks."
+            )
+        return self.pack()
+
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs the block over ``inputs`` into ``outputs``, changing ``state``.
 
         ``inputs`` has shape (n, n_inputs) and ``outputs`` (n, n_outputs), both C-contiguous; all
         arrays are used in place at every call, so the caller may refill ``inputs`` between calls.
         """
+        numbers, kernel = self.coefficients(sample_time), self.kernel
+        scratch = scratch_of(kernel, self.n_scratch)
+        return bound(kernel.batch, numbers, state, *scratch, inputs, outputs)
 
-    @classmethod
-    @abstractmethod
-    def example(cls) -> Block:
-        """Return a small, typical block of this class, for documentation and contract tests."""
+    @property
+    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
+        """Kernels of a step, and of the start if it has memory, which C is translated from."""
+        step, start = getattr(self, "kernel", None), self.start_kernel
+        if step is None or (self.n_states and start is None):
+            return ()
+        return (step, start) if self.n_states and start is not None else (step,)
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return what a step costs."""
+        return Cost.of(self.coefficients(sample_time), self.n_states)
+
+    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Give the name and the numbers of every field that is `increasing`."""
+        for name in self.increasing:
+            yield name, getattr(self, name)
+
+    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+        """Lay the block out on a board, and return the signals that it gives."""
+        return board.call(self, given)
 
     def inverse(self) -> Block:
         """Return the block that undoes this one.
@@ -142,19 +317,6 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
         n = len(self.outputs)
         return np.full(n, -np.inf), np.full(n, np.inf)
 
-    def state_at(self, first: Array, output: Array) -> Array | None:
-        """Return the state at rest at a first input where the output is known, for models of it.
-
-        None, by default, where past outputs are no part of the state.
-        """
-        del first, output
-        return None
-
-    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        """Return the start to use on a recording, which some rules look at; by default as given."""
-        del recording
-        return initial
-
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Return the outputs that can be reached where the inputs between two ends can be.
 
@@ -164,6 +326,44 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
             first, second = np.sort(self.simulate(np.array([low, high])), axis=0)
             return first, second
         return self.reachable()
+
+    # -- linear blocks -----------------------------------------------------------------------
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return a linear block as a state-space system; its state is 0 at the operating point.
+
+        Parameters
+        ----------
+        sample_time : float, optional
+            Time between samples [s]; needed by blocks that are continuous in time.
+
+        Raises
+        ------
+        ModelError
+            If it is not linear.
+        """
+        del sample_time
+        raise ModelError(
+            f"{self.kind!r} is not linear, so it has no transfer function. Remedy: hand over a linear "
+            "model (oe, arx, armax, bj, p1 to p3), or look at its describing function."
+        )
+
+    def continuous(self) -> Polynomials | None:
+        """Return the transfer function of what is continuous in time, without dead time; else None."""
+        return None
+
+    def to_scipy(self, sample_time: float | None = None) -> dlti | lti:
+        """Return a linear model as a system of SciPy; see `mckibben.blocks.linear.as_scipy`."""
+        return as_scipy(self, sample_time)
+
+    def to_control(self, sample_time: float | None = None) -> StateSpace | TransferFunction:
+        """Return a linear model as one of python-control; see `mckibben.blocks.linear.as_control`."""
+        return as_control(self, sample_time)
+
+    @classmethod
+    @abstractmethod
+    def example(cls) -> Block:
+        """Return a small, typical block of this class, for documentation and contract tests."""
 
     # -- running -----------------------------------------------------------------------------
 
@@ -345,53 +545,20 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
         saving.save(self, path)
 
 
-class Primitive(Block):
-    """A block that is one kernel, ``kernel(coefficients, state, inputs, outputs)``.
-
-    A kernel with a parameter ``scratch`` behind the state is given `n_scratch` numbers to compute in.
-    """
-
-    kernel: ClassVar[Kernel]
-
-    start_kernel: ClassVar[Start | None] = None
-    """Fills the state, ``start_kernel(coefficients, state, first inputs, virgin)``, by a named rule."""
-
-    @property
-    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
-        """The kernel, and that of the start."""
-        return kernels_for_c(self.kernel, self.start_kernel, self.n_states)
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state before the first sample: by a named rule, or given itself."""
-        start = self.start if initial is None else initial
-        if not isinstance(start, str) or start not in VIRGIN:
-            return explicit_state(self, start)
-        state = np.zeros(self.n_states)
-        kernel = self.start_kernel
-        if kernel is not None:
-            fill(kernel, self.start_numbers(), state, self.n_scratch, first, start)
-        return state
-
-    def start_numbers(self) -> Array:
-        """Return the coefficients as starts read them, which no sample time changes."""
-        return self.coefficients(self.sample_time or 1.0)
-
-    def coefficients(self, sample_time: float | None) -> Array:
-        """Return the numbers that the kernel reads, one-dimensional; by default the parameters."""
-        del sample_time
-        return self.pack()
-
-    def c_numbers(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads."""
-        return self.coefficients(sample_time)
-
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs the kernel in place."""
-        numbers = self.coefficients(sample_time)
-        kernel = self.kernel
-        return bound(
-            kernel.batch, numbers, state, *scratch_of(kernel, self.n_scratch), inputs, outputs
+def explicit_state(block: Block, initial: Initial) -> Array:
+    """Return an explicit initial state after checking its length."""
+    if isinstance(initial, str):
+        raise ModelError(
+            f"{block.kind!r} knows no start {initial!r}. Remedy: give 'first_sample', 'virgin', or "
+            f"{block.n_states} numbers."
         )
+    state = np.array(initial, dtype=np.float64)
+    if state.shape != (block.n_states,) or not np.isfinite(state).all():
+        raise ModelError(
+            f"{block.kind!r} has {block.n_states} states, the initial state given has shape "
+            f"{state.shape}. Remedy: give {block.n_states} finite numbers, or 'first_sample'."
+        )
+    return state
 
 
 def scratch_of(kernel: Callable[..., Any], size: int) -> list[Array]:
@@ -399,16 +566,22 @@ def scratch_of(kernel: Callable[..., Any], size: int) -> list[Array]:
     return [np.zeros(size)] if in_scratch(kernel) else []
 
 
-def fill(
-    start: Start, numbers: Array, state: Array, n_scratch: int, first: Array, rule: Initial
-) -> None:
-    """Fill a state by a start kernel and a named rule."""
-    given = np.ascontiguousarray(first, dtype=np.float64)
-    start(numbers, state, *scratch_of(start, n_scratch), given, VIRGIN[str(rule)])
+def needs_sample_time(kind: str, sample_time: float | None) -> float:
+    """Return the sample time, or say that a rate-dependent block cannot do without."""
+    if sample_time is None or not sample_time > 0:
+        raise ModelError(
+            f"{kind!r} depends on rate and needs a sample time, but the data have no time. "
+            "Remedy: read the recording with a time column or --rate, or give sample_time."
+        )
+    return sample_time
 
 
-def kernels_for_c(step: Step, start: Start | None, n_states: int) -> tuple[Callable[..., Any], ...]:
-    """Return the kernels of a step and of its start; none where a start is wanted and has no kernel."""
-    if n_states == 0:
-        return (step,)
-    return () if start is None else (step, start)
+def own_sample_time(kind: str, own: float, sample_time: float | None) -> float:
+    """Return the sample time of a discrete block, after checking that the data have the same."""
+    step = needs_sample_time(kind, sample_time)
+    if abs(step - own) > 1e-3 * own:
+        raise ModelError(
+            f"{kind!r} holds for a sample time of {own:g} s, but the data have {step:g} s. Remedy: "
+            f"resample them to {own:g} s, or identify the model again."
+        )
+    return own

@@ -5,13 +5,9 @@ from __future__ import annotations
 from typing import Literal
 
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.inverse import Inverse, Invertible
-from mckibben.blocks.core.solved_inverse import Solved
+from mckibben.blocks.core.inverse import Inverse
 
 Kind = Literal["exact", "solved", "none"]
-
-SOLVED = ("balance", "force-balance", "fuzzy-network")
-"""Kinds that solve equations for their inverse in a way of their own."""
 
 
 def inverse_of(inverse: Block | None) -> Kind:
@@ -29,8 +25,7 @@ def inverse_of(inverse: Block | None) -> Kind:
 
 def _solves(block: Block) -> bool:
     if isinstance(block, Inverse):
-        forward: Invertible = block.forward
-        return isinstance(forward, Solved) or forward.kind in SOLVED
+        return block.forward.inverse_kind == "solved"
     parts = [getattr(block, name, None) for name in block.parameters]
     nested = [part for some in parts for part in (some if isinstance(some, tuple) else (some,))]
     return any(_solves(part) for part in nested if isinstance(part, Block))

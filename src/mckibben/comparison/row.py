@@ -15,7 +15,7 @@ from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.drift import Drift
 from mckibben.comparison.inverses import inverse_of
-from mckibben.comparison.limits import caution
+from mckibben.comparison.offered import caution
 from mckibben.comparison.recommending import CONSTANT, order
 from mckibben.comparison.starts import Start
 from mckibben.errors import MckibbenError

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
@@ -37,6 +37,9 @@ from mckibben.system.compiling import bound
 
 class Invertible(Primitive):
     """A block that declares its inverse: a kernel, what that reads, and how it starts."""
+
+    inverse_kind: ClassVar[Literal["exact", "solved"]] = "exact"
+    """Whether the inverse is a formula, or solves equations in every sample."""
 
     inverse_kernel: ClassVar[Kernel]
     """Runs the inverse, as `kernel` runs the block."""

@@ -98,6 +98,7 @@ def solved_cost(trial: Cost) -> Cost:
 class Solved(Ranged):
     """A single-channel block whose inverse is solved for in every sample."""
 
+    inverse_kind = "solved"
     inverse_remembers = "input"
 
     @abstractmethod

@@ -165,6 +165,7 @@ class Balance(ManyChannels, LearntBalance):
     """
 
     kind: ClassVar[str] = "balance"
+    inverse_kind = "solved"
     kernel: ClassVar[Kernel] = balance_step
     start_kernel: ClassVar[Start] = start_balance
     inverse_kernel: ClassVar[Kernel] = balance_inverse_step

@@ -269,6 +269,7 @@ class ForceBalance(ManyChannels, Invertible):
     """
 
     kind: ClassVar[str] = "force-balance"
+    inverse_kind = "solved"
     kernel: ClassVar[Kernel] = force_balance_step
     start_kernel: ClassVar[Start] = force_balance_start
     inverse_kernel: ClassVar[Kernel] = force_balance_inverse_step

@@ -165,6 +165,7 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
     """
 
     kind: ClassVar[str] = "fuzzy-network"
+    inverse_kind = "solved"
     kernel: ClassVar[Kernel] = fuzzy_network_step
     inverse_kernel: ClassVar[Kernel] = fuzzy_network_inverse_step
     inverse_start_kernel: ClassVar[Start] = fuzzy_network_inverse_start

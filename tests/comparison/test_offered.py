@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import types
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import get_args
 
@@ -12,7 +15,6 @@ import mckibben
 from mckibben import ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.inverses import inverse_of
 from mckibben.comparison.offered import (
     declared,
     default_model,
@@ -21,9 +23,12 @@ from mckibben.comparison.offered import (
     objections,
     settings_of,
     settings_of_all,
+    summary,
 )
+from mckibben.comparison.row import inverse_of
 from mckibben.errors import MckibbenError
-from mckibben.estimators.core.estimator import DefaultFor, Purpose
+from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
+from mckibben.estimators.play_type.pi import PIEstimator
 
 FITTED = Path(__file__).parents[2] / "docs" / "models" / "fitted"
 MODELS = registry.names("estimators")
@@ -50,6 +55,28 @@ def test_a_model_declares_what_it_is(model: str) -> None:
 def test_one_model_is_the_default_of_a_use(use: DefaultFor) -> None:
     found = [model for model in MODELS if declared(model).default_for == use]
     assert found == [default_model(use)]
+
+
+def test_a_plug_in_that_declares_nothing_is_listed_under_its_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    silent = types.new_class("Silent", (PIEstimator,), {})
+    for name in ("title", "purpose", "can", "quick", "makes", "default_for"):
+        setattr(silent, name, getattr(Estimator, name))
+    silent.__doc__ = "A model of mine."
+    outside = types.ModuleType("outside")
+    outside.silent = silent  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "outside", outside)
+    entries = [
+        EntryPoint(name, f"outside:{name}", "mckibben.estimators") for name in ("silent", "no")
+    ]
+    monkeypatch.setattr(registry, "entry_points", lambda group: entries)
+    registry._locations.cache_clear()
+    try:
+        assert set(needs()[-1].models) == {"no", "silent"}
+        assert summary("silent") == "silent. A model of mine."
+    finally:
+        registry._locations.cache_clear()
 
 
 @pytest.mark.parametrize("model", MODELS)

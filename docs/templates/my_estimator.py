@@ -27,6 +27,14 @@ class ElasticPlasticEstimator(SeparableEstimator):
     inverse; data are taken to start from 0, for the model has no offset.
     """
 
+    # --- What is said of the model; the README lists all that may be declared.
+    title = "Elastic-plastic model"
+    purpose = "memory"
+    can = "One loop of straight branches, with nonlocal memory."
+    cannot = "No curved branches, no rate, no creep."
+    inverse_kind = "exact"
+    makes = ("elastic-plastic",)
+
     # --- A setting of its own is a field with a default, validated by its type:
     # --- n_terms: Annotated[int, Ge(1)] = 4
 

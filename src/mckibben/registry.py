@@ -1,4 +1,4 @@
-"""Every plug-in of the package, one line each: group, name, and where it lives, or a preset of one.
+"""Every plug-in of the package, one line each: group, name, and where it lives.
 
 A plug-in is imported when it is first asked for, never before. Packages outside this one join by
 entry points in the groups ``mckibben.blocks``, ``mckibben.estimators`` and so on.
@@ -12,18 +12,9 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from mckibben.errors import ModelError
-from mckibben.presets import Chosen, Preset, preset
+from mckibben.presets import Chosen, Preset
 
-LINEAR = "mckibben.estimators.linear.models:PredictionErrorEstimator"
-PROCESS = "mckibben.estimators.linear.process:ProcessModelEstimator"
-FORCE_LAW = "mckibben.estimators.force.static:PolynomialForceEstimator"
-MULTISTATE = "mckibben.estimators.force.multistate:MultistateEstimator"
-GRID = "mckibben.estimators.preisach_type.preisach:GridEstimator"
-SLIP = "mckibben.estimators.play_type.maxwell_slip:MaxwellSlipEstimator"
-NARX = "mckibben.estimators.narx.polynomial:NarxPolynomialEstimator"
-SDCHM = "mckibben.estimators.coupled.sdchm:SDCHMEstimator"
-
-PLUGINS: dict[str, dict[str, str | Preset]] = {
+PLUGINS: dict[str, dict[str, str]] = {
     "blocks": {
         "activation-memory": "mckibben.blocks.force.activation_memory:ActivationMemory",
         "activation-pressure": "mckibben.blocks.force.activation_pressure:ActivationPressure",
@@ -106,128 +97,55 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
             "mckibben.estimators.force.activation_pressure:ActivationPressureEstimator"
         ),
         "air": "mckibben.estimators.dynamic.air:AirEstimator",
-        "armax": preset(LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0),
-        "arx": preset(LINEAR, "ARX model, A y = B u + e, by linear least squares."),
+        "armax": "mckibben.estimators.linear.models:ARMAX",
+        "arx": "mckibben.estimators.linear.models:ARX",
         "balance": "mckibben.estimators.coupled.balance:BalanceEstimator",
         "balance-force": "mckibben.estimators.coupled.balance_force:BalanceForceEstimator",
-        "bj": preset(
-            LINEAR,
-            "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
-            shared_poles=False,
-            n_noise=2,
-            n_noise_poles=2,
-            effort=1.0,
-        ),
+        "bj": "mckibben.estimators.linear.models:BJ",
         "bouc-wen": "mckibben.estimators.differential.bouc_wen:BoucWenEstimator",
         "bouc-wen-oscillator": (
             "mckibben.estimators.differential.bouc_wen_oscillator:BoucWenOscillatorEstimator"
         ),
         "coupled-memory": "mckibben.estimators.coupled.memory:CoupledMemoryEstimator",
-        "coupled-pi": preset(
-            SDCHM,
-            "Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline.",
-            memory="gpi",
-            n_sets=0,
-            n_friction=0,
-        ),
+        "coupled-pi": "mckibben.estimators.coupled.sdchm:COUPLED_PI",
         "cpi": "mckibben.estimators.play_type.creep_pi:CreepPIEstimator",
         "duhem": "mckibben.estimators.differential.duhem:DuhemEstimator",
         "duhem-oscillator": (
             "mckibben.estimators.differential.duhem_oscillator:DuhemOscillatorEstimator"
         ),
         "eupi": "mckibben.estimators.play_type.eupi:EUPIEstimator",
-        "force-bilinear": preset(FORCE_LAW, "The bilinear-quadratic law.", law="bilinear"),
+        "force-bilinear": "mckibben.estimators.force.static:FORCE_BILINEAR",
         "force-chou": "mckibben.estimators.force.static:ChouHannafordEstimator",
-        "force-minh": preset(
-            FORCE_LAW,
-            "Minh's law: cubic in length, with coefficients linear in pressure.",
-            law="minh",
-        ),
-        "force-petrovic": preset(
-            FORCE_LAW,
-            "Petrovic's polynomial: quadratic in length with pressure, and without.",
-            law="petrovic",
-        ),
-        "force-schindele": preset(
-            FORCE_LAW,
-            "Schindele and Aschemann's polynomials: cubic with pressure, of fourth order without.",
-            law="schindele",
-        ),
+        "force-minh": "mckibben.estimators.force.static:FORCE_MINH",
+        "force-petrovic": "mckibben.estimators.force.static:FORCE_PETROVIC",
+        "force-schindele": "mckibben.estimators.force.static:FORCE_SCHINDELE",
         "force-tondu": "mckibben.estimators.force.static:TonduLopezEstimator",
         "gbw": "mckibben.estimators.differential.generalized_bouc_wen:GeneralizedBoucWenEstimator",
         "gpi": "mckibben.estimators.play_type.gpi:GPIEstimator",
-        "kp": preset(
-            GRID,
-            "Krasnosel'skii-Pokrovskii model by (non-negative) least squares on its operators.",
-            relays="gradual",
-        ),
-        "maxwell-slip": preset(SLIP, "Maxwell-slip model by least squares.", asymmetric=False),
-        "mms": preset(
-            SLIP,
-            "Modified Maxwell-slip model: the two ratios of its directions are searched.",
-            asymmetric=True,
-            effort=0.5,
-        ),
+        "kp": "mckibben.estimators.preisach_type.preisach:KP",
+        "maxwell-slip": "mckibben.estimators.play_type.maxwell_slip:MAXWELL_SLIP",
+        "mms": "mckibben.estimators.play_type.maxwell_slip:MMS",
         "mpi": "mckibben.estimators.play_type.mpi:MPIEstimator",
         "mpi-narmax": "mckibben.estimators.coupled.mpi_narmax:MPINarmaxEstimator",
-        "multistate": preset(
-            MULTISTATE,
-            "Multistate friction with one shared element and one for each direction: "
-            "eleven parameters.",
-            elements="each-way",
-            effort=3.0,
-        ),
-        "multistate-11": preset(
-            MULTISTATE,
-            "Multistate friction by bounded least squares from many starts, and exchange of elements.",
-            elements="eleven",
-        ),
-        "multistate-18": preset(
-            MULTISTATE,
-            "Multistate friction with three elements in both directions: eighteen parameters.",
-            elements="eighteen",
-        ),
-        "narx": NARX,
+        "multistate": "mckibben.estimators.force.multistate:MULTISTATE",
+        "multistate-11": "mckibben.estimators.force.multistate:MULTISTATE_11",
+        "multistate-18": "mckibben.estimators.force.multistate:MULTISTATE_18",
+        "narx": "mckibben.estimators.narx.polynomial:NarxPolynomialEstimator",
         "narx-network": "mckibben.estimators.narx.network:NarxNetworkEstimator",
-        "narx-play": preset(
-            NARX,
-            "Polynomial NARX model with play operators among its regressors, so that it keeps its "
-            "branch.",
-            output_lags=1,
-            input_lags=1,
-            n_play=6,
-            effort=0.2,
-        ),
-        "oe": preset(
-            LINEAR,
-            "Output-error model, y = B / F u + e: the best free run of its orders.",
-            shared_poles=False,
-            effort=0.8,
-        ),
-        "p1": preset(PROCESS, "One lag.", structure="P1"),
-        "p1z": preset(PROCESS, "One lag and a zero.", structure="P1Z"),
-        "p2": preset(PROCESS, "Two lags.", structure="P2"),
-        "p2u": preset(PROCESS, "Two poles that may oscillate.", structure="P2U"),
-        "p2uz": preset(PROCESS, "Two poles that may oscillate, and a zero.", structure="P2UZ"),
-        "p2z": preset(PROCESS, "Two lags and a zero.", structure="P2Z"),
-        "p3": preset(PROCESS, "Three lags.", structure="P3"),
+        "narx-play": "mckibben.estimators.narx.polynomial:NARX_PLAY",
+        "oe": "mckibben.estimators.linear.models:OE",
+        "p1": "mckibben.estimators.linear.process:P1",
+        "p1z": "mckibben.estimators.linear.process:P1Z",
+        "p2": "mckibben.estimators.linear.process:P2",
+        "p2u": "mckibben.estimators.linear.process:P2U",
+        "p2uz": "mckibben.estimators.linear.process:P2UZ",
+        "p2z": "mckibben.estimators.linear.process:P2Z",
+        "p3": "mckibben.estimators.linear.process:P3",
         "pi": "mckibben.estimators.play_type.pi:PIEstimator",
-        "preisach": preset(
-            GRID, "Preisach model by (non-negative) least squares on its cells.", relays="sudden"
-        ),
+        "preisach": "mckibben.estimators.preisach_type.preisach:PREISACH",
         "rdpi": "mckibben.estimators.play_type.rdpi:RDPIEstimator",
-        "sdchm": SDCHM,
-        "sdchm-published": preset(
-            SDCHM,
-            "SDCHM as its paper identifies it: GPI, coupling, and a network trained by particle swarm.",
-            effort=25.0,
-            constants=False,
-            method="pso",
-            ridge=1e-9,
-            memory="gpi",
-            memory_settings={"threshold_rule": "paper", "initial": "virgin"},
-            n_friction=0,
-        ),
+        "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",
+        "sdchm-published": "mckibben.estimators.coupled.sdchm:SDCHM_PUBLISHED",
         "state-network": "mckibben.estimators.dynamic.state_network:StateNetworkEstimator",
         "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
     },
@@ -291,7 +209,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "triangle": "mckibben.signals.excitations:triangle",
     },
 }
-"""Group -> name -> ``"module:attribute"``, or a preset. Adding a plug-in is one line here."""
+"""Group -> name -> ``"module:attribute"``. Adding a plug-in is one line here."""
 
 REPLACED: dict[str, dict[str, str]] = {
     "estimators": {"force-balance": "balance", "grey-box": "balance"},
@@ -326,22 +244,18 @@ def load(group: str, name: str) -> Any:
         raise ModelError(
             f"there is no {kind} named {name!r}. Remedy: use one of {', '.join(sorted(locations))}."
         )
-    found: Any = locations[name]
-    if isinstance(found, str):
-        module, _, attribute = found.partition(":")
-        try:
-            found = getattr(import_module(module), attribute)
-        except (ImportError, AttributeError, SyntaxError) as error:
-            raise ModelError(
-                f"{name!r} of the {group} cannot be imported: {error}. Remedy: mend "
-                f"{locations[name]}, or take it out of the registry."
-            ) from error
+    module, _, attribute = locations[name].partition(":")
+    try:
+        found: Any = getattr(import_module(module), attribute)
+    except (ImportError, AttributeError, SyntaxError) as error:
+        raise ModelError(
+            f"{name!r} of the {group} cannot be imported: {error}. Remedy: mend "
+            f"{locations[name]}, or take it out of the registry."
+        ) from error
     return Chosen(name, found) if isinstance(found, Preset) else found
 
 
 @cache
-def _locations(group: str) -> dict[str, str | Preset]:
-    outside: dict[str, str | Preset] = {
-        entry.name: entry.value for entry in entry_points(group=f"mckibben.{group}")
-    }
+def _locations(group: str) -> dict[str, str]:
+    outside = {entry.name: entry.value for entry in entry_points(group=f"mckibben.{group}")}
     return outside | PLUGINS[group]

@@ -89,18 +89,6 @@ def unit_of(part: Parametrised, field: str, index: tuple[int, ...], units: Units
     return resolved(own, index[-1] if index else 0, units)
 
 
-def undeclared(part: Parametrised) -> list[str]:
-    """Return the fields of parameters, parts aside, whose numbers have a unit nowhere."""
-    if any(name.endswith("]") for name in part.parameter_names):  # which hold units themselves
-        return []
-    numbers = {
-        field
-        for field in part.parameters
-        if any(isinstance(value, float) for _, value in _walked(getattr(part, field)))
-    }
-    return sorted(field for field in numbers if part.notation.unit(field) is None)
-
-
 def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[tuple[str, Quantity]]:
     """Give every number, each behind the names of the parts that it is in."""
     units = channel_units(part) or units

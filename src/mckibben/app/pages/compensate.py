@@ -64,9 +64,7 @@ def _none_yet(desk: Desk) -> str:
     if jobs:
         under_way = ", ".join(job.title for job in jobs)
         return f"Nothing that can be inverted is fitted yet. Under way: {under_way}."
-    several = len(desk.inputs) > 1
-    kinds = "balance, coupled-pi, sdchm" if several else "pi, gpi, mpi, cpi, preisach, balance"
-    return f"Fit a model that can be inverted first, under Models: {kinds}."
+    return "Fit a model that can be inverted first, under Models."
 
 
 def _reach(desk: Desk, model: str) -> dict[str, tuple[float, float]]:

@@ -24,6 +24,7 @@ from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import LOST, Contact
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.coupled.balance_checks import (
     check_directions,
@@ -132,6 +133,24 @@ class BalanceEstimator(CoupledEstimator):
         muscle 1's area at rest.
     """
 
+    title = "Balance of forces"
+    can = (
+        "Springs, areas, friction and relaxation of one muscle or several in parallel, under "
+        "load, stiffness and rate included; holds off the patterns of its training."
+    )
+    cannot = (
+        "Friction is the same in contraction and extension; one set of lags serves all "
+        "muscles; air's delay between command and pressure is not in it: put air in front."
+    )
+    inverse_kind = "exact"
+    quick = True
+    default_for = "plan of displacement"
+    param_grid: ClassVar[Grid] = {
+        "n_lags": (1, 2, 3),
+        "n_stops": (4, 6, 8),
+        "area": (2, 3),
+    }
+    makes = ("balance", "balance-inverse", "contact balance-inverse")
     effort: ClassVar[float] = 1.0
     alone: ClassVar[bool] = True
     fewer_outputs: ClassVar[bool] = True

@@ -49,6 +49,18 @@ class BalanceForceEstimator(ErrorsUnknown, SingleEstimator):
         What is likely before, as `balance` takes it.
     """
 
+    title = "Force from a balance of forces"
+    purpose = "force"
+    can = (
+        "Force by length, or displacement, and pressure: a balance of forces asked for its "
+        "load, with friction and relaxation."
+    )
+    cannot = (
+        "Loops at held length come from friction alone; beyond the lengths recorded its area "
+        "goes on straight."
+    )
+    quick = True
+
     input: str = "length"
     output: str = "force"
     pressure: str = "pressure"

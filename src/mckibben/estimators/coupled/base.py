@@ -42,6 +42,8 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
         ``pressure_extensor`` and ``force``, where there are any.
     """
 
+    purpose = "several"
+
     input: str | tuple[str, ...] | None = None
     output: str | tuple[str, ...] | None = None
     scheduling: tuple[str, ...] | None = None

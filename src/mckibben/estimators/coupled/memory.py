@@ -37,6 +37,14 @@ class CoupledMemoryEstimator(CoupledEstimator):
         Damping, relative to the size of what is read out.
     """
 
+    title = "Coupled lags and play operators"
+    can = (
+        "Any number of outputs from lags, play operators and products of all inputs; in "
+        "closed form."
+    )
+    cannot = "No inverse; products know nothing of inputs larger than those recorded."
+    quick = True
+    makes = ("coupled-memory",)
     needs_time: ClassVar[bool] = True
 
     lags: tuple[Annotated[float, Gt(0)], ...] = (0.3, 1.0, 8.0)

@@ -56,6 +56,10 @@ class MPINarmaxEstimator(CoupledEstimator):
         Damping of what is a rule's own.
     """
 
+    title = "MPI in a recurrent fuzzy network (MPI–NARMAX)"
+    can = "Hysteresis under a load that varies, by a recurrent fuzzy network behind a modified PI."
+    cannot = "No inverse; nothing keeps the network sensible under other pulls."
+    caution = "its network is arbitrary under loads and motions of another kind"
     effort: ClassVar[float] = 6.0
 
     most_inputs: ClassVar[float] = 1

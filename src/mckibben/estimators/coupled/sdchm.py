@@ -32,6 +32,7 @@ from mckibben.estimators.coupled.fuzzy_fit import Method, Search, fit_network
 from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm
 from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
 from mckibben.estimators.play_type.pi import play_operators
+from mckibben.presets import preset
 from mckibben.recording import Recording
 
 BEYOND = 0.1
@@ -140,6 +141,14 @@ def as_block(
 class TSFNNEstimator(NetworkEstimator):
     """Fuzzy network on the raw pressures: the paper's baseline, without memory."""
 
+    title = "Takagi–Sugeno fuzzy network of raw pressures (TSFNN)"
+    can = "A network without memory, as a baseline."
+    cannot = "Hysteresis; combinations of pressures unlike those recorded."
+    caution = (
+        "its network is arbitrary where muscles move in other combinations (mckibben "
+        "reproduce sdchm)"
+    )
+    inverse_kind = "solved"
     effort: ClassVar[float] = 5.0
 
     paired: ClassVar[bool] = False
@@ -177,6 +186,16 @@ class SDCHMEstimator(NetworkEstimator):
         Times that network and friction are fitted in turn.
     """
 
+    title = "Stiffness-dependent coupled hysteresis model (SDCHM)"
+    can = (
+        "Hysteresis, coupling and stiffness of muscles round a backbone; its damped network "
+        "holds where pressures move in other combinations."
+    )
+    cannot = (
+        "Strong rate dependence; with next to no damping (ridge) its network is arbitrary off"
+        " the runs recorded."
+    )
+    inverse_kind = "solved"
     effort: ClassVar[float] = 20.0
     each_alone: ClassVar[bool] = True
 
@@ -340,3 +359,36 @@ def coupled(memories: list[Block], runs: list[Run], data: TrainingData) -> Coupl
             if j != i:
                 gains[i, j] = float(v @ run.outputs[:, j]) / float(v @ v)
     return Coupling(rows(gains), data.outputs, data.outputs)
+
+
+COUPLED_PI = preset(
+    SDCHMEstimator,
+    "Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline.",
+    title="Coupled Prandtl–Ishlinskii model",
+    can="Hysteresis of every muscle, and a constant coupling.",
+    cannot="The coupling does not change with stiffness.",
+    inverse_kind="exact",
+    quick=True,
+    memory="gpi",
+    n_sets=0,
+    n_friction=0,
+)
+
+SDCHM_PUBLISHED = preset(
+    SDCHMEstimator,
+    "SDCHM as its paper identifies it: GPI, coupling, and a network trained by particle swarm.",
+    title="SDCHM as its paper identifies it",
+    can="As sdchm, identified as its paper has it.",
+    cannot="Combinations of pressures unlike those recorded: its network is arbitrary there.",
+    caution=(
+        "its network is arbitrary where muscles move in other combinations (mckibben "
+        "reproduce sdchm)"
+    ),
+    effort=25.0,
+    constants=False,
+    method="pso",
+    ridge=1e-9,
+    memory="gpi",
+    memory_settings={"threshold_rule": "paper", "initial": "virgin"},
+    n_friction=0,
+)

@@ -19,6 +19,13 @@ from mckibben.estimators.differential.loops import DifferentialLoopEstimator
 class BoucWenEstimator(DifferentialLoopEstimator):
     """Bouc-Wen model by variable projection: rate and sigma are searched, the rest is solved for."""
 
+    title = "Bouc–Wen model"
+    purpose = "memory"
+    can = "A loop that saturates, with five numbers or so, and a reversible polynomial."
+    cannot = "Minor loops need not close; loops are symmetric but for the polynomial."
+    inverse_kind = "solved"
+    quick = True
+    makes = ("bouc-wen",)
     effort: ClassVar[float] = 0.6
 
     lowest: ClassVar[tuple[float, ...]] = (0.5,)

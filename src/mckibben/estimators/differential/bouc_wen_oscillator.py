@@ -16,6 +16,17 @@ from mckibben.estimators.differential.oscillator_slopes import follow_bouc_wen
 class BoucWenOscillatorEstimator(OscillatorEstimator):
     """Bouc-Wen oscillator by Gauss-Newton on free runs, begun with a linear one's stiffness shared."""
 
+    title = "Bouc–Wen oscillator"
+    purpose = "rate"
+    can = (
+        "A mass, a damper and a spring with Bouc-Wen hysteresis inside the loop, from force "
+        "to displacement: six numbers, from free runs or from periods of a steady motion."
+    )
+    cannot = (
+        "One mass, linear but for the element, whose loops are symmetric; needs time; no inverse."
+    )
+    quick = True
+
     n_positive: ClassVar[int] = 4
     follows: ClassVar[Callable[..., None]] = staticmethod(follow_bouc_wen)
 

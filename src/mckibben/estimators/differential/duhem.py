@@ -28,6 +28,14 @@ class DuhemEstimator(SeparableEstimator):
         Of the slope right after a reversal.
     """
 
+    title = "Duhem model"
+    purpose = "memory"
+    can = "Loops that tend to a curve, with polynomial slopes; in closed form."
+    cannot = (
+        "Minor loops are not congruent and need not close; the inverse exists only where the "
+        "slopes stay positive."
+    )
+    makes = ("duhem",)
     effort: ClassVar[float] = 1.1
 
     nonnegative: bool = False

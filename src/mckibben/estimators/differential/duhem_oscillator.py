@@ -34,6 +34,17 @@ class DuhemOscillatorEstimator(OscillatorEstimator):
         is there; spread evenly over the element's forces.
     """
 
+    title = "Duhem oscillator"
+    purpose = "rate"
+    can = (
+        "A mass, a damper and a spring with hysteresis of unknown shape inside the loop: "
+        "slopes of one element, free in either direction."
+    )
+    cannot = (
+        "The element remembers one number, so nothing of minor loops once they are left; "
+        "slopes beyond the forces seen are held; no inverse."
+    )
+
     n_pieces: Annotated[int, Interval(ge=1, le=20)] = 2
 
     n_positive: ClassVar[int] = 3

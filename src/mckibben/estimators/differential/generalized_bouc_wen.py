@@ -22,6 +22,12 @@ MOST_ASYMMETRIC = 0.19
 class GeneralizedBoucWenEstimator(DifferentialLoopEstimator):
     """Generalised Bouc-Wen model: rate and shape are searched, the rest is solved for."""
 
+    title = "Generalised Bouc–Wen model (GBW)"
+    purpose = "memory"
+    can = "Asymmetric saturating loops, by five shape numbers."
+    cannot = "Minor loops need not close; many starts are needed to identify it."
+    inverse_kind = "solved"
+    makes = ("generalized-bouc-wen",)
     effort: ClassVar[float] = 1.3
 
     lowest: ClassVar[tuple[float, ...]] = (-MOST_ASYMMETRIC,) * 5

@@ -57,6 +57,17 @@ class AirEstimator(SeparableEstimator):
         0 below, if nothing recorded is, and no limit above.
     """
 
+    title = "Valve and air"
+    purpose = "rate"
+    can = (
+        "What lies between a valve's command and the pressure: gain, hysteresis, lags that "
+        "differ in filling and venting, dead time."
+    )
+    cannot = (
+        "Knows nothing of how the flow depends on pressure and room: a muscle that moves, or "
+        "a large step, fills at another speed."
+    )
+    inverse_kind = "exact"
     needs_time: ClassVar[bool] = True
 
     effort: ClassVar[float] = 1.0

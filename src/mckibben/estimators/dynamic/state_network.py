@@ -68,6 +68,14 @@ class StateNetworkEstimator(SingleEstimator):
         no more than 1/3 rad in each.
     """
 
+    title = "State-space network"
+    purpose = "rate"
+    can = (
+        "Nonlinear dynamics with memory of any kind, from force to displacement, told nothing"
+        " but the number of states."
+    )
+    cannot = "Slow to fit; no inverse; nothing keeps it sensible beyond the data."
+    caution = "a network without physics is arbitrary beyond them"
     needs_time: ClassVar[bool] = True
 
     input: str = "force"

@@ -44,6 +44,12 @@ class ActivationPressureEstimator(SearchingEstimator):
         found is set to that of the first run that is not static.
     """
 
+    title = "Activation pressure by characteristic points"
+    purpose = "force"
+    can = (
+        "Pressure for a contraction under a force, at one frequency of a sine; as its paper has it."
+    )
+    cannot = "Knows no minor loops and no other frequency: its hysteresis is a term in the rate."
     needs_time: ClassVar[bool] = True
 
     input: str = "contraction"

@@ -15,6 +15,7 @@ from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.uncertainty import inverted, told_by_runs
 from mckibben.estimators.linear.polynomials import Orders, Polynomials
 from mckibben.estimators.linear.prediction_error import (
@@ -25,6 +26,7 @@ from mckibben.estimators.linear.prediction_error import (
 )
 from mckibben.estimators.linear.starts import LinearEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
 
 Order = Annotated[int, Interval(ge=0, le=20)]
 Lag = Annotated[int, Interval(ge=0, le=120)]
@@ -75,6 +77,12 @@ class PredictionErrorEstimator(LinearEstimator):
         Starting points.
     """
 
+    purpose = "rate"
+    inverse_kind = "exact where stable"
+    param_grid: ClassVar[Grid] = {
+        "n_poles": (1, 2, 3),
+        "n_zeros": (1, 2, 3),
+    }
     needs_time: ClassVar[bool] = True
 
     n_zeros: Annotated[int, Interval(ge=1, le=20)] = 2
@@ -199,3 +207,49 @@ class PredictionErrorEstimator(LinearEstimator):
         covariance = np.full((n, n), np.nan)
         covariance[np.ix_(used, used)] = (turned @ self._covariance @ turned.T)[np.ix_(used, used)]
         return self._condition, covariance
+
+
+ARMAX = preset(
+    PredictionErrorEstimator,
+    "ARMAX model, A y = B u + C e.",
+    title="ARMAX model, linear",
+    can="Linear dynamics with a model of the noise; fast to fit.",
+    cannot="Has no hysteresis: rising and falling branches coincide at rest.",
+    param_grid={"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3), "n_noise": (1, 2)},
+    n_noise=2,
+    effort=1.0,
+)
+
+ARX = preset(
+    PredictionErrorEstimator,
+    "ARX model, A y = B u + e, by linear least squares.",
+    title="ARX model, linear",
+    can="Linear dynamics, in closed form.",
+    cannot=(
+        "No hysteresis; biased by noise in the output, so its free run drifts from what one "
+        "step ahead promises."
+    ),
+    param_grid={"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
+)
+
+BJ = preset(
+    PredictionErrorEstimator,
+    "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
+    title="Box–Jenkins model (BJ), linear",
+    can="Linear dynamics with noise described apart from them.",
+    cannot="No hysteresis.",
+    shared_poles=False,
+    n_noise=2,
+    n_noise_poles=2,
+    effort=1.0,
+)
+
+OE = preset(
+    PredictionErrorEstimator,
+    "Output-error model, y = B / F u + e: the best free run of its orders.",
+    title="Output-error model (OE), linear",
+    can="Linear dynamics, identified on free runs.",
+    cannot="No hysteresis.",
+    shared_poles=False,
+    effort=0.8,
+)

@@ -16,6 +16,7 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.linear.starts import LinearEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
 
 Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 
@@ -36,6 +37,8 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         What the input does between samples.
     """
 
+    purpose = "rate"
+    cannot = "No hysteresis; no inverse."
     needs_time: ClassVar[bool] = True
 
     effort: ClassVar[float] = 0.3
@@ -162,3 +165,55 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
             place = 1 + n + ("Z" in self.structure)
             lower[place], upper[place] = 1e-6, self.bounds(data)[1][-1]
         return template, lower, upper
+
+
+P1 = preset(
+    ProcessModelEstimator,
+    "One lag.",
+    title="Process model: one lag (P1)",
+    structure="P1",
+)
+
+P1Z = preset(
+    ProcessModelEstimator,
+    "One lag and a zero.",
+    title="Process model: one lag and a zero (P1Z)",
+    structure="P1Z",
+)
+
+P2 = preset(
+    ProcessModelEstimator,
+    "Two lags.",
+    title="Process model: two lags (P2)",
+    structure="P2",
+)
+
+P2U = preset(
+    ProcessModelEstimator,
+    "Two poles that may oscillate.",
+    title="Process model: oscillating poles (P2U)",
+    structure="P2U",
+)
+
+P2UZ = preset(
+    ProcessModelEstimator,
+    "Two poles that may oscillate, and a zero.",
+    title="Process model: oscillating poles and a zero (P2UZ)",
+    can="Two poles that may oscillate, and a zero: best of the linear ones on coiled muscles.",
+    quick=True,
+    structure="P2UZ",
+)
+
+P2Z = preset(
+    ProcessModelEstimator,
+    "Two lags and a zero.",
+    title="Process model: two lags and a zero (P2Z)",
+    structure="P2Z",
+)
+
+P3 = preset(
+    ProcessModelEstimator,
+    "Three lags.",
+    title="Process model: three lags (P3)",
+    structure="P3",
+)

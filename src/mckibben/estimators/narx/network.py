@@ -13,6 +13,7 @@ from mckibben.blocks.dynamic.narx import Narx
 from mckibben.blocks.dynamic.narx_network import NarxNetwork, activated
 from mckibben.blocks.fields import vector
 from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.narx.base import LEAST_GAIN, NarxEstimator
 from mckibben.estimators.narx.regressors import Lags
 from mckibben.estimators.optimisers.descent import Radius, descend
@@ -39,6 +40,12 @@ class NarxNetworkEstimator(NarxEstimator):
         Random first layers tried.
     """
 
+    title = "NARX network"
+    purpose = "rate"
+    can = "Nonlinear dynamics by one hidden layer."
+    cannot = "Slow to fit; no inverse; nothing keeps it sensible beyond the data."
+    caution = "a network without physics is arbitrary beyond them"
+    param_grid: ClassVar[Grid] = {"output_lags": (1, 2), "n_units": (3, 5)}
     effort: ClassVar[float] = 2.0
 
     n_units: Annotated[int, Interval(ge=1, le=100)] = 5

@@ -13,10 +13,12 @@ from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial, products
 from mckibben.blocks.fields import vector
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.narx.base import NarxEstimator
 from mckibben.estimators.narx.regressors import Lags
 from mckibben.estimators.narx.selection import candidate_terms, select
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
 
 MOST_CANDIDATES = 2000
 
@@ -36,6 +38,19 @@ class NarxPolynomialEstimator(NarxEstimator):
         Most terms; half and a quarter of them are tried too, and the best free run kept.
     """
 
+    title = "Polynomial NARX model"
+    purpose = "rate"
+    can = (
+        "Nonlinear dynamics by a polynomial of past inputs and outputs; terms chosen by "
+        "orthogonal least squares."
+    )
+    cannot = "Remembers only as far as its lags; no inverse."
+    caution = "a polynomial of past values leaves all bounds beyond them"
+    param_grid: ClassVar[Grid] = {
+        "output_lags": (1, 2),
+        "input_lags": (1, 2),
+        "n_terms": (8, 16),
+    }
     effort: ClassVar[float] = 0.6
 
     degree: Annotated[int, Interval(ge=1, le=6)] = 3
@@ -69,3 +84,22 @@ class NarxPolynomialEstimator(NarxEstimator):
                 )
             )
         return models
+
+
+NARX_PLAY = preset(
+    NarxPolynomialEstimator,
+    (
+        "Polynomial NARX model with play operators among its regressors, so that it keeps its"
+        " branch."
+    ),
+    title="Polynomial NARX model with play operators",
+    can=(
+        "Polynomial dynamics with play operators among the regressors: hysteresis and rate in one."
+    ),
+    cannot="No inverse.",
+    param_grid={"n_play": (3, 6), "n_terms": (8, 16)},
+    output_lags=1,
+    input_lags=1,
+    n_play=6,
+    effort=0.2,
+)

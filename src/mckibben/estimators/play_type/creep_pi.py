@@ -19,6 +19,7 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.memoryless.logarithm import Logarithm
 from mckibben.blocks.play_type.pi import PI
 from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.output_maps import PolynomialMap
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, counting
 from mckibben.estimators.play_type.creeping import CreepingEstimator, creep_moves, with_creep
@@ -38,6 +39,20 @@ class CreepPIEstimator(CreepingEstimator):
         The largest threshold, relative to half the range of the logarithm.
     """
 
+    title = "Prandtl–Ishlinskii model with creep (CPI)"
+    purpose = "rate"
+    can = (
+        "Asymmetric loops, minor loops, and creep: memory on log(pressure), an increasing "
+        "map, visco-elastic elements."
+    )
+    cannot = "Its loops' shape does not change with rate or load; needs time."
+    inverse_kind = "exact"
+    quick = True
+    param_grid: ClassVar[Grid] = {
+        "n_operators": (4, 6, 8),
+        "n_creep": (1, 2, 3),
+    }
+    makes = ("logarithm pi polynomial creep",)
     effort: ClassVar[float] = 1.0
 
     map_size: Annotated[int, Interval(ge=1, le=12)] = 6

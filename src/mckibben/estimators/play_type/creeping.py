@@ -71,6 +71,7 @@ class CreepingEstimator(SeparableEstimator):
     n_creep: Annotated[int, Interval(ge=0, le=5)] = 2
     settled: bool | None = None
 
+    needs_time: ClassVar[bool] = True
     searches_condensed: ClassVar[bool] = False
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:

@@ -37,6 +37,12 @@ class EUPIEstimator(SeparableEstimator):
         How thresholds spread over half the input range.
     """
 
+    title = "Extended unparallel Prandtl–Ishlinskii model (EUPI)"
+    purpose = "memory"
+    can = "Asymmetric loops by edges of different slope and threshold."
+    cannot = "One asymmetry for all operators; the inverse wants weights that are not negative."
+    inverse_kind = "solved"
+    makes = ("eupi",)
     effort: ClassVar[float] = 0.3
 
     n_operators: Operators = 10

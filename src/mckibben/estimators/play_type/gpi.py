@@ -19,6 +19,7 @@ from mckibben.blocks.play_type.envelopes.tanh import Tanh
 from mckibben.blocks.play_type.gpi import GPI, gpi_matrix, smallest_gap
 from mckibben.blocks.play_type.memory import started
 from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.play_type.thresholds import spread
 
@@ -53,6 +54,17 @@ class GPIEstimator(SeparableEstimator):
         How thresholds spread under the first rule.
     """
 
+    title = "Generalised Prandtl–Ishlinskii model (GPI)"
+    purpose = "memory"
+    can = "Asymmetric, saturating loops between two envelopes, minor loops by few weights."
+    cannot = (
+        "Where envelopes differ the output holds after a reversal, whether or not the muscle "
+        "does; no rate, no creep."
+    )
+    inverse_kind = "exact"
+    quick = True
+    param_grid: ClassVar[Grid] = {"n_operators": (5, 10, 15)}
+    makes = ("gpi",)
     effort: ClassVar[float] = 0.7
 
     n_operators: Annotated[int, Interval(ge=0, le=1000)] = 10

@@ -15,6 +15,7 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.play_type.loops import LoopEstimator
 from mckibben.estimators.play_type.thresholds import spread
+from mckibben.presets import preset
 
 MOST_UNEQUAL = np.log(4.0)
 
@@ -33,6 +34,8 @@ class MaxwellSlipEstimator(LoopEstimator):
         Whether rising and falling differ in stiffness and in slip, by ratios that are searched.
     """
 
+    purpose = "memory"
+    inverse_kind = "solved"
     effort: ClassVar[float] = 0.02
 
     n_operators: Operators = 8
@@ -92,3 +95,24 @@ class MaxwellSlipEstimator(LoopEstimator):
             self.starting_rule,
             **self.channels(data),
         )
+
+
+MAXWELL_SLIP = preset(
+    MaxwellSlipEstimator,
+    "Maxwell-slip model by least squares.",
+    title="Maxwell-slip model",
+    can="Springs that slip beside a reversible curve; symmetric loops.",
+    cannot="Asymmetry only by the curve.",
+    quick=True,
+    asymmetric=False,
+)
+
+MMS = preset(
+    MaxwellSlipEstimator,
+    "Modified Maxwell-slip model: the two ratios of its directions are searched.",
+    title="Modified Maxwell-slip model (MMS)",
+    can="Springs that slip, of different stiffness and limit up and down.",
+    cannot="One asymmetry for all springs.",
+    asymmetric=True,
+    effort=0.5,
+)

@@ -177,6 +177,20 @@ class MappedPIEstimator(SeparableEstimator):
 class MPIEstimator(MappedPIEstimator):
     """Modified Prandtl-Ishlinskii model by variable projection."""
 
+    title = "Modified Prandtl–Ishlinskii model (MPI)"
+    purpose = "memory"
+    can = (
+        "Prandtl-Ishlinskii memory behind an increasing map: asymmetric by saturation; small "
+        "and quick."
+    )
+    cannot = (
+        "Loops that are narrow at one end and wide at the other for other reasons than the "
+        "map; no rate, no creep."
+    )
+    inverse_kind = "exact"
+    quick = True
+    default_for = "load"
+    makes = ("pi polynomial",)
     effort: ClassVar[float] = 0.2
 
     def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:

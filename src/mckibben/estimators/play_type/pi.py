@@ -17,7 +17,7 @@ from mckibben.blocks.play_type.pi import PI
 from mckibben.blocks.play_type.play import play_matrix
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.estimator import Operators
+from mckibben.estimators.core.estimator import Grid, Operators
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -44,6 +44,14 @@ class PIEstimator(SeparableEstimator):
         Thresholds themselves, instead.
     """
 
+    title = "Prandtl–Ishlinskii model (PI)"
+    purpose = "memory"
+    can = "Symmetric loops with nonlocal memory, by least squares; the smallest code."
+    cannot = "No asymmetry, no saturation, no rate, no creep."
+    inverse_kind = "exact"
+    quick = True
+    param_grid: ClassVar[Grid] = {"n_operators": (5, 10, 20)}
+    makes = ("pi",)
     effort: ClassVar[float] = 0.01
 
     method: Literal["ls", "pso-ls", "pso", "slopes"] = "ls"  # type: ignore[assignment]

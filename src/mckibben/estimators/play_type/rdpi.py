@@ -36,6 +36,16 @@ class RDPIEstimator(MappedPIEstimator):
         Default: the best on the training data of none, 5 and 25 samples.
     """
 
+    title = "Rate-dependent Prandtl–Ishlinskii model (RDPI)"
+    purpose = "rate"
+    can = "Prandtl-Ishlinskii memory with weights that follow the rate."
+    cannot = (
+        "Extrapolates badly beyond the rates seen; its inverse swings where weights by rate "
+        "are strongly negative."
+    )
+    caution = "weights that follow the rate are arbitrary at other rates"
+    inverse_kind = "exact"
+    makes = ("rate-dependent-pi polynomial",)
     needs_time: ClassVar[bool] = True
 
     effort: ClassVar[float] = 0.9

@@ -14,7 +14,9 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.preisach_type.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
 from mckibben.blocks.preisach_type.preisach import Preisach
 from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.presets import preset
 
 LEAST_REVERSIBLE = 1e-4
 """Least share of the output's range that each operator on the diagonal gives."""
@@ -33,6 +35,12 @@ class GridEstimator(SeparableEstimator):
         Intervals that the input range is cut into.
     """
 
+    purpose = "memory"
+    param_grid: ClassVar[Grid] = {"n_levels": (6, 10, 15)}
+    cannot = (
+        "Weights that no reversal has excited are not determined; nothing beyond the largest "
+        "input seen."
+    )
     effort: ClassVar[float] = 0.15
 
     relays: Literal["sudden", "gradual"] = "sudden"
@@ -73,3 +81,23 @@ class GridEstimator(SeparableEstimator):
         n = template.n_parameters - 1
         most = 2 * (high - low) / n
         return template, np.array([*np.zeros(n), low - most]), np.array([*np.full(n, most), high])
+
+
+KP = preset(
+    GridEstimator,
+    "Krasnosel'skii-Pokrovskii model by (non-negative) least squares on its operators.",
+    title="Krasnosel'skii–Pokrovskii model (KP)",
+    can="Loops of any shape whose minor loops are congruent, with ridges of finite slope.",
+    inverse_kind="solved",
+    quick=True,
+    relays="gradual",
+)
+
+PREISACH = preset(
+    GridEstimator,
+    "Preisach model by (non-negative) least squares on its cells.",
+    title="Preisach model",
+    can="Loops of any shape whose minor loops are congruent.",
+    inverse_kind="exact",
+    relays="sudden",
+)

@@ -28,7 +28,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.kernels import SLACK, kernel, step
+from mckibben.blocks.core.kernels import DERIVED, SLACK, kernel, step
 from mckibben.blocks.core.linear_system import eliminate, newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
@@ -107,6 +107,14 @@ def fuzzy_network_inverse_step(
                 break
         for i in range(m):
             x[i] = min(max(best[i] - share * change[i], low[i]), high[i])
+    if DERIVED:
+        sloped_answer(c, left, best, memberships, tilts, y, slopes)
+        for j in range(m):
+            y[j] -= inputs[j]
+        eliminate(slopes, y)
+        for i in range(m):
+            if low[i] < best[i] < high[i]:
+                best[i] -= y[i]
     for i in range(m):
         state[i] = best[i]
         outputs[i] = best[i]

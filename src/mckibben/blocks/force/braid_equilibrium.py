@@ -22,7 +22,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel, Start
 from mckibben.blocks.core.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, Initial
-from mckibben.blocks.core.kernels import SLACK, kernel, step
+from mckibben.blocks.core.kernels import DERIVED, SLACK, improved, kernel, step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless, Ranged, nothing_clipped
 
@@ -81,6 +81,8 @@ def braid_equilibrium_step(
             if abs(candidate - e) <= STILL or candidate in (low, high):
                 break
             e = candidate
+        if DERIVED:
+            e = improved(balance, p, e, c)
     outputs[0] = c[8] * e + c[9]
 
 

@@ -23,7 +23,7 @@ from mckibben.blocks.core.fields import (
     Coefficients,
     Initial,
 )
-from mckibben.blocks.core.kernels import SLACK, kernel, step
+from mckibben.blocks.core.kernels import DERIVED, SLACK, improved, kernel, step
 from mckibben.blocks.core.notation import Notation, summed
 from mckibben.blocks.core.single_channel import (
     Memoryless,
@@ -48,6 +48,11 @@ def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: A
     """Evaluate; coefficients are [centre, scale, ascending polynomial coefficients]."""
     x = (inputs[0] - coefficients[0]) / coefficients[1]
     outputs[0] = horner(coefficients[2:], x)
+
+
+@kernel
+def _value(x: float, c: Array) -> float:
+    return horner(c, x)
 
 
 @step
@@ -93,6 +98,8 @@ def polynomial_inverse_step(
         if candidate in (x, low, high):
             break
         x = candidate
+    if DERIVED:
+        x = improved(_value, y, x, c)
     outputs[0] = centre + scale * x
 
 

@@ -33,7 +33,7 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, step, summing_step
+from mckibben.blocks.core.kernels import DERIVED, improved, kernel, step, summing_step
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.core.root import solve_near
@@ -100,6 +100,8 @@ def rate_dependent_pi_inverse_step(
     n = state.size - 3
     lowest, highest = coefficients[-2], coefficients[-1]
     u, clipped = solve_near(_trial, inputs[0], state[n], lowest, highest, (coefficients, state))
+    if DERIVED and lowest < u < highest:
+        u = improved(_trial, inputs[0], u, (coefficients, state))
     rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
     for i in range(n):
         r = coefficients[3 + i]

@@ -93,7 +93,7 @@ def test_the_sizes_of_steps_do_not_matter(kind: str, monkeypatch: pytest.MonkeyP
         largest = np.abs(slopes).max()
         monkeypatch.setattr(module, "STEP", 1e-150)
         np.testing.assert_allclose(jacobian(block, inputs, TIME), slopes, atol=1e-13 * largest)
-        monkeypatch.setattr(module, "CHANGE", 3e-3)
+        monkeypatch.setattr(module, "CHANGES", (3e-3, 2e-4))
         np.testing.assert_allclose(jacobian(block, inputs, TIME), slopes, atol=1e-10 * largest)
         monkeypatch.undo()
 

@@ -2,8 +2,8 @@
 
 What a block does is laid out as kernels in order, as for an export. Their coefficients depend smoothly
 on the parameters, by arithmetic of a few numbers: central differences of eighth order give that to
-1e-13. From coefficients to outputs, starts and memories included, kernels are differentiated by complex
-step; see `mckibben.blocks.core.complex_step`.
+1e-11 or better. From coefficients to outputs, starts and memories included, kernels are differentiated
+by complex step; see `mckibben.blocks.core.complex_step`.
 """
 
 from __future__ import annotations
@@ -29,8 +29,11 @@ from mckibben.system.threads import cores
 
 Complex = NDArray[np.complex128]
 
-CHANGE = 1e-2
+CHANGES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 """Of a parameter, relative, between the places of a central difference of its coefficients."""
+
+AGREEING = 1e-11
+"""Relative difference of derivatives of coefficients that is rounding."""
 
 WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 """Of such a difference of eighth order, from the nearest places on."""
@@ -236,23 +239,34 @@ def _complex(real: Array, slopes: Array) -> Complex:
 def _coefficient_slopes(
     block: Block, values: Array, place: int, sample_time: float | None
 ) -> list[Array]:
-    """Return the derivatives of the coefficients of all kernels by a parameter."""
-    change = CHANGE * (abs(values[place]) or 1.0)
-    sides = []
-    for times in range(-len(WEIGHTS), len(WEIGHTS) + 1):
+    """Return the derivatives of the coefficients of all kernels by a parameter.
+
+    Of ever shorter differences, those that agree best: a gain may have a pole nearby.
+    """
+    sizes = [numbers.size for numbers in _numbers(block, sample_time)]
+
+    def moved(change: float) -> Array:
         other = values.copy()
-        other[place] += times * change
-        sides.append(_numbers(_moved(block, iter(other.tolist())), sample_time))
-    middle = len(WEIGHTS)
-    found = []
-    for tables in zip(*sides, strict=True):
-        slopes = np.zeros(tables[middle].size)
-        moves = tables[0] != tables[middle]  # infinite ones do not
+        other[place] += change
+        return np.concatenate(_numbers(_moved(block, iter(other.tolist())), sample_time))
+
+    tried: list[Array] = []
+    found, apart = np.zeros(sum(sizes)), np.full(sum(sizes), np.inf)
+    for share in CHANGES:
+        change = share * (abs(values[place]) or 1.0)
+        slopes = np.zeros(found.size)
         for times, weight in enumerate(WEIGHTS, 1):
-            apart = tables[middle + times][moves] - tables[middle - times][moves]
-            slopes[moves] += weight * apart / change
-        found.append(slopes)
-    return found
+            above, below = moved(times * change), moved(-times * change)
+            moves = above != below  # infinite ones do not
+            slopes[moves] += weight * (above[moves] - below[moves]) / change
+        if tried:
+            gap = np.abs(slopes - tried[-1])
+            found = np.where(gap < apart, tried[-1], found)
+            apart = np.minimum(gap, apart)
+            if (apart <= AGREEING * np.abs(found)).all():
+                break
+        tried.append(slopes)
+    return np.split(found, np.cumsum(sizes)[:-1])
 
 
 def jacobian(

@@ -97,7 +97,7 @@ def test_predicted_standard_errors_are_the_spread_of_estimates() -> None:
         LIMITS,
         STEP,
     )
-    own = Slopes(block, places, STEP, len(commands))
+    own = Slopes(block, places, STEP)
     base, slopes, _ = own.over(commands, own.start(commands[0]))
     noise, matrix = 0.05, slopes[:, 0, :]
     said = standard_errors(matrix.T @ matrix / noise**2)

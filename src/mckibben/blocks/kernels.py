@@ -58,6 +58,20 @@ def accumulate(total: float, change: float, lost: Array, place: int) -> float:
     return total + change
 
 
+DERIVED = False
+"""Whether derivatives are taken: true in the twins of `mckibben.blocks.complex_step` alone. What
+``if DERIVED:`` guards is neither compiled nor translated to C."""
+
+
+@inlined
+def improved(evaluate: Any, target: float, u: float, memory: Any) -> float:
+    """Return a root of ``evaluate(u, memory) == target``, in twins with its derivative.
+
+    A search ends on the root to rounding, but not on its derivative, which is that of the last step.
+    """
+    return u
+
+
 class Step(Protocol):
     """A kernel that advances one sample, ``step(coefficients, state, inputs, outputs)``.
 

@@ -15,7 +15,16 @@ from typing import Any
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Cost, Start
-from mckibben.blocks.kernels import BRACKET, NOTHING, ROUNDING, SLACK, inlined, kernel
+from mckibben.blocks.kernels import (
+    BRACKET,
+    DERIVED,
+    NOTHING,
+    ROUNDING,
+    SLACK,
+    improved,
+    inlined,
+    kernel,
+)
 
 MOST_STEPS = 200
 """Of closing the bracket, and of the walk each way: far more than either takes."""
@@ -105,6 +114,8 @@ def solve_input(trial: Any, coefficients: Array, state: Array, inputs: Array) ->
     lowest, highest = coefficients[-2], coefficients[-1]
     forward, own = coefficients[:-2], state[:n]
     u, clipped = solve_near(trial, inputs[0], state[n], lowest, highest, (forward, own))
+    if DERIVED and lowest < u < highest:
+        u = improved(trial, inputs[0], u, (forward, own))
     state[n] = u
     if clipped:
         state[n + 1] += 1.0
@@ -127,6 +138,14 @@ def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> 
     ``start`` is that of the block, behind whose state the inverse has 2 numbers, the last input and the
     count of samples clipped, or the count alone.
     """
+
+    @kernel
+    def first_output(u: float, memory: tuple[Array, Array, Array, Array]) -> float:
+        """Return the first output at an input, of derivatives."""
+        forward, own, given, rule = memory
+        given[0] = u
+        start(forward, own, given, rule[0] > 0.0)
+        return trial(u, (forward, own))
 
     @kernel
     def inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
@@ -153,6 +172,10 @@ def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> 
             else:
                 high = middle
         u[0] = 0.5 * (low + high)
+        if DERIVED and coefficients[-2] < u[0] < coefficients[-1]:
+            rule = state[state.size - 1 :]
+            rule[0] = 1.0 if virgin else 0.0
+            u[0] = improved(first_output, inputs[0], u[0], (forward, own, u, rule))
         start(forward, own, u, virgin)
         state[-1] = 0.0
 

@@ -22,7 +22,7 @@ from mckibben.blocks.base import SEVERAL, Cost, Kernel, Ports, Start
 from mckibben.blocks.coupled.fuzzy_rules import answer, contract, sloped_answer
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import SLACK, kernel, step
+from mckibben.blocks.kernels import DERIVED, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import eliminate, newton_cost
 from mckibben.errors import ModelError
@@ -98,6 +98,14 @@ def fuzzy_network_inverse_step(
                 break
         for i in range(m):
             x[i] = min(max(best[i] - share * change[i], low[i]), high[i])
+    if DERIVED:
+        sloped_answer(c, left, best, memberships, tilts, y, slopes)
+        for j in range(m):
+            y[j] -= inputs[j]
+        eliminate(slopes, y)
+        for i in range(m):
+            if low[i] < best[i] < high[i]:
+                best[i] -= y[i]
     for i in range(m):
         state[i] = best[i]
         outputs[i] = best[i]

@@ -23,7 +23,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, Initial
 from mckibben.blocks.inverse import Invertible, nothing_clipped
-from mckibben.blocks.kernels import SLACK, kernel, step
+from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
 from mckibben.blocks.notation import Notation
 
 NEWTONS_PER_BAR = 0.1
@@ -81,6 +81,8 @@ def braid_equilibrium_step(
             if abs(candidate - e) <= STILL or candidate in (low, high):
                 break
             e = candidate
+        if DERIVED:
+            e = improved(balance, p, e, c)
     outputs[0] = c[8] * e + c[9]
 
 

@@ -18,7 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Coefficients, Initial
 from mckibben.blocks.inverse import Invertible, check_input_range, nothing_clipped
-from mckibben.blocks.kernels import SLACK, kernel, step
+from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
 from mckibben.blocks.notation import Notation, summed
 from mckibben.errors import ModelError
 
@@ -37,6 +37,11 @@ def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: A
     """Evaluate; coefficients are [centre, scale, ascending polynomial coefficients]."""
     x = (inputs[0] - coefficients[0]) / coefficients[1]
     outputs[0] = horner(coefficients[2:], x)
+
+
+@kernel
+def _value(x: float, c: Array) -> float:
+    return horner(c, x)
 
 
 @step
@@ -82,6 +87,8 @@ def polynomial_inverse_step(
         if candidate in (x, low, high):
             break
         x = candidate
+    if DERIVED:
+        x = improved(_value, y, x, c)
     outputs[0] = centre + scale * x
 
 

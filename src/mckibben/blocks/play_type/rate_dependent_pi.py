@@ -32,7 +32,7 @@ from mckibben.blocks.fields import (
     Vector,
 )
 from mckibben.blocks.inverse import Invertible, check_input_range
-from mckibben.blocks.kernels import kernel, step, summing_step
+from mckibben.blocks.kernels import DERIVED, improved, kernel, step, summing_step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.play_type.memory import (
     check_invertible_sum,
@@ -95,6 +95,8 @@ def rate_dependent_pi_inverse_step(
     n = state.size - 3
     lowest, highest = coefficients[-2], coefficients[-1]
     u, clipped = solve_near(_trial, inputs[0], state[n], lowest, highest, (coefficients, state))
+    if DERIVED and lowest < u < highest:
+        u = improved(_trial, inputs[0], u, (coefficients, state))
     rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
     for i in range(n):
         r = coefficients[3 + i]

@@ -17,6 +17,7 @@ class BoucWenOscillatorEstimator(OscillatorEstimator):
     """Bouc-Wen oscillator by Gauss-Newton on free runs, begun with a linear one's stiffness shared."""
 
     n_positive: ClassVar[int] = 4
+    order: ClassVar[int] = 0
     follows: ClassVar[Callable[..., None]] = staticmethod(follow_bouc_wen)
 
     def starts(self, slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:

@@ -334,7 +334,7 @@ class BalanceEstimator(CoupledEstimator):
         loaded = [channel.unit in LOADS for channel in data.scheduled]
         scheduled = [i for i, load in enumerate(loaded) if not load]
         x = data.stacked("scheduled")[:, scheduled]
-        levels = [np.unique(np.round(v / (0.1 * max(float(np.ptp(v)), 1e-9)))).size for v in x.T]
+        levels = [np.unique(np.round(v / (0.1 * (float(np.ptp(v)) or 1.0)))).size for v in x.T]
         degree = max(min([self.degree, *(n - 1 for n in levels)]), 1)
         highest = float(data.highest.max())
         margin = 0.02 * span
@@ -364,6 +364,7 @@ class BalanceEstimator(CoupledEstimator):
             hull=np.column_stack([y.min(axis=0) - margin, y.max(axis=0) + margin]),
             scheduled_hull=np.column_stack([x.min(axis=0), x.max(axis=0)]),
             highest=highest,
+            heaviest=float(np.abs(data.stacked("scheduled")[:, loaded]).max(initial=0.0)) or 1.0,
             tare=tare,
             slack=False,
             mass=self.mass,

@@ -23,7 +23,6 @@ from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_checks import held
 from mckibben.estimators.coupled.balance_search import Search
-from mckibben.estimators.coupled.balance_structure import LEAST_PULL
 from mckibben.estimators.coupled.base import LOADS
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
@@ -236,7 +235,7 @@ def _told(search: Search, values: Array) -> bool:
     """Tell whether the linear stage found that a load pulls, and how much."""
     structure = search.structure
     area = float(values[structure.places("areas", 0)[0]])
-    return not structure.in_newtons or area < 0.99 * structure.highest / LEAST_PULL
+    return not structure.in_newtons or area * structure.least_pull < 0.99
 
 
 def _turned(search: Search, places: Sequence[int]) -> Search:

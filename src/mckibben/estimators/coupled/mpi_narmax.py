@@ -49,9 +49,9 @@ class MPINarmaxEstimator(CoupledEstimator):
         Runs that the network learns from: all, or as in the paper those under a load only.
     constants : bool
         Whether a consequent has a constant; the paper's fourth layer has none.
-    method : {"pso", "ls", "trust-region"}
-        Antecedents and feedbacks by the paper's particle swarm; even and none; or refined from those on
-        the free-running error, over ever longer parts of the runs. Consequents by least squares always.
+    method : {"pso", "ls"}
+        Antecedents and feedbacks by the paper's particle swarm; or even and none. Consequents by least
+        squares always.
     ridge : float
         Damping of what is a rule's own.
     """
@@ -71,7 +71,7 @@ class MPINarmaxEstimator(CoupledEstimator):
     memory: Literal["mpi", "rdpi"] = "mpi"
     learns_from: Literal["all", "loaded"] = "all"
     constants: bool = True
-    method: Literal["pso", "ls", "trust-region"] = "pso"
+    method: Literal["pso", "ls"] = "pso"
     ridge: Annotated[float, Gt(0)] = 1e-4
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
@@ -102,8 +102,6 @@ class MPINarmaxEstimator(CoupledEstimator):
         chosen = (even, still)
         if self.method == "pso":
             chosen = problem.swarm(even, self.seed, tracker)
-        elif self.method == "trust-region":
-            chosen = problem.refined(even, still, tracker)
         tracker.reached(0.9)
         network = problem.best(*chosen)
         return Series((hysteresis, network))

@@ -30,6 +30,7 @@ from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Fitted
 from mckibben.estimators.coupled.fuzzy_fit import Method, Search, fit_network
 from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm
+from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
 from mckibben.estimators.play_type.pi import play_operators
 from mckibben.presets import preset
@@ -263,8 +264,6 @@ class SDCHMEstimator(NetworkEstimator):
 
     def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
         """Return the memory of a muscle's own motion: play operators, all partial sums positive."""
-        from scipy.optimize import lsq_linear
-
         low = min(float(part.min()) for part in given)
         high = max(float(part.max()) for part in given)
         span = high - low
@@ -273,18 +272,14 @@ class SDCHMEstimator(NetworkEstimator):
         plays = np.concatenate([play_operators(part, radii, "first_sample") for part in given])
         # weights are differences of partial sums, which must stay positive for an inverse
         steps = np.column_stack([-np.diff(plays, axis=1), plays[:, -1]])
-        columns = np.column_stack([steps, np.ones(len(steps))])
-        lower = np.append(np.full(radii.size, LEAST_SLOPE), -np.inf)
-        y = np.concatenate(wanted)
-        gram, right = columns.T @ columns, columns.T @ y
-        factor = np.linalg.cholesky(gram + 1e-10 * np.trace(gram) * np.eye(len(gram)))
-        found = lsq_linear(factor.T, np.linalg.solve(factor, right), (lower, np.inf)).x
-        weights = np.diff(found[:-1], prepend=0.0)
+        least = np.full(radii.size, LEAST_SLOPE)
+        sums, offset = solve_linear(steps, np.concatenate(wanted), nonnegative=True, least=least)
+        weights = np.diff(sums, prepend=0.0)
         margin = BEYOND * span
         return PI(
             vector(radii),
             vector(weights),
-            float(found[-1]),
+            offset,
             (low - margin, high + margin),
             "first_sample",
             channel,

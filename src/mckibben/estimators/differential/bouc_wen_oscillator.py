@@ -28,6 +28,7 @@ class BoucWenOscillatorEstimator(OscillatorEstimator):
     quick = True
 
     n_positive: ClassVar[int] = 4
+    order: ClassVar[int] = 0
     follows: ClassVar[Callable[..., None]] = staticmethod(follow_bouc_wen)
 
     def starts(self, slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:

@@ -48,6 +48,7 @@ class DuhemOscillatorEstimator(OscillatorEstimator):
     n_pieces: Annotated[int, Interval(ge=1, le=20)] = 2
 
     n_positive: ClassVar[int] = 3
+    order: ClassVar[int] = 1
     follows: ClassVar[Callable[..., None]] = staticmethod(follow_duhem)
 
     def starts(self, slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:

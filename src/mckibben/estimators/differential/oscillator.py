@@ -80,6 +80,9 @@ class OscillatorEstimator(SingleEstimator):
     n_positive: ClassVar[int]
     """Parameters of the block, the first ones, that are searched by their logarithms."""
 
+    order: ClassVar[int]
+    """The others have the unit of this power of a force, over displacement."""
+
     follows: ClassVar[Callable[..., None]]
     """What runs the model with its derivatives."""
 
@@ -158,7 +161,7 @@ class OscillatorEstimator(SingleEstimator):
     ) -> FreeRuns:
         """Return the errors of models of one structure on all runs."""
         at_rest = not self.periodic and self.starting_rule == "first_sample"
-        way = Way(self.n_positive, type(self).follows, at_rest)
+        way = Way(self.n_positive, type(self).follows, at_rest, self.order)
         warm = self._warm if self.periodic else None
         return FreeRuns(model, data, paths(data, substeps, warm, at_rest), way, tracker, told)
 

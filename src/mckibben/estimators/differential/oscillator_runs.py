@@ -42,11 +42,14 @@ class Way:
         The model with its derivatives; see `oscillator_slopes.follow`.
     at_rest : bool
         Whether runs begin at rest where their first input leads, instead of at none.
+    order : int
+        The other parameters of the element have the unit of this power of a force, over displacement.
     """
 
     n_positive: int
     follows: Callable[..., None]
     at_rest: bool
+    order: int
 
 
 class FreeRuns:
@@ -80,22 +83,27 @@ class FreeRuns:
         self.tracker, self.told = tracker, told
         self.n_positive, self.follows, self.at_rest = way.n_positive, way.follows, way.at_rest
         self.step = data.sample_time or 1.0
+        force, travel = (float(np.ptp(span)) for span in (data.input_range, data.output_range))
+        self.size = np.full(template.n_parameters, force**way.order / travel)
+        self.size[: self.n_positive] = 1.0
+        if template.output_offset is not None:
+            self.size[-1] = travel
 
     def coordinates(self, model: Oscillator) -> Array:
-        """Return where a model is searched: logarithms of what is positive, then the others."""
-        theta = model.pack()
+        """Return where a model is searched: logarithms of what is positive, then the others' sizes."""
+        theta = model.pack() / self.size
         theta[: self.n_positive] = np.log(np.maximum(theta[: self.n_positive], 1e-300))
         return theta
 
     def model(self, theta: Array) -> Oscillator:
         """Return the model at coordinates."""
-        values = theta.copy()
+        values = theta * self.size
         values[: self.n_positive] = np.exp(np.minimum(values[: self.n_positive], 690.0))
         return self.template.unpack(values)
 
     def scale(self, model: Oscillator) -> Array:
         """Return the derivatives of the parameters by the coordinates."""
-        found = np.ones(model.n_parameters)
+        found = self.size.copy()
         found[: self.n_positive] = model.pack()[: self.n_positive]
         return found
 
@@ -179,7 +187,7 @@ class FreeRuns:
         state = model.initial_state(first, "first_sample")[:3]
         values = model.pack()
         for place in range(OWN - 1, p):  # rest knows neither mass nor damping
-            change = DIFFERENCE * (abs(values[place]) or 1.0)
+            change = DIFFERENCE * (abs(values[place]) or self.size[place])
             other = values.copy()
             other[place] += change
             moved[:, place] = (

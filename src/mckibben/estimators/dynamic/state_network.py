@@ -18,7 +18,7 @@ from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.dynamic.state_network import StateNetwork
+from mckibben.blocks.dynamic.state_network import SETTLING, SETTLING_STEP, StateNetwork
 from mckibben.blocks.fields import rows
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
@@ -44,7 +44,7 @@ velocity, what damps, and how fast the first lag dies away."""
 UNIT, FORCED, READ = 0.7, 0.05, 0.01
 """Sizes of random weights: of units by states, by the input, and of what is read of them."""
 
-FIRST_DAMPING, HEAVIEST, FLOOR = 1e-2, 1e9, 1e-9
+FIRST_DAMPING, HEAVIEST, EASING, FLOOR = 0.1, 1e9, 2.0, 1e-6
 
 LEAST_GAIN = 1e-7
 """Share of the squared error that a step gains, or the descent has arrived."""
@@ -107,7 +107,7 @@ class StateNetworkEstimator(SingleEstimator):
             search.errors,
             search.slopes,
             template.pack(),
-            Damping(FIRST_DAMPING, HEAVIEST, steps=partial(marquardt, floor=FLOOR)),
+            Damping(FIRST_DAMPING, HEAVIEST, easing=EASING, steps=partial(marquardt, floor=FLOOR)),
             least_gain=LEAST_GAIN,
         )
         with tracker.searching():
@@ -229,8 +229,13 @@ class NetworkRuns:
         for path in self.paths:
             samples = path.run.u.size
             given, table = np.empty(samples), np.empty((samples if slopes else 0, theta.size))
-            state, moved = self._begun(theta, path.inputs[0])
             h, u = self.rate / path.every, (path.inputs - model.input_offset) / model.input_scale
+            state, moved = np.zeros(n), np.zeros((n, theta.size))
+            if self.at_rest:
+                held, last = np.full(1 + SETTLING, u[0]), (np.empty(1), np.empty((1, theta.size)))
+                follow_network(
+                    linear, hidden, readout, SETTLING_STEP, state, moved, held, SETTLING, 0, *last
+                )
             along = (u, path.every, path.skipped)
             ended = follow_network(linear, hidden, readout, h, state, moved, *along, given, table)
             if not ended or not np.isfinite(table).all():
@@ -239,21 +244,3 @@ class NetworkRuns:
             tables.append(table[path.run.counts] if slopes else table)
         self._slopes = model.output_scale * np.concatenate(tables)
         return np.asarray(model.output_offset + model.output_scale * np.concatenate(found))
-
-    def _begun(self, theta: Array, first: float) -> tuple[Array, Array]:
-        """Return the state before the first input, and its derivatives, by differences."""
-        n = len(self.template.linear)
-        state, moved = np.zeros(n), np.zeros((n, theta.size))
-        if not self.at_rest:
-            return state, moved
-        begun = partial(_rest, self.template, np.array([first]))
-        state = begun(theta)
-        for place in range(theta.size):
-            other = theta.copy()
-            other[place] += 1e-6
-            moved[:, place] = (begun(other) - state) / 1e-6
-        return state, moved
-
-
-def _rest(template: StateNetwork, first: Array, theta: Array) -> Array:
-    return template.unpack(theta).initial_state(first, "first_sample")[:-1]

@@ -131,8 +131,9 @@ class PredictionErrorEstimator(LinearEstimator):
             )
         centre = float(np.mean(np.concatenate([run.u for run in data.runs])))
         middle = float(np.mean(data.target))
+        given, wanted = (float(np.ptp(span)) for span in (data.input_range, data.output_range))
         known, runs = (
-            [run.carrying(run.u - centre, run.y - middle) for run in pieces]
+            [run.carrying((run.u - centre) / given, (run.y - middle) / wanted) for run in pieces]
             for pieces in (data.stretches(orders.size).runs, data.runs)
         )
         if orders.a or orders.c or orders.d:
@@ -148,6 +149,9 @@ class PredictionErrorEstimator(LinearEstimator):
         else:
             starts = starting_points(runs, known, orders, self.n_starts, self.seed)
             theta = minimise(runs, orders, starts, tracker, self.initial)
+        theta[: orders.b] *= wanted / given
+        theta[-1] *= wanted
+        runs = [run.carrying(given * run.u, wanted * run.y) for run in runs]
         p = Polynomials.of(theta, orders)
         self._constant = p.constant
         e, slopes, deviation = evaluate(theta, orders, runs, self.initial)

@@ -98,9 +98,10 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         return np.array(lower), np.array(upper)
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return lags of a few speeds."""
+        """Return lags of a few speeds; of several, none alike, which no derivative would part."""
         lower, upper = self.bounds(data)
-        return [lower + share * (upper - lower) for share in (0.2, 0.4, 0.6, 0.8)]
+        apart = np.where(np.arange(lower.size) < self.n_times, 0.05 * np.arange(lower.size), 0.0)
+        return [lower + (share - apart) * (upper - lower) for share in (0.2, 0.4, 0.6, 0.8)]
 
     def unit(self, theta: Array, data: TrainingData, gain: float = 1.0) -> ProcessModel:
         """Return the model without zero and offsets."""

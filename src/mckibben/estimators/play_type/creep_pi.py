@@ -26,6 +26,9 @@ from mckibben.estimators.play_type.creeping import CreepingEstimator, creep_move
 from mckibben.estimators.play_type.pi import play_operators
 from mckibben.estimators.play_type.thresholds import spread
 
+RAISED = 1e-5
+"""Step either way, of the logarithm of what is added to the input, for its derivative."""
+
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class CreepPIEstimator(CreepingEstimator):
@@ -114,13 +117,14 @@ class CreepPIEstimator(CreepingEstimator):
 
     def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
         pieces = PolynomialMap(self.map_size)
-        raised, step = self.raised(theta, data)
+        step = RAISED * (np.arange(theta.size) == self.n_operators)
         taus, compliances = self.tail(theta)
         linear, left = np.split(linear, [self.map_size])
 
         def of(run: Run) -> Array:
             x, by_weights = self.argument(theta, run, data)
-            by_offset = (self.argument(raised, run, data)[0] - x) / step
+            more, less = (self.argument(theta + way * step, run, data)[0] for way in (1.0, -1.0))
+            by_offset = (more - less) / (2.0 * RAISED)
             slopes = pieces.slopes(x) @ linear
             at_once = slopes[:, np.newaxis] * np.column_stack([by_weights, by_offset])
             crept = with_creep(at_once, taus, compliances, run.sample_time)

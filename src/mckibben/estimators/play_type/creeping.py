@@ -26,7 +26,6 @@ from mckibben.estimators.core.separable import (
     LEAST_REVERSIBLE,
     SEARCH_SAMPLES,
     SeparableEstimator,
-    difference,
 )
 from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -209,12 +208,6 @@ class CreepingEstimator(SeparableEstimator):
         if not taus.size:
             return ()
         return (Creep(vector(compliances), vector(taus), rule, channel, channel),)
-
-    def raised(self, theta: Array, data: TrainingData) -> tuple[Array, float]:
-        """Return theta with a little more added to the input, and how much."""
-        n = self.n_operators
-        step = difference(theta[n], self.bounds(data)[1][n])
-        return theta + step * (np.arange(theta.size) == n), step
 
 
 def elapsed(run: Run) -> Array:

@@ -126,7 +126,7 @@ class ElasticPlastic(Invertible):
         threshold="r [{u}]",
     )
     # --- Where time matters: rate_dependent: ClassVar[bool] = True, and coefficients() turns the
-    # --- sample time into what the kernel needs; see blocks/play_type/rate_dependent_pi.py.
+    # --- sample time into what the kernel needs; see blocks/hysteresis/rate_dependent_pi.py.
 
     gain: Annotated[FiniteFloat, Gt(0)]
     weight: FiniteFloat
@@ -154,7 +154,7 @@ class ElasticPlastic(Invertible):
 
     # --- Without an exact inverse, leave out its kernels and what follows, and derive from SingleChannel
     # --- and Primitive in place of Ranged: Block.inverse then says what to use instead. One to be
-    # --- solved for in every sample derives from Solved; see blocks/play_type/eupi.py.
+    # --- solved for in every sample derives from Solved; see blocks/hysteresis/eupi.py.
     # --- An error says which condition fails, and ends with the remedy.
     def check_invertible(self) -> None:
         """Demand that the output rises with the input."""

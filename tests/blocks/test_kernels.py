@@ -19,14 +19,14 @@ from mckibben.blocks.coupled.force_balance import ForceBalance
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
-from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
-from mckibben.blocks.differential.flow import flow
-from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
-from mckibben.blocks.dynamic.state_network import StateNetwork
+from mckibben.blocks.dynamics.narx_polynomial import NarxPolynomial
+from mckibben.blocks.dynamics.state_network import StateNetwork
 from mckibben.blocks.fields import vector
 from mckibben.blocks.force.multistate_friction import deflected
+from mckibben.blocks.hysteresis.bouc_wen_flow import flow
+from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
+from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach, _output, _solve, everett
 from mckibben.blocks.laws.trial import wander
-from mckibben.blocks.preisach_type.preisach import DEPTH, Preisach, _output, _solve, everett
 from mckibben.blocks.solving import eliminate, solve_near
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_starts import begin_at

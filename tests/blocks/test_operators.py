@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import EUPI, GPI, PiecewiseLinear, Play
-from mckibben.blocks.play_type.eupi import eupi_matrix
-from mckibben.blocks.play_type.gpi import gpi_matrix
-from mckibben.blocks.play_type.maxwell_slip import slip_matrix
-from mckibben.blocks.play_type.play import play_matrix
-from mckibben.blocks.preisach_type.preisach import DEPTH, Preisach
+from mckibben.blocks.hysteresis.eupi import eupi_matrix
+from mckibben.blocks.hysteresis.gpi import gpi_matrix
+from mckibben.blocks.hysteresis.maxwell_slip import slip_matrix
+from mckibben.blocks.hysteresis.play import play_matrix
+from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach
 from tests.blocks.strategies import LOW, eupi_models, gpi_models, numbers, paths
 
 Array = NDArray[np.float64]

@@ -28,7 +28,7 @@ from mckibben.comparison.offered import (
 from mckibben.comparison.row import inverse_of
 from mckibben.errors import MckibbenError
 from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
-from mckibben.estimators.play_type.pi import PIEstimator
+from mckibben.estimators.hysteresis.pi import PIEstimator
 
 FITTED = Path(__file__).parents[2] / "docs" / "models" / "fitted"
 MODELS = registry.names("estimators")

@@ -12,11 +12,11 @@ import pytest
 from mckibben import PI, Channel, ModelError, PerChannel, Play, Series
 from mckibben.blocks.adaptive.adaptive_series import adaptive
 from mckibben.blocks.coupled.coupling import Coupling
-from mckibben.blocks.dynamic.process_model import ProcessModel
+from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.fields import DISPLACEMENT
-from mckibben.blocks.play_type.envelopes.exponential import Exponential
-from mckibben.blocks.play_type.envelopes.piecewise_linear import PiecewiseLinear as Lines
-from mckibben.blocks.play_type.envelopes.tanh import Tanh
+from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
+from mckibben.blocks.hysteresis.envelopes.piecewise_linear import PiecewiseLinear as Lines
+from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
 from mckibben.registry import load
 
 Make = Callable[[], object]

@@ -18,9 +18,9 @@ from sklearn.base import clone
 
 import mckibben
 from mckibben import Block, ModelError
-from mckibben.blocks.play_type.envelopes import Envelope
+from mckibben.blocks.hysteresis.envelopes import Envelope
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.estimators.play_type.pi import PIEstimator
+from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.presets import Chosen, preset
 from mckibben.registry import PLUGINS, REPLACED, load, names
 from mckibben.report.notebook.face import Face
@@ -52,7 +52,7 @@ def concrete(base: type, folder: str) -> set[Any]:
 
 ON_DISK: dict[str, Callable[[], set[Any]]] = {
     "blocks": lambda: concrete(Block, "blocks"),
-    "envelopes": lambda: concrete(Envelope, "blocks/play_type/envelopes"),
+    "envelopes": lambda: concrete(Envelope, "blocks/hysteresis/envelopes"),
     "estimators": lambda: concrete(Estimator, "estimators"),
     "faces": lambda: concrete(Face, "report/notebook"),
     "setups": lambda: concrete(Rig, "rigs"),

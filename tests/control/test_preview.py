@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Recording, Series
-from mckibben.blocks.dynamic.air import Air
+from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.blocks.fields import Channel

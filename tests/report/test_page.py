@@ -19,8 +19,8 @@ from hypothesis import strategies as st
 
 from mckibben import registry
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.play_type.gpi import GPI
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.outputs import Results
 from mckibben.papers.reproduction import Reproduction
 from mckibben.recording import Recording

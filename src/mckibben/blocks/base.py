@@ -40,7 +40,7 @@ Start = Callable[..., None]
 VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
 """Named starts, and whether a start kernel takes them as if nothing had happened before.
 
-"fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamic.linear_start`."""
+"fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamics.linear_start`."""
 
 Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 """Names of fields of channels: driven, scheduling, and given."""

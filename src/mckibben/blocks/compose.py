@@ -275,8 +275,8 @@ class Series(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return a modified Prandtl-Ishlinskii model: a PI model and a saturating curve."""
+        from mckibben.blocks.hysteresis.pi import PI
         from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
-        from mckibben.blocks.play_type.pi import PI
 
         return cls((PI.example(), PiecewiseLinear.example()))
 
@@ -354,8 +354,8 @@ class Parallel(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return the sum of a PI model and a play operator."""
-        from mckibben.blocks.play_type.pi import PI
-        from mckibben.blocks.play_type.play import Play
+        from mckibben.blocks.hysteresis.pi import PI
+        from mckibben.blocks.hysteresis.play import Play
 
         return cls((PI.example(), Play.example()))
 
@@ -441,8 +441,8 @@ class PerChannel(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return two muscles with models of their own."""
-        from mckibben.blocks.play_type.gpi import GPI
-        from mckibben.blocks.play_type.pi import PI
+        from mckibben.blocks.hysteresis.gpi import GPI
+        from mckibben.blocks.hysteresis.pi import PI
 
         pressures = [Channel(f"pressure_{number}", "bar") for number in (1, 2)]
         displacements = [Channel(f"displacement_{number}", "mm") for number in (1, 2)]

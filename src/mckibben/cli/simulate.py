@@ -166,7 +166,7 @@ def _parted(block: Any, interval: float | None) -> tuple[Any, Any]:
 
 
 def _predicted(block: Any, recording: Any, horizon: int) -> Any:
-    from mckibben.blocks.dynamic.transfer_function import TransferFunction
+    from mckibben.blocks.dynamics.transfer_function import TransferFunction
 
     if not isinstance(block, TransferFunction):
         raise ModelError(

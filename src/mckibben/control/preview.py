@@ -25,7 +25,7 @@ def dead_time_undone(compensator: Block) -> float:
 
     Examples
     --------
-    >>> from mckibben.blocks.dynamic.air import Air
+    >>> from mckibben.blocks.dynamics.air import Air
     >>> dead_time_undone(Air.example().inverse())
     0.02
     """

@@ -9,10 +9,10 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.equations import channel_units, unit_of
-from mckibben.blocks.play_type.eupi import EUPI
-from mckibben.blocks.play_type.gpi import GPI
-from mckibben.blocks.play_type.pi import PI
-from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
+from mckibben.blocks.hysteresis.eupi import EUPI
+from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.hysteresis.rate_dependent_pi import RateDependentPI
 from mckibben.errors import ModelError
 from mckibben.report.drawing import (
     N_COLOURS,

@@ -14,7 +14,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.signals.reversals import reversals
 from mckibben.validation.residuals import Run
 

@@ -352,7 +352,7 @@ class Adaptive(Block):
 
     @classmethod
     def example(cls) -> Self:
-        from mckibben.blocks.play_type.pi import PI
+        from mckibben.blocks.hysteresis.pi import PI
 
         return cls(PI.example(), 60.0, 0.05)
 

@@ -18,8 +18,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable, Group, relative_spread
 from mckibben.blocks.adaptive.learning import GATE, USUAL, family_at, learn, trusted
+from mckibben.blocks.hysteresis.play_operators import follow
 from mckibben.blocks.kernels import kernel
-from mckibben.blocks.play_type.memory import follow
 
 LEAST = 0.1
 """Share of a fitted partial sum of weights that is left, whatever is measured."""

@@ -23,10 +23,10 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Cost, Kernel, Run, Start, explicit_state, needs_sample_time
 from mckibben.blocks.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.inverse import drives
 from mckibben.blocks.kernels import Step
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.play_type.pi import PI
 from mckibben.blocks.predictive.horizon import (
     PASSES,
     STILL,

@@ -23,16 +23,16 @@ from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.fields import Channel, rows, vector
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Fitted
 from mckibben.estimators.coupled.fuzzy_fit import Method, Search, fit_network
 from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm
+from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
-from mckibben.estimators.play_type.pi import play_operators
 from mckibben.presets import preset
 from mckibben.recording import Recording
 

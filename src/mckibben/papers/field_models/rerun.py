@@ -11,7 +11,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.comparison.columns import columns_of_board
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.ranking import compare

@@ -150,11 +150,10 @@ class ElasticPlastic(Invertible):
 
     def peaks(self) -> Array:
         """Return the peak from which the operator just comes back to the lowest input."""
-        return np.array([self.limits[0] + 2 * self.threshold])
+        return np.array([self.input_limits[0] + 2 * self.threshold])
 
-    # --- Without an exact inverse, leave out its kernels and what follows, and derive from SingleChannel
-    # --- and Primitive in place of Ranged: Block.inverse then says what to use instead. One to be
-    # --- solved for in every sample derives from Solved; see blocks/hysteresis/eupi.py.
+    # --- Without an inverse, leave out its kernels and what follows, and derive from Block. One to be
+    # --- solved for in every sample declares `solved`; see blocks/hysteresis/eupi.py.
     # --- An error says which condition fails, and ends with the remedy.
     def check_invertible(self) -> None:
         """Demand that the output rises with the input."""
@@ -165,9 +164,8 @@ class ElasticPlastic(Invertible):
                 "would not rise with its input. Remedy: identify it with a weight above -gain."
             )
 
-    # --- Its numbers are this model's, then the limits; its state is this model's, then the count of
-    # --- clipped samples. What differs is said by inverse_numbers and inverse_remembers; see
-    # --- blocks/core/single_channel.py.
+    # --- The inverse's coefficients are this model's, then the limits; its state is this model's, then
+    # --- the count of clipped samples. What differs is declared; see blocks/inverse.py.
 
     # --- Contract tests run on the example: make it small and typical.
     @classmethod

@@ -44,7 +44,7 @@ class RDPIEstimator(MappedPIEstimator):
         "are strongly negative."
     )
     caution = "weights that follow the rate are arbitrary at other rates"
-    inverse_kind = "exact"
+    inverse_kind = "solved"
     makes = ("rate-dependent-pi polynomial",)
     needs_time: ClassVar[bool] = True
 

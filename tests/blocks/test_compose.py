@@ -18,9 +18,9 @@ from mckibben import (
     Recording,
     Series,
 )
-from mckibben.blocks.core.fields import DISPLACEMENT
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.fields import DISPLACEMENT
 from tests.blocks.strategies import paths, pi_models
 
 Array = NDArray[np.float64]

@@ -13,9 +13,9 @@ import numpy as np
 from annotated_types import Gt, Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import rows, vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
+from mckibben.blocks.fields import rows, vector
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -37,6 +37,14 @@ class CoupledMemoryEstimator(CoupledEstimator):
         Damping, relative to the size of what is read out.
     """
 
+    title = "Coupled lags and play operators"
+    can = (
+        "Any number of outputs from lags, play operators and products of all inputs; in "
+        "closed form."
+    )
+    cannot = "No inverse; products know nothing of inputs larger than those recorded."
+    quick = True
+    makes = ("coupled-memory",)
     needs_time: ClassVar[bool] = True
 
     lags: tuple[Annotated[float, Gt(0)], ...] = (0.3, 1.0, 8.0)

@@ -20,8 +20,8 @@ throw try catch namespace using virtual friend main
 
 _HEADERS = """
 assert complex ctype errno fenv float inttypes iso646 limits locale math mex setjmp signal stdarg
-stdatomic stdbool stddef stdint stdio stdlib string tgmath time uchar wchar unit unit_model fmi2 fmi3
-fmi2_refused fmi3_refused
+stdatomic stdbool stddef stdint stdio stdlib string tgmath time uchar wchar unit unit_model fmi2
+fmi2_refused
 """
 
 RESERVED = frozenset((*_WORDS.split(), *_HEADERS.split()))

@@ -157,11 +157,6 @@ def described(
     cost, size = wiring.cost, 4 if single else 8
     n_numbers = max(wiring.n_numbers, 1)
     calls = [_call(call, index, translation) for index, call in enumerate(wiring.calls)]
-    first = 0
-    for told in calls:
-        told["first_coefficient"] = first
-        told["adjusted"] = f"self->coefficients + {first}"
-        first += max(told["n_coefficients"], 1)
     order = {id(call): told for call, told in zip(wiring.calls, calls, strict=True)}
     constants = sum(call.part.coefficients.size for call in wiring.calls)
     return {
@@ -183,8 +178,6 @@ def described(
         "n_needed": len(inputs) - block.n_missable,
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
-        "n_coefficients": first,
-        "adjustable": False,
         "n_states": sum(call["n_states"] for call in calls),
         "starts": _starts(wiring.calls),
         "kernels": translation.text(),

@@ -15,8 +15,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.export.c.adjusting import coefficient_limits, memory_limits
-from mckibben.export.c.literals import literal, rows
+from mckibben.export.c.literals import literal
 from mckibben.export.c.wiring import Wiring
 from mckibben.export.templating import render
 
@@ -45,15 +44,11 @@ class Serving:
         Of an output, what stands there while no host leads; default its lowest.
     watchdog : float
         How long a host may be silent at most [s].
-    adjustable : float
-        Share by which coefficients may be set to others, 0 for not at all; with it, memory may be set
-        too, where the model's own runs take it.
     """
 
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     safe: Mapping[str, float] = field(default_factory=dict)
     watchdog: float = 0.5
-    adjustable: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -139,28 +134,7 @@ def served(
             f"{n} channels do not fit into a frame of the wire. Remedy: export in single precision, "
             "--float32, or fewer channels."
         )
-    if not 0 <= serving.adjustable < 1:
-        raise ModelError(
-            f"coefficients adjustable by {serving.adjustable:g} of their values. Remedy: give a share "
-            "from 0 to below 1, such as 0.2."
-        )
-    found = limits(block, serving)
-    wiring = Wiring(block, content["sample_time"])
-    adjusted: dict[str, dict[str, list[str]]] = {}
-    # memory can be read anyhow: what has been learnt is there
-    sizes = [0, wiring.n_numbers if wiring.n_numbers <= MOST_NUMBERS else 0]
-    if serving.adjustable:
-        inputs = slice(0, len(block.inputs))
-        ways = {
-            "coefficients": coefficient_limits(wiring, serving.adjustable),
-            "memory": memory_limits(wiring, found.low[inputs], found.high[inputs]),
-        }
-        for place, (what, ends) in enumerate(ways.items()):
-            if ends is not None and 0 < ends[0].size <= MOST_NUMBERS:
-                sizes[place] = ends[0].size
-                named = zip(("lowest", "highest"), ends, strict=True)
-                adjusted[what] = {end: rows(numbers, single=single) for end, numbers in named}
-    kept = ["coefficients", "memory"]
+    found, n_memory = limits(block, serving), Wiring(block, content["sample_time"]).n_numbers
     told = {
         "period": period,
         "microseconds": round(1e6 * period),
@@ -173,21 +147,16 @@ def served(
             }
             for place, channel in enumerate((*content["inputs"], *content["outputs"]))
         ],
-        "adjusted": adjusted,
-        "sizes": sizes,
-        "lowest": [f"{what}_lowest" if what in adjusted else "NULL" for what in kept],
-        "highest": [f"{what}_highest" if what in adjusted else "NULL" for what in kept],
-        "staged": max([1, *(sizes[kept.index(what)] for what in adjusted)]),
+        "n_memory": n_memory if n_memory <= MOST_NUMBERS else 0,
         "fingerprint_bytes": "",
     }
-    full = {**content, "adjustable": bool(serving.adjustable), "served": told}
+    full = {**content, "served": told}
     texts = [render("mckibben.export.c", file, full) for file in ("model.c.j2", "server.c.j2")]
     digest = hashlib.sha256("\n".join([*texts, repr(single)]).encode()).digest()[:8]
     told["fingerprint"] = digest.hex()
     told["fingerprint_bytes"] = ", ".join(f"0x{byte:02X}" for byte in digest)
     return {
         "served": told,
-        "adjustable": bool(serving.adjustable),
         "shared": [*content["shared"], *SERVER],
         "sources": [*content["sources"], SERVER[0].name, f"{content['name']}_server.c"],
     }

@@ -7,8 +7,8 @@ import platform
 import shutil
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from mckibben.errors import ModelError
 from mckibben.export.programs import own_compiler, run
@@ -16,52 +16,27 @@ from mckibben.export.programs import own_compiler, run
 FLAGS = ("-std=c99", "-O2", "-s", "-ffp-contract=off", "-shared")
 
 
-@dataclass(frozen=True)
-class Platform:
-    """A kind of machine that an FMU runs on.
+class Platform(NamedTuple):
+    """A kind of machine that an FMU runs on: its folder in an FMU, its libraries, its target for zig."""
 
-    Parameters
-    ----------
-    name : str
-        Ours: system and processor.
-    fmi2, fmi3 : str
-        Folder of its library in an FMU.
-    suffix : str
-        Of the library.
-    zig : str
-        Target for the zig cross-compiler.
-    """
-
-    name: str
-    fmi2: str
-    fmi3: str
+    folder: str
     suffix: str
     zig: str
 
 
 PLATFORMS = {
-    platform.name: platform
-    for platform in (
-        Platform("linux", "linux64", "x86_64-linux", ".so", "x86_64-linux-gnu.2.17"),
-        Platform("windows", "win64", "x86_64-windows", ".dll", "x86_64-windows-gnu"),
-        Platform("macos", "darwin64", "x86_64-darwin", ".dylib", "x86_64-macos"),
-        Platform("macos-arm", "", "aarch64-darwin", ".dylib", "aarch64-macos"),
-        Platform("linux-arm", "", "aarch64-linux", ".so", "aarch64-linux-gnu.2.17"),
-    )
+    "linux": Platform("linux64", ".so", "x86_64-linux-gnu.2.17"),
+    "windows": Platform("win64", ".dll", "x86_64-windows-gnu"),
+    "macos": Platform("darwin64", ".dylib", "x86_64-macos"),
 }
-"""By name; those without a folder in FMI 2.0 are built for 3.0 only."""
+"""Those that FMI 2.0 has a folder for, by our name."""
 
 
 def own_platform() -> str | None:
     """Return the name of the platform that this machine is, if it is one of them."""
-    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
-    return {
-        ("linux", "x86_64"): "linux",
-        ("linux", "aarch64"): "linux-arm",
-        ("win32", "x86_64"): "windows",
-        ("darwin", "x86_64"): "macos",
-        ("darwin", "aarch64"): "macos-arm",
-    }.get((sys.platform, machine))
+    if platform.machine() not in ("x86_64", "AMD64"):
+        return None
+    return {"linux": "linux", "win32": "windows", "darwin": "macos"}.get(sys.platform)
 
 
 def buildable() -> list[str]:

@@ -3,20 +3,23 @@
 One zip: the description, the C it is built from, libraries for the platforms that this machine can
 build for, and a page on how to import it. The same model gives the same bytes on the same machine.
 
-Source: FMI 2.0.4 and 3.0.1, Modelica Association.
+Source: FMI 2.0.4, Modelica Association.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 import tarfile
 import tempfile
+import textwrap
+import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -26,16 +29,17 @@ from mckibben.blocks.saving import to_dict, to_text
 from mckibben.errors import DataError, ModelError
 from mckibben.export.c.literals import literal
 from mckibben.export.c.project import described, source_files
-from mckibben.export.fmu.refusals import refusals
 from mckibben.export.fmu.toolchains import PLATFORMS, build_library, buildable
 from mckibben.export.folders import zipped
 from mckibben.export.templating import render as rendered
 from mckibben.system import ordinary
 from mckibben.system.atomic import replacing, written
 
-Version = Literal["2.0", "3.0"]
-
 HERE = Path(__file__).parent
+
+DECLARED = re.compile(r"typedef\s+(\w+)\s*\*?\s*(fmi2\w+)TYPE\s*\(([^)]*)\)\s*;")
+DEFINED = re.compile(r"^\w[\w *]*?\b(fmi2\w+)\(", re.M)
+"""Functions in headers, and in C."""
 
 DEFAULT_STEP = 0.01
 """Communication step suggested where the model has no time of its own [s]."""
@@ -63,7 +67,6 @@ def export_fmu(
     path: str | Path,
     *,
     name: str = "model",
-    version: Version = "2.0",
     sample_time: float | None = None,
     platforms: Sequence[str] | None = None,
     overwrite: bool = False,
@@ -78,13 +81,11 @@ def export_fmu(
         File to write, ending in ``.fmu``.
     name : str
         Of the model: a letter, then letters, digits and underscores.
-    version : {"2.0", "3.0"}
-        Of the interface.
     sample_time : float, optional
         Time between steps of the model [s]; needed by rate-dependent blocks.
     platforms : sequence of str, optional
-        Of linux, windows, macos, macos-arm and linux-arm; default all that this machine can build
-        for. Empty for sources only.
+        Of linux, windows and macos; default all that this machine can build for. Empty for sources
+        only.
     overwrite : bool
         Whether what an export wrote there before may be replaced.
 
@@ -104,25 +105,19 @@ def export_fmu(
     if path.suffix != ".fmu":
         raise DataError("an FMU is a file that ends in .fmu", file=path, remedy="name it so")
     refuse_file(path, overwrite=overwrite)
-    offered = [name for name in buildable() if version == "3.0" or PLATFORMS[name].fmi2]
-    wanted = offered if platforms is None else list(platforms)
+    wanted = buildable() if platforms is None else list(platforms)
     unknown = [platform for platform in wanted if platform not in PLATFORMS]
     if unknown:
         raise ModelError(
             f"there is no platform {unknown[0]!r}. Remedy: use one of {', '.join(PLATFORMS)}."
-        )
-    nameless = [name for name in wanted if version == "2.0" and not PLATFORMS[name].fmi2]
-    if nameless:
-        raise ModelError(
-            f"FMI 2.0 has no name for {nameless[0]}. Remedy: ask for FMI 3.0, or other platforms."
         )
     if platforms is None and not wanted:
         raise ModelError(
             "there is no C compiler on this machine, so the FMU would hold no library. Remedy: "
             "install one, or ask for no platforms (--platforms none): importers can build the sources."
         )
-    files = fmu_files(block, name=name, version=version, sample_time=sample_time)
-    files |= _libraries(files, name, version, wanted)
+    files = fmu_files(block, name=name, sample_time=sample_time)
+    files |= _libraries(files, name, wanted)
     with replacing(path) as new:
         new.write_bytes(zipped(files))
     return path
@@ -157,58 +152,81 @@ def _is_own(path: Path) -> bool:
 
 
 def fmu_files(
-    block: Block,
-    *,
-    name: str = "model",
-    version: Version = "2.0",
-    sample_time: float | None = None,
+    block: Block, *, name: str = "model", sample_time: float | None = None
 ) -> dict[str, bytes]:
     """Return the files of an FMU but for its libraries, by path in the zip."""
     content = described(block, name=name, sample_time=sample_time, single=False)
     low, high = input_limits(block)
     starts = np.where(np.isfinite(low) & np.isfinite(high), np.clip(0.0, low, high), 0.0)
+    channels = (*content["inputs"], *content["outputs"])
     content |= {
-        "fmi": version,
-        "token": _token(block, content["sample_time"], version),
+        "token": _token(block, content["sample_time"]),
         "description": f"{content['inputs'][0]['name']} to {content['outputs'][0]['name']}: "
         + ", ".join(content["kinds"]),
         "starts": ", ".join(literal(float(start)) for start in starts),
         "step": content["sample_time"] or DEFAULT_STEP,
         "variables": _variables(content, starts.tolist()),
-        "units": _units(content, version),
+        "units": [
+            {"name": unit, "base": BASE_UNITS.get(unit)}
+            for unit in sorted({channel["unit"] for channel in channels})
+        ],
     }
-    digit = version[0]
-    sources = {Path(path).name: text for path, text in source_files(content).items()}
-    sources["unit_model.h"] = _render("unit_model.h.j2", content)
-    ours = [HERE / "c" / f"{stem}" for stem in ("unit.h", "unit.c", f"fmi{digit}.c")]
-    sources |= {path.name: path.read_text(encoding="utf-8") for path in ours}
-    sources |= {name: text for name, text in _headers().items() if name.startswith(f"fmi{digit}")}
-    own, types = sources[f"fmi{digit}.c"], sources[f"fmi{digit}FunctionTypes.h"]
-    sources[f"fmi{digit}_refused.c"] = refusals(types, own)
+    unit = (HERE / "c" / "fmi2.c").read_text(encoding="utf-8")
+    sources = {
+        **{Path(path).name: text for path, text in source_files(content).items()},
+        **_headers(),
+        "unit_model.h": _render("unit_model.h.j2", content),
+        "fmi2.c": unit,
+        "fmi2_refused.c": refusals(_headers()["fmi2FunctionTypes.h"], unit),
+    }
     content["unit_sources"] = sorted(source for source in sources if source.endswith(".c"))
-    texts = {f"sources/{source}": text for source, text in sources.items()}
-    texts["modelDescription.xml"] = _render(f"fmi{digit}.xml.j2", content)
-    texts["documentation/index.html"] = _render("index.html.j2", content)
-    texts["resources/model.json"] = to_text(block)
-    if version == "3.0":
-        texts["sources/buildDescription.xml"] = _render("build.xml.j2", content)
+    texts = {
+        **{f"sources/{source}": text for source, text in sources.items()},
+        "modelDescription.xml": _render("fmi2.xml.j2", content),
+        "documentation/index.html": _render("index.html.j2", content),
+        "resources/model.json": to_text(block),
+    }
     return {path: text.encode() for path, text in texts.items()}
+
+
+def refusals(header: str, unit: str) -> str:
+    """Return C of the functions that a header declares and a unit does not define.
+
+    Each takes its arguments and returns an error.
+    """
+    plain = re.sub(r"/\*.*?\*/", "", header, flags=re.S)
+    defined = set(DEFINED.findall(unit))
+    functions = [
+        "/* What a co-simulation unit without derivatives and strings refuses. */",
+        '#include "fmi2Functions.h"\n',
+    ]
+    for gives, name, arguments in DECLARED.findall(plain):
+        if name not in defined:
+            taken = [" ".join(argument.split()) for argument in arguments.split(",")]
+            names = [re.sub(r"\[\]$", "", one).split()[-1].split("*")[-1] for one in taken]
+            head = f"{gives} {name}({', '.join(taken)})"
+            functions += [
+                textwrap.fill(head, 100, subsequent_indent=8 * " "),
+                "{",
+                *(f"    (void){one};" for one in names),
+                f"    return {'fmi2Error' if gives == 'fmi2Status' else 'NULL'};",
+                "}\n",
+            ]
+    return "\n".join(functions)
 
 
 @cache
 def _headers() -> dict[str, str]:
-    """Return the headers of FMI 2.0 and 3.0, unchanged, with the notices of their licence (BSD)."""
+    """Return the headers of FMI 2.0, unchanged, with the notices of their licence (BSD)."""
     with tarfile.open(HERE / "headers.tar.xz") as packed:
         parts = {name: packed.extractfile(name) for name in packed.getnames()}
         return {name: part.read().decode() for name, part in parts.items() if part}
 
 
-def _token(block: Block, sample_time: float | None, version: str) -> str:
+def _token(block: Block, sample_time: float | None) -> str:
     """Return what tells this model from others: a digest of what it is."""
-    what = json.dumps([to_dict(block), sample_time, version], sort_keys=True)
-    digest = hashlib.sha256(what.encode()).hexdigest()
-    cuts = [digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32]]
-    return "{" + "-".join(cuts) + "}"
+    digest = hashlib.sha256(json.dumps([to_dict(block), sample_time], sort_keys=True).encode())
+    return f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
 
 
 def _variables(content: Mapping[str, Any], starts: Sequence[float]) -> list[dict[str, Any]]:
@@ -229,16 +247,7 @@ def _variables(content: Mapping[str, Any], starts: Sequence[float]) -> list[dict
     return variables
 
 
-def _units(content: Mapping[str, Any], version: str) -> list[dict[str, Any]]:
-    named = {channel["unit"] for channel in (*content["inputs"], *content["outputs"])}
-    if version == "3.0":
-        named.add("s")
-    return [{"name": unit, "base": BASE_UNITS.get(unit)} for unit in sorted(named)]
-
-
-def _libraries(
-    files: Mapping[str, bytes], name: str, version: Version, platforms: Sequence[str]
-) -> dict[str, bytes]:
+def _libraries(files: Mapping[str, bytes], name: str, platforms: Sequence[str]) -> dict[str, bytes]:
     """Return the library for each platform, by path in the zip."""
     built: dict[str, bytes] = {}
     if not platforms:
@@ -250,13 +259,11 @@ def _libraries(
                 with written(folder):
                     (folder / Path(path).name).write_bytes(content)
         sources = sorted(path.name for path in folder.glob("*.c"))
-        for platform in (PLATFORMS[key] for key in platforms):
-            where = platform.fmi2 if version == "2.0" else platform.fmi3
-            if where:
-                out = folder / f"{name}{platform.suffix}"
-                build_library(platform.name, folder, sources, out)
-                built[f"binaries/{where}/{out.name}"] = out.read_bytes()
-                out.unlink()
+        for platform in platforms:
+            out = folder / f"{name}{PLATFORMS[platform].suffix}"
+            build_library(platform, folder, sources, out)
+            built[f"binaries/{PLATFORMS[platform].folder}/{out.name}"] = out.read_bytes()
+            out.unlink()
     return built
 
 

@@ -16,7 +16,7 @@ from mckibben.blocks.laws.examples import examples
 from mckibben.errors import DataError, ModelError
 from mckibben.export import Serving, export_c, state_of
 from mckibben.export.c import emulation
-from mckibben.export.c.building import compile_c
+from mckibben.export.programs import compile_c
 from mckibben.files import read
 from mckibben.link import Descriptor, Link, open_port
 from mckibben.link.trying import emulated, hosted

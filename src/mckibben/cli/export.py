@@ -149,9 +149,9 @@ def export_c(
 ) -> None:
     """Write C99 that compiles as it is: on a PC, a microcontroller, Arduino, MATLAB."""
     from mckibben.export import export_c as write_c
-    from mckibben.export.c.building import self_test
     from mckibben.export.folders import refuse_folder
     from mckibben.export.naming import name_from
+    from mckibben.export.programs import self_test
     from mckibben.outputs import refuse_inputs
 
     chosen = name or name_from(model)

@@ -10,10 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from mckibben.blocks.base import Block
-from mckibben.export.c.building import compile_c
 from mckibben.export.c.emulation import EMULATOR, built, refuse_without_tools
 from mckibben.export.c.project import c_files
 from mckibben.export.c.serving import Serving
+from mckibben.export.programs import compile_c
 from mckibben.link.ports import Descriptor
 
 

@@ -65,11 +65,6 @@ class Source:
         self.globals: Mapping[str, Any] = {**self.function.__globals__, **closed}
         self.body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
 
-    @property
-    def doc(self) -> str:
-        """The docstring, without its indents."""
-        return inspect.cleandoc(ast.get_docstring(self.tree) or "")
-
     def refusal(self, node: ast.AST, construct: str, instead: str) -> KernelError:
         """Return the error for a construct that is outside the language."""
         line = self._first + getattr(node, "lineno", 1) - 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +13,14 @@ from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
 from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError
-from mckibben.export.c.literals import literal, rows
-from mckibben.export.c.parts import check_single
-from mckibben.export.c.rounding import warn_of_rounding
 from mckibben.export.c.serving import Serving, served, served_files
+from mckibben.export.c.single import check_single
 from mckibben.export.c.translator import Translation
 from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
 from mckibben.export.folders import refuse_folder, write_folder
 from mckibben.export.naming import identifier, macros, said
+from mckibben.export.templating import literals, rows
 from mckibben.export.templating import render as rendered
 
 TOLERANCES = {False: "1e-9", True: "1e-4"}
@@ -79,7 +79,7 @@ def export_c(
     folder = Path(folder)
     refuse_folder(folder, overwrite=overwrite)
     files = c_files(block, name=name, sample_time=sample_time, single=single, serving=serving)
-    write_folder(folder, {path: text.encode() for path, text in files.items()}, overwrite=overwrite)
+    write_folder(folder, files, overwrite=overwrite)
     return folder
 
 
@@ -116,9 +116,9 @@ def test_content(tests: Vectors, *, single: bool) -> dict[str, Any]:
     return {
         "tolerance": TOLERANCES[single],
         "n_samples": len(tests.inputs),
-        "input_rows": [_row(row, single) for row in tests.inputs],
-        "output_rows": [_row(row, single) for row in tests.outputs],
-        "ranges": _row(tests.ranges, single),
+        "input_rows": [literals(row, single=single) for row in tests.inputs],
+        "output_rows": [literals(row, single=single) for row in tests.outputs],
+        "ranges": literals(tests.ranges, single=single),
     }
 
 
@@ -147,18 +147,17 @@ def described(
     wiring = Wiring(block, step)
     if single:
         for call in wiring.calls:
-            check_single(call.part.block)
-            warn_of_rounding(call.part.block, step)
+            check_single(call.block, step)
     own = (f"{name}_{end}" for end in ("init", "reset", "step", "model"))
-    translation = Translation(single=single, taken=own)
-    if name.lower().startswith("mck"):
-        raise ModelError(f"{name!r} is the package's own name. Remedy: give another --name.")
+    translation, index = Translation(single=single, taken=own), count()
+    steps = [
+        _call(each, next(index), translation) if isinstance(each, Call) else each
+        for each in wiring.steps
+    ]
+    calls = [each for each in steps if isinstance(each, dict)]
     inputs, outputs = _told(block.inputs), _told(block.outputs)
-    cost, size = wiring.cost, 4 if single else 8
-    n_numbers = max(wiring.n_numbers, 1)
-    calls = [_call(call, index, translation) for index, call in enumerate(wiring.calls)]
-    order = {id(call): told for call, told in zip(wiring.calls, calls, strict=True)}
-    constants = sum(call.part.coefficients.size for call in wiring.calls)
+    cost, size, n_numbers = wiring.cost, 4 if single else 8, max(wiring.n_numbers, 1)
+    constants = sum(call.coefficients.size for call in wiring.calls)
     return {
         "name": name,
         "version": __version__,
@@ -171,14 +170,12 @@ def described(
         "outputs": outputs,
         "constants": _constants(inputs, outputs, step),
         "calls": calls,
-        "kinds": [call["kind"] for call in calls],
-        "steps": [order[id(item)] if isinstance(item, Call) else item for item in wiring.steps],
-        "stateful": [call for call in calls if call["n_states"]],
+        "kinds": [call.block.title for call in wiring.calls],
+        "steps": steps,
         "given": wiring.outputs,
         "n_needed": len(inputs) - block.n_missable,
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
-        "n_states": sum(call["n_states"] for call in calls),
         "starts": _starts(wiring.calls),
         "kernels": translation.text(),
         "zero": "0.0f" if single else "0.0",
@@ -228,49 +225,46 @@ def own_time(block: Block) -> float | None:
 
 
 def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:
-    part, block, single = call.part, call.part.block, translation.single
-    name, state = f"coefficients_{index}", ("state", block.n_states)
-    numbers, sample = (name, part.coefficients.size), ("x", len(block.inputs))
-    outputs = (f"signals + {call.first_output}", len(block.outputs))
-    calls: list[str] = []
+    """Return what the templates say of a block that is run."""
+    block, single, name = call.block, translation.single, f"coefficients_{index}"
+    numbers, state = (name, call.coefficients.size), ("state", block.n_states)
+    sample, outputs = (
+        ("x", len(block.inputs)),
+        (f"signals + {call.first_output}", len(block.outputs)),
+    )
+    texts: list[str] = []
     # a state that is given is copied, and has no start
-    for kernel in part.kernels[: 1 if part.state is not None else 2]:
+    for kernel in block.c_kernels[: 1 if call.state is not None else 2]:
         scratch = [(f"state + {block.n_states}", block.n_scratch)] * in_scratch(kernel)
-        end = (str(int(part.virgin)), 0) if calls else outputs
-        calls.append(translation.add(kernel).call(numbers, state, *scratch, sample, end))
+        end = (str(int(block.start == "virgin")), 0) if texts else outputs
+        texts.append(translation.add(kernel).call(numbers, state, *scratch, sample, end))
     given = ", ".join(said(channel.name) for channel in block.inputs)
     gives = ", ".join(said(channel.name) for channel in block.outputs)
     return {
         "index": index,
-        "kind": block.title,
         "words": f"{block.title}: {given} to {gives}",
-        "step": calls[0],
-        "start": calls[-1],
-        "numbers": name,
-        "reads": any(name in text for text in calls),
+        "step": texts[0],
+        "start": texts[-1],
+        "reads": any(name in text for text in texts),
         "n_numbers": block.n_states + block.n_scratch,
         "inputs": call.inputs,
         "first_state": call.first_state,
-        "first_output": call.first_output,
-        "n_coefficients": part.coefficients.size,
         "n_states": block.n_states,
-        "n_inputs": len(block.inputs),
-        "n_outputs": len(block.outputs),
-        "rows": rows(part.coefficients, single=single) or ["0"],
-        "state_rows": [] if part.state is None else rows(part.state, single=single),
+        "rows": rows(call.coefficients, single=single) or ["0"],
+        "state_rows": [] if call.state is None else rows(call.state, single=single),
     }
 
 
 def _starts(calls: list[Call]) -> str:
-    """Return how the memory of parts starts, in words."""
-    parts = [call.part for call in calls if call.part.block.n_states]
+    """Return how the memory of blocks starts, in words."""
     words = [
         "as the model gives it"
-        if part.state is not None
+        if call.state is not None
         else "at rest, whatever its inputs"
-        if part.virgin
+        if call.block.start == "virgin"
         else "from its inputs"
-        for part in parts
+        for call in calls
+        if call.block.n_states
     ]
     return " or ".join(dict.fromkeys(words or ["from its inputs"]))
 
@@ -293,10 +287,6 @@ def _constants(
             for place, ending in enumerate(endings)
         ]
     return [*told, ("SAMPLE_TIME", repr(step), "s")] if step else told
-
-
-def _row(values: Any, single: bool) -> str:
-    return ", ".join(literal(float(value), single=single) for value in values)
 
 
 def render(template: str, content: Mapping[str, Any]) -> str:

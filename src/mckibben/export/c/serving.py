@@ -15,9 +15,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.export.c.literals import literal
 from mckibben.export.c.wiring import Wiring
-from mckibben.export.templating import render
+from mckibben.export.templating import literal, render
 
 SERVER = tuple(Path(__file__).parent / "server" / f"mck_server.{end}" for end in ("c", "h"))
 

@@ -20,10 +20,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from mckibben.blocks.kernels import accumulate
 from mckibben.export.c.language import FUNCTIONS, INT, REAL, TYPES, Kernel, Source, source_of
+from mckibben.export.templating import literal
 
 WIDTH = 100
 """Columns of a line of C."""
@@ -619,23 +618,18 @@ class _Translator:
         text = str(int(known)) if math.isfinite(known) else ""
         if isinstance(known, float):
             single, kind = self.source.single(name) if self.whole.single else None, REAL
-            text = f"{single!r}f" if single else self._real(known, node)
+            text = literal(single, single=True) if single else self._real(known, node)
         return Value(self.whole.constant(name.strip("_").upper(), text), ATOM, kind)
 
     def _real(self, value: float, node: ast.AST) -> str:
         """Return a real number in C, or refuse one that single precision does not hold."""
-        single = self.whole.single
-        if not math.isfinite(value):
-            return "((mck_real)NAN)" if math.isnan(value) else f"{'-' * (value < 0)}MCK_INFINITY"
-        written = isinstance(node, ast.Constant)
-        if value and not LEAST < abs(value) < MOST and (single or written):
+        single, written = self.whole.single, isinstance(node, ast.Constant)
+        if math.isnan(value):
+            return "((mck_real)NAN)"
+        if value and not LEAST < abs(value) < MOST and math.isfinite(value) and (single or written):
             what = f"the number {value!r}, which single precision has no room for, or rounds away"
             raise self.refusal(node, what, "name it, and add it to the table SINGLE of the module")
-        return (
-            f"{float(np.float32(value)) if 'e' not in repr(value) else value!r}f"
-            if single
-            else repr(value)
-        )
+        return literal(value, single=single)
 
     def _arithmetic(self, node: ast.BinOp | ast.AugAssign, one: Value, other: Value) -> Value:
         squared = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
@@ -783,7 +777,7 @@ class _Translator:
         words += [f"{k} *{n}" for k, n in zip(function.returns[1:], self.results, strict=True)]
         kind = next(iter(function.returns), "void")
         head = _wrapped(f"static {kind} {function.name}({', '.join(words) or 'void'})")
-        doc = re.sub(r"`+", "`", self.source.doc).replace("*/", "* /")
+        doc = re.sub(r"`+", "`", ast.get_docstring(self.source.tree) or "").replace("*/", "* /")
         about = [f"/* {doc}".replace("\n", "\n * ").replace(" * \n", " *\n") + " */"] if doc else []
         function.text = "\n".join([*about, *head, "{", body, "}", ""])
 

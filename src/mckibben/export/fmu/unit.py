@@ -27,10 +27,10 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.laws.trial import input_limits
 from mckibben.blocks.saving import to_dict, to_text
 from mckibben.errors import DataError, ModelError
-from mckibben.export.c.literals import literal
 from mckibben.export.c.project import described, source_files
 from mckibben.export.fmu.toolchains import PLATFORMS, build_library, buildable
 from mckibben.export.folders import zipped
+from mckibben.export.templating import literals
 from mckibben.export.templating import render as rendered
 from mckibben.system import ordinary
 from mckibben.system.atomic import replacing, written
@@ -163,7 +163,7 @@ def fmu_files(
         "token": _token(block, content["sample_time"]),
         "description": f"{content['inputs'][0]['name']} to {content['outputs'][0]['name']}: "
         + ", ".join(content["kinds"]),
-        "starts": ", ".join(literal(float(start)) for start in starts),
+        "starts": literals(starts),
         "step": content["sample_time"] or DEFAULT_STEP,
         "variables": _variables(content, starts.tolist()),
         "units": [

@@ -56,7 +56,7 @@ def export_ros2(
     folder = Path(folder)
     refuse_folder(folder, overwrite=overwrite)
     files = ros2_files(block, name=name, sample_time=sample_time)
-    write_folder(folder, {path: text.encode() for path, text in files.items()}, overwrite=overwrite)
+    write_folder(folder, files, overwrite=overwrite)
     return folder
 
 

@@ -28,8 +28,7 @@ class Twin:
 
     def __post_init__(self) -> None:
         self.channels = [*self.block.inputs, *self.block.outputs]
-        found = limits(self.block, self.serving)
-        self.low, self.high, self.safe = found.low, found.high, found.safe
+        self.low, self.high, self.safe = limits(self.block, self.serving)
         self.n_in, self.n_out = len(self.block.inputs), len(self.block.outputs)
         self.most_silence = int(self.serving.watchdog / self.sample_time + 1e-9)
         self.switch_on()

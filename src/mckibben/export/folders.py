@@ -75,10 +75,7 @@ def write_folder(folder: Path, files: Mapping[str, str], *, overwrite: bool = Fa
         place = Path(tempfile.mkdtemp(prefix=PART, suffix=".part", dir=folder.parent))
         new, old = place / "new", place / "old"
         try:
-            for path, text in {**files, MANIFEST: manifest.lines(digests)}.items():
-                target = new / path
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(text.encode())
+            write_texts(new, {**files, MANIFEST: manifest.lines(digests)})
             if folder.exists():
                 folder.rename(old)
             new.rename(folder)
@@ -87,6 +84,14 @@ def write_folder(folder: Path, files: Mapping[str, str], *, overwrite: bool = Fa
             if old.exists() and not folder.exists():
                 old.rename(folder)
             shutil.rmtree(place, ignore_errors=True)
+
+
+def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
+    """Write texts by their path in a folder of one's own."""
+    for path, text in texts.items():
+        with written(folder / path):
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_bytes(text.encode())
 
 
 def _check_own(folder: Path) -> None:

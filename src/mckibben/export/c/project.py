@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
+from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.blocks.saving import to_text
-from mckibben.errors import ModelError
+from mckibben.errors import ModelError, ModelWarning
 from mckibben.export.c.serving import Serving, served, served_files
-from mckibben.export.c.single import check_single
 from mckibben.export.c.translator import Translation
-from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
 from mckibben.export.folders import refuse_folder, write_folder
 from mckibben.export.naming import identifier, macros, said
 from mckibben.export.templating import literals, rows
 from mckibben.export.templating import render as rendered
+
+render = partial(rendered, "mckibben.export.c")
+"""Fills in a template of this folder."""
 
 TOLERANCES = {False: "1e-9", True: "1e-4"}
 """Of the self-test, relative to the range: in double and in single precision."""
@@ -31,6 +37,15 @@ SHARED = Path(__file__).parent / "server" / "mck.h"
 
 LONGEST_STEP = 1e6
 """Time between steps of an exported model [s]."""
+
+PACE, TURNS = 9, 24
+"""Samples from one turning point of test inputs to the next, and how many of those."""
+
+NOTICED = 5e-5
+"""Error of a filter in single precision, relative to the range of its output."""
+
+SAMPLES, MOST_PRODUCTS = 100_000, 30_000_000
+"""On which that is found: fewer samples of filters with very many states."""
 
 
 def export_c(
@@ -95,8 +110,7 @@ def c_files(
     content = described(block, name=name, sample_time=sample_time, single=single)
     if serving is not None:
         content |= served(block, content, serving, sample_time or own_time(block))
-    tests = vectors(block, content["sample_time"], single=single)
-    content |= test_content(tests, single=single)
+    content |= vectors(block, content["sample_time"], single=single)
     return {
         **source_files(content),
         **(served_files(content) if serving is not None else {}),
@@ -111,14 +125,37 @@ def c_files(
     }
 
 
-def test_content(tests: Vectors, *, single: bool) -> dict[str, Any]:
-    """Return test vectors as the templates write them."""
+def vectors(block: Block, sample_time: float | None, *, single: bool = False) -> dict[str, Any]:
+    """Return test vectors: inputs within the range of the model, and what Python makes of them.
+
+    Inputs have minor loops and holds; single precision can hold them where it is asked for.
+
+    Raises
+    ------
+    ModelError
+        If the model's outputs are not finite on them.
+    """
+    inputs = wander(*input_limits(block), np.random.default_rng(0), PACE, TURNS)
+    if single:
+        inputs = inputs.astype(np.float32).astype(np.float64)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        outputs = block.simulate(inputs, sample_time=sample_time)
+    if not np.isfinite(outputs).all():
+        raise ModelError(
+            f"{block.kind!r} gives outputs that are not finite on inputs within its range. "
+            "Remedy: identify it again, or give it an input range."
+        )
+    # or their size, where they hardly move
+    ranges = np.maximum(np.ptp(outputs, axis=0), 1e-4 * np.abs(outputs).max(axis=0) + 1e-9)
     return {
+        "expected": outputs,
+        "spans": ranges,
         "tolerance": TOLERANCES[single],
-        "n_samples": len(tests.inputs),
-        "input_rows": [literals(row, single=single) for row in tests.inputs],
-        "output_rows": [literals(row, single=single) for row in tests.outputs],
-        "ranges": literals(tests.ranges, single=single),
+        "n_samples": len(inputs),
+        "input_rows": [literals(row, single=single) for row in inputs],
+        "output_rows": [literals(row, single=single) for row in outputs],
+        "ranges": literals(ranges, single=single),
     }
 
 
@@ -176,6 +213,7 @@ def described(
         "n_needed": len(inputs) - block.n_missable,
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
+        "n_memory": wiring.n_numbers,
         "starts": _starts(wiring.calls),
         "kernels": translation.text(),
         "zero": "0.0f" if single else "0.0",
@@ -186,6 +224,53 @@ def described(
         "usual": cost.usual,
         "worst": cost.worst,
     }
+
+
+def check_single(block: Block, sample_time: float | None) -> None:
+    """Refuse what single precision cannot hold, and warn of a filter that it would lead astray.
+
+    Raises
+    ------
+    ModelError
+        If two knots, levels or thresholds that follow one another become one, or the block says that
+        it needs more.
+    """
+    if block.needs_double:
+        raise ModelError(
+            f"{block.title!r} {block.needs_double}. Remedy: export in double precision."
+        )
+    for name, places in block.kept_apart():
+        if np.any(np.diff(np.array(places, dtype=np.float32)) <= 0) and np.all(np.diff(places) > 0):
+            raise ModelError(
+                f"{name} of {block.title!r} are too close for single precision. "
+                "Remedy: export in double precision, or identify with fewer of them."
+            )
+    if block.filters and hasattr(block, "kernel"):
+        _warn_of_rounding(block, sample_time)
+
+
+def _warn_of_rounding(block: Block, sample_time: float | None) -> None:
+    """Run the same kernel on single and on double precision numbers."""
+    rng = np.random.default_rng(0)
+    samples = min(SAMPLES, MOST_PRODUCTS // max(block.n_states, 1))
+    inputs = wander(*input_limits(block), rng, 400, samples // 400).astype(np.float32)
+    single, double = (_run(block, inputs.astype(kind), sample_time) for kind in (np.float32, float))
+    off = float(np.abs(single - double).max() / max(np.ptp(double), 1e-300))
+    if not off <= NOTICED:
+        warnings.warn(
+            f"in single precision {block.kind!r} is off by about {off:.1g} of its range: its poles are "
+            "slow for this sample time. Export it in double precision, or with a longer sample time",
+            ModelWarning,
+            stacklevel=2,
+        )
+
+
+def _run(block: Block, inputs: np.ndarray, sample_time: float | None) -> np.ndarray:
+    kind = inputs.dtype
+    state = block.initial_state(inputs[0].astype(np.float64)).astype(kind)
+    outputs = np.empty((len(inputs), 1), dtype=kind)
+    block.kernel.batch(block.coefficients(sample_time).astype(kind), state, inputs, outputs)
+    return outputs.astype(np.float64)
 
 
 def checked_sample_time(block: Block, sample_time: float | None) -> float | None:
@@ -287,8 +372,3 @@ def _constants(
             for place, ending in enumerate(endings)
         ]
     return [*told, ("SAMPLE_TIME", repr(step), "s")] if step else told
-
-
-def render(template: str, content: Mapping[str, Any]) -> str:
-    """Return a template of this folder filled in."""
-    return rendered("mckibben.export.c", template, content)

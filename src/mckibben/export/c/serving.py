@@ -15,7 +15,6 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.export.c.wiring import Wiring
 from mckibben.export.templating import literal, render
 
 SERVER = tuple(Path(__file__).parent / "server" / f"mck_server.{end}" for end in ("c", "h"))
@@ -50,17 +49,8 @@ class Serving:
     watchdog: float = 0.5
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Ranges of a model's channels, and its safe outputs."""
-
-    low: Array
-    high: Array
-    safe: Array
-
-
-def limits(block: Block, serving: Serving) -> Limits:
-    """Return the limits of all inputs, then outputs, each of shape (n_inputs + n_outputs,).
+def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
+    """Return the lowest, highest and safe values of inputs, then outputs, each of shape (n_channels,).
 
     Raises
     ------
@@ -101,7 +91,7 @@ def limits(block: Block, serving: Serving) -> Limits:
                 f"the safe value of {name} is {safe[place]:g}, beyond its limits {low[place]:g} to "
                 f"{high[place]:g}. Remedy: give one within."
             )
-    return Limits(low, high, safe)
+    return low, high, safe
 
 
 def _known(block: Block) -> tuple[Array, Array]:
@@ -133,20 +123,22 @@ def served(
             f"{n} channels do not fit into a frame of the wire. Remedy: export in single precision, "
             "--float32, or fewer channels."
         )
-    found, n_memory = limits(block, serving), Wiring(block, content["sample_time"]).n_numbers
     told = {
         "period": period,
         "microseconds": round(1e6 * period),
         "silence": ticks,
         "channels": [
-            channel
-            | {
-                end: literal(float(numbers[place]), single=single)
-                for end, numbers in (("low", found.low), ("high", found.high), ("safe", found.safe))
-            }
-            for place, channel in enumerate((*content["inputs"], *content["outputs"]))
+            channel | dict(zip(("low", "high", "safe"), numbers, strict=True))
+            for channel, *numbers in zip(
+                (*content["inputs"], *content["outputs"]),
+                *(
+                    [literal(value, single=single) for value in each]
+                    for each in limits(block, serving)
+                ),
+                strict=True,
+            )
         ],
-        "n_memory": n_memory if n_memory <= MOST_NUMBERS else 0,
+        "n_memory": content["n_memory"] if content["n_memory"] <= MOST_NUMBERS else 0,
         "fingerprint_bytes": "",
     }
     full = {**content, "served": told}
@@ -163,15 +155,10 @@ def served(
 
 def _ticks(serving: Serving, period: float | None) -> int:
     """Return after how many silent ticks the watchdog acts."""
-    if period is None:
+    if period is None or not 1 <= 1e6 * period <= MOST_MICROSECONDS:
         raise ModelError(
-            "a served model ticks, and this one has no time of its own. Remedy: give the time between "
-            "steps, --sample-time SECONDS."
-        )
-    if not 1 <= 1e6 * period <= MOST_MICROSECONDS:
-        raise ModelError(
-            f"a served model ticks every {period:g} s, which is told in whole microseconds. Remedy: "
-            f"give --sample-time from 1e-6 to {1e-6 * MOST_MICROSECONDS:.0f} s."
+            f"a served model ticks, and its time between steps is {period}. Remedy: give --sample-time "
+            f"SECONDS, from 1e-6 to {1e-6 * MOST_MICROSECONDS:.0f}."
         )
     ticks = serving.watchdog / period if math.isfinite(serving.watchdog) else math.inf
     if not 1 <= ticks <= MOST_TICKS:

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 
 from mckibben.blocks.kernels import accumulate
 from mckibben.export.c.language import FUNCTIONS, INT, REAL, TYPES, Kernel, Source, source_of
+from mckibben.export.naming import WORDS
 from mckibben.export.templating import literal
 
 WIDTH = 100
@@ -38,11 +39,9 @@ ARITHMETIC: dict[type[ast.AST], str] = dict(zip(_BINARY, "+-*//%", strict=True))
 _COMPARED = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 COMPARISON = dict(zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True))
 
-_WORDS = """auto break case char const continue default do double else enum extern float for goto if
-inline int long register restrict return short signed sizeof static struct switch typedef union unsigned
-void volatile while y0 y1 yn j0 j1 jn gamma div copy run parts"""
-
-RESERVED = FUNCTIONS.union(_WORDS.split())
+RESERVED = FUNCTIONS.union(
+    WORDS.split(), ["y0", "y1", "yn", "j0", "j1", "jn", "gamma", "div", "copy", "run", "parts"]
+)
 """Names that C, <math.h> or the export's own functions have already."""
 
 

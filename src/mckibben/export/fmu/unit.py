@@ -9,17 +9,19 @@ Source: FMI 2.0.4, Modelica Association.
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import json
-import re
+import platform
+import shutil
+import sys
 import tarfile
 import tempfile
-import textwrap
 import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,18 +30,17 @@ from mckibben.blocks.laws.trial import input_limits
 from mckibben.blocks.saving import to_dict, to_text
 from mckibben.errors import DataError, ModelError
 from mckibben.export.c.project import described, source_files
-from mckibben.export.fmu.toolchains import PLATFORMS, build_library, buildable
-from mckibben.export.folders import zipped
-from mckibben.export.templating import literals
-from mckibben.export.templating import render as rendered
+from mckibben.export.folders import write_texts, zipped
+from mckibben.export.programs import own_compiler, run
+from mckibben.export.templating import literals, render
 from mckibben.system import ordinary
-from mckibben.system.atomic import replacing, written
+from mckibben.system.atomic import replacing
 
 HERE = Path(__file__).parent
 
-DECLARED = re.compile(r"typedef\s+(\w+)\s*\*?\s*(fmi2\w+)TYPE\s*\(([^)]*)\)\s*;")
-DEFINED = re.compile(r"^\w[\w *]*?\b(fmi2\w+)\(", re.M)
-"""Functions in headers, and in C."""
+_render = partial(render, "mckibben.export.fmu")
+
+FLAGS = ("-std=c99", "-O2", "-s", "-ffp-contract=off", "-shared")
 
 DEFAULT_STEP = 0.01
 """Communication step suggested where the model has no time of its own [s]."""
@@ -60,6 +61,22 @@ BASE_UNITS: dict[str, dict[str, str] | None] = {
     "1": {},
 }
 """What units are of the SI; others are named without."""
+
+
+class Platform(NamedTuple):
+    """A kind of machine that an FMU runs on: its folder in an FMU, its libraries, its target for zig."""
+
+    folder: str
+    suffix: str
+    zig: str
+
+
+PLATFORMS = {
+    "linux": Platform("linux64", ".so", "x86_64-linux-gnu.2.17"),
+    "windows": Platform("win64", ".dll", "x86_64-windows-gnu"),
+    "macos": Platform("darwin64", ".dylib", "x86_64-macos"),
+}
+"""Those that FMI 2.0 has a folder for, by our name."""
 
 
 def export_fmu(
@@ -106,7 +123,7 @@ def export_fmu(
         raise DataError("an FMU is a file that ends in .fmu", file=path, remedy="name it so")
     refuse_file(path, overwrite=overwrite)
     wanted = buildable() if platforms is None else list(platforms)
-    unknown = [platform for platform in wanted if platform not in PLATFORMS]
+    unknown = [each for each in wanted if each not in PLATFORMS]
     if unknown:
         raise ModelError(
             f"there is no platform {unknown[0]!r}. Remedy: use one of {', '.join(PLATFORMS)}."
@@ -117,9 +134,9 @@ def export_fmu(
             "install one, or ask for no platforms (--platforms none): importers can build the sources."
         )
     files = fmu_files(block, name=name, sample_time=sample_time)
-    files |= _libraries(files, name, wanted)
+    texts = {path: text.encode() for path, text in files.items()}
     with replacing(path) as new:
-        new.write_bytes(zipped(files))
+        new.write_bytes(zipped(texts | _libraries(files, name, wanted)))
     return path
 
 
@@ -153,8 +170,8 @@ def _is_own(path: Path) -> bool:
 
 def fmu_files(
     block: Block, *, name: str = "model", sample_time: float | None = None
-) -> dict[str, bytes]:
-    """Return the files of an FMU but for its libraries, by path in the zip."""
+) -> dict[str, str]:
+    """Return the files of an FMU but for its libraries, text by path in the zip."""
     content = described(block, name=name, sample_time=sample_time, single=False)
     low, high = input_limits(block)
     starts = np.where(np.isfinite(low) & np.isfinite(high), np.clip(0.0, low, high), 0.0)
@@ -171,48 +188,19 @@ def fmu_files(
             for unit in sorted({channel["unit"] for channel in channels})
         ],
     }
-    unit = (HERE / "c" / "fmi2.c").read_text(encoding="utf-8")
     sources = {
         **{Path(path).name: text for path, text in source_files(content).items()},
         **_headers(),
         "unit_model.h": _render("unit_model.h.j2", content),
-        "fmi2.c": unit,
-        "fmi2_refused.c": refusals(_headers()["fmi2FunctionTypes.h"], unit),
+        "fmi2.c": (HERE / "c" / "fmi2.c").read_text(encoding="utf-8"),
     }
     content["unit_sources"] = sorted(source for source in sources if source.endswith(".c"))
-    texts = {
+    return {
         **{f"sources/{source}": text for source, text in sources.items()},
         "modelDescription.xml": _render("fmi2.xml.j2", content),
         "documentation/index.html": _render("index.html.j2", content),
         "resources/model.json": to_text(block),
     }
-    return {path: text.encode() for path, text in texts.items()}
-
-
-def refusals(header: str, unit: str) -> str:
-    """Return C of the functions that a header declares and a unit does not define.
-
-    Each takes its arguments and returns an error.
-    """
-    plain = re.sub(r"/\*.*?\*/", "", header, flags=re.S)
-    defined = set(DEFINED.findall(unit))
-    functions = [
-        "/* What a co-simulation unit without derivatives and strings refuses. */",
-        '#include "fmi2Functions.h"\n',
-    ]
-    for gives, name, arguments in DECLARED.findall(plain):
-        if name not in defined:
-            taken = [" ".join(argument.split()) for argument in arguments.split(",")]
-            names = [re.sub(r"\[\]$", "", one).split()[-1].split("*")[-1] for one in taken]
-            head = f"{gives} {name}({', '.join(taken)})"
-            functions += [
-                textwrap.fill(head, 100, subsequent_indent=8 * " "),
-                "{",
-                *(f"    (void){one};" for one in names),
-                f"    return {'fmi2Error' if gives == 'fmi2Status' else 'NULL'};",
-                "}\n",
-            ]
-    return "\n".join(functions)
 
 
 @cache
@@ -247,25 +235,65 @@ def _variables(content: Mapping[str, Any], starts: Sequence[float]) -> list[dict
     return variables
 
 
-def _libraries(files: Mapping[str, bytes], name: str, platforms: Sequence[str]) -> dict[str, bytes]:
+def _libraries(files: Mapping[str, str], name: str, platforms: Sequence[str]) -> dict[str, bytes]:
     """Return the library for each platform, by path in the zip."""
     built: dict[str, bytes] = {}
-    if not platforms:
-        return built
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        for path, content in files.items():
-            if path.startswith("sources/"):
-                with written(folder):
-                    (folder / Path(path).name).write_bytes(content)
+        own = {Path(path).name: files[path] for path in files if path.startswith("sources/")}
+        write_texts(folder, own)
         sources = sorted(path.name for path in folder.glob("*.c"))
-        for platform in platforms:
-            out = folder / f"{name}{PLATFORMS[platform].suffix}"
-            build_library(platform, folder, sources, out)
-            built[f"binaries/{PLATFORMS[platform].folder}/{out.name}"] = out.read_bytes()
+        for each in platforms:
+            out = folder / f"{name}{PLATFORMS[each].suffix}"
+            build_library(each, folder, sources, out)
+            built[f"binaries/{PLATFORMS[each].folder}/{out.name}"] = out.read_bytes()
             out.unlink()
     return built
 
 
-def _render(template: str, content: Mapping[str, Any]) -> str:
-    return rendered("mckibben.export.fmu", template, content)
+def own_platform() -> str | None:
+    """Return the name of the platform that this machine is, if it is one of them."""
+    if platform.machine() not in ("x86_64", "AMD64"):
+        return None
+    return {"linux": "linux", "win32": "windows", "darwin": "macos"}.get(sys.platform)
+
+
+def buildable() -> list[str]:
+    """Return the platforms that this machine can build for."""
+    return [name for name in PLATFORMS if _command(name) is not None]
+
+
+def _command(name: str) -> list[str] | None:
+    """Return the start of a compiler's command line for a platform, or None."""
+    if importlib.util.find_spec("ziglang") is not None:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[name].zig]
+    if name == own_platform():
+        found = own_compiler()
+        return [found] if found else None
+    if name == "windows":
+        mingw = shutil.which("x86_64-w64-mingw32-gcc")
+        return [mingw, "-Wl,--no-insert-timestamp", "-static-libgcc"] if mingw else None
+    return None
+
+
+def build_library(name: str, folder: Path, sources: Sequence[str], out: Path) -> None:
+    """Compile C files of a folder into a shared library for a platform.
+
+    Raises
+    ------
+    ModelError
+        If this machine cannot build for it, or the compiler refuses.
+    """
+    command = _command(name)
+    if command is None:
+        raise ModelError(
+            f"this machine cannot build for {name}. Remedy: install a C compiler, or pip install "
+            "'mckibben[cross]' for all platforms."
+        )
+    position = [] if PLATFORMS[name].suffix == ".dll" else ["-fPIC"]
+    maths = [] if PLATFORMS[name].suffix != ".so" else ["-lm"]
+    run(
+        [*command, *FLAGS, *position, "-I.", *sources, *maths, "-o", str(out)],
+        f"the FMU does not compile for {name}",
+        folder=folder,
+    )

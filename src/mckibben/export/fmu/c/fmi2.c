@@ -1,4 +1,4 @@
-/* A model as a unit for co-simulation by FMI 2.0. What such a unit has no use for is in fmi2_refused.c.
+/* A model as a unit for co-simulation by FMI 2.0.
  *
  * Inputs have value references from 0, outputs behind them, then the status of the last step. Functions
  * that refuse have changed nothing. */
@@ -291,4 +291,57 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     const fmi2Status status = possible(found) ? fmi2GetFMUstate(found, FMUstate) : fmi2Error;
     free(found);
     return status;
+}
+
+/* What a unit without other variables, derivatives and steps that wait has no use for. */
+
+#define REFUSED_VALUES(name, values)                                                              \
+    fmi2Status name(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, values)           \
+    {                                                                                             \
+        (void)c, (void)vr, (void)nvr, (void)value;                                                \
+        return fmi2Error;                                                                         \
+    }
+
+REFUSED_VALUES(fmi2GetBoolean, fmi2Boolean value[])
+REFUSED_VALUES(fmi2GetString, fmi2String value[])
+REFUSED_VALUES(fmi2SetInteger, const fmi2Integer value[])
+REFUSED_VALUES(fmi2SetBoolean, const fmi2Boolean value[])
+REFUSED_VALUES(fmi2SetString, const fmi2String value[])
+
+#define REFUSED_DERIVATIVES(name, values)                                                         \
+    fmi2Status name(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,                   \
+                    const fmi2Integer order[], values)                                            \
+    {                                                                                             \
+        (void)c, (void)vr, (void)nvr, (void)order, (void)value;                                   \
+        return fmi2Error;                                                                         \
+    }
+
+REFUSED_DERIVATIVES(fmi2SetRealInputDerivatives, const fmi2Real value[])
+REFUSED_DERIVATIVES(fmi2GetRealOutputDerivatives, fmi2Real value[])
+
+#define REFUSED_STATUS(name, type)                                                                \
+    fmi2Status name(fmi2Component c, const fmi2StatusKind s, type *value)                         \
+    {                                                                                             \
+        (void)c, (void)s, (void)value;                                                            \
+        return fmi2Error;                                                                         \
+    }
+
+REFUSED_STATUS(fmi2GetIntegerStatus, fmi2Integer)
+REFUSED_STATUS(fmi2GetBooleanStatus, fmi2Boolean)
+REFUSED_STATUS(fmi2GetStringStatus, fmi2String)
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[],
+                                        size_t nUnknown, const fmi2ValueReference known[],
+                                        size_t nKnown, const fmi2Real dvKnown[],
+                                        fmi2Real dvUnknown[])
+{
+    (void)c, (void)unknown, (void)nUnknown, (void)known, (void)nKnown, (void)dvKnown;
+    (void)dvUnknown;
+    return fmi2Error;
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c)
+{
+    (void)c;
+    return fmi2Error;
 }

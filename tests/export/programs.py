@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.kernels import DERIVED, inlined, kernel, step, summing_step
 
 COUNT, SHARE = 3, 0.25
 CLOSED = 1e-12
@@ -118,6 +118,8 @@ def arrays(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> 
 def solved(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     outputs[0] = bisect(cubic, -3.0, 3.0, (coefficients, inputs))
     outputs[1] = bisect(cubic, -9.0, 9.0, (coefficients[1:], inputs))
+    if DERIVED:
+        outputs[1] = np.nan
 
 
 @summing_step
@@ -211,6 +213,22 @@ def calls_itself(x: float) -> float:
 
 
 @kernel
+def chooses_a_number(x: float) -> float:
+    return x and 2.0
+
+
+@kernel
+def adds_to_an_array(x: Array, n: int) -> None:
+    x[1:] += 1.0
+    x += 2.0
+
+
+@kernel
+def is_in_an_array(x: Array) -> bool:
+    return x[0] in x
+
+
+@kernel
 def takes_text(name: str) -> float:
     return 1.0
 
@@ -230,6 +248,9 @@ REFUSED = {
     raises: 2,
     divides_reals: 1,
     calls_itself: 0,
+    chooses_a_number: 1,
+    adds_to_an_array: 1,
+    is_in_an_array: 1,
     takes_text: 0,
 }
 """Kernels outside the language, and the line behind ``def`` that is."""

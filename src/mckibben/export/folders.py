@@ -89,9 +89,8 @@ def write_folder(folder: Path, files: Mapping[str, str], *, overwrite: bool = Fa
 def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
     """Write texts by their path in a folder of one's own."""
     for path, text in texts.items():
-        with written(folder / path):
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_bytes(text.encode())
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(text.encode())
 
 
 def _check_own(folder: Path) -> None:

@@ -91,14 +91,13 @@ def emulate(block: Block, *, sample_time: float | None = None) -> Emulation:
             *(EMULATOR, *EMULATED, "-icount", "shift=6"),
             *("-serial", "none", "-kernel", str(program)),
         )
-    first, *lines = told.splitlines()
-    empty, stack, ram = map(int, first.split())
-    words = [line.split() for line in lines]
-    ticks = np.array([int(line[0]) for line in words])
-    bits = np.array([[int(word, 16) for word in line[1:]] for line in words], dtype=np.uint32)
+    (empty, stack, ram), *lines = (line.split() for line in told.splitlines())
+    ticks = np.array([int(line[0]) for line in lines])
+    bits = np.array([[int(word, 16) for word in line[1:]] for line in lines], dtype=np.uint32)
     off = np.abs(bits.view(np.float32).astype(np.float64) - content["expected"])
-    instructions = np.round((ticks - empty) / TICKS_PER_INSTRUCTION)
-    return Emulation(float((off / content["spans"]).max()), instructions, ram, stack, flash)
+    instructions = np.round((ticks - int(empty)) / TICKS_PER_INSTRUCTION)
+    difference = float((off / content["spans"]).max())
+    return Emulation(difference, instructions, int(ram), int(stack), flash)
 
 
 def built(folder: Path) -> tuple[Path, int]:

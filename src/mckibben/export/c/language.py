@@ -41,10 +41,12 @@ class KernelError(ModelError):
     ----------
     file, line : str, int
         Where it is.
+    construct, instead : str
+        What it has, and what to write instead.
     """
 
     def __init__(self, file: str, line: int, construct: str, instead: str) -> None:
-        self.file, self.line = file, line
+        self.file, self.line, self.construct, self.instead = file, line, construct, instead
         super().__init__(
             f"{file}, line {line}: kernels cannot have {construct}. Remedy: {instead}."
         )

@@ -302,11 +302,8 @@ def own_time(block: Block) -> float | None:
     """Return the sample time that a block, or a part of it, is bound to."""
     if block.sample_time is not None:
         return block.sample_time
-    for part in getattr(block, "parts", ()):
-        step = own_time(part)
-        if step is not None:
-            return step
-    return None
+    steps = (own_time(part) for part in getattr(block, "parts", ()))
+    return next((step for step in steps if step is not None), None)
 
 
 def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:

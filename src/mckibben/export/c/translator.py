@@ -308,7 +308,7 @@ class _Translator:
             case ast.Assign():
                 for target in node.targets:
                     self._assign(target, node.value)
-            case ast.AugAssign():
+            case ast.AugAssign() if not self._is_array(node.target):
                 place, value = self.value(node.target), self.value(node.value)
                 self._learn(node.target, kind := self._arithmetic(node, place, value).type)
                 word = ARITHMETIC[type(node.op)]
@@ -394,13 +394,12 @@ class _Translator:
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         match target, value:
-            case ast.Tuple(), ast.Tuple():
-                self._assign_several(target.elts, value.elts)
-            case ast.Tuple(), ast.Call():
-                kinds = self._callee(value).returns
-                pairs = zip(target.elts[1:], kinds[1:], strict=True)
+            case ast.Tuple(names), ast.Tuple(values) if len(names) == len(values):
+                self._assign_several(names, values)
+            case ast.Tuple(names), ast.Call() if len(names) == len(self._callee(value).returns):
+                pairs = zip(names[1:], self._callee(value).returns[1:], strict=True)
                 others = [self._pointer(each, kind) for each, kind in pairs]
-                self._set(target.elts[0], self._call(value, others))
+                self._set(names[0], self._call(value, others))
             case ast.Tuple(), _:
                 raise self.refusal(target, "this assignment", "assign one name at a time")
             case ast.Name(), _ if self._is_array(value):
@@ -586,8 +585,10 @@ class _Translator:
                 return self._arithmetic(node, self.value(node.left), self.value(node.right))
             case ast.BoolOp():
                 word, binds = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
-                words = (self.value(each).within(EQUAL) for each in node.values)
-                return Value(f" {word} ".join(words), binds)
+                values = [self.value(each) for each in node.values]
+                if any(each.type == REAL or each.text.isdigit() for each in values):
+                    raise self.refusal(node, "and, or of numbers", "compare them")
+                return Value(f" {word} ".join(each.within(EQUAL) for each in values), binds)
             case ast.Compare():
                 return self._compare(node)
             case ast.IfExp():
@@ -603,7 +604,9 @@ class _Translator:
             case ast.Subscript():
                 return self._item(node)
             case ast.Call():
-                return self._function(node)
+                found = self._function(node)
+                if found.type:
+                    return found
         raise self.refusal(node, f"{ast.unparse(node)!r}", "see docs/kernels.md")
 
     def _name(self, node: ast.Name) -> Value:
@@ -622,13 +625,13 @@ class _Translator:
 
     def _real(self, value: float, node: ast.AST) -> str:
         """Return a real number in C, or refuse one that single precision does not hold."""
-        single, written = self.whole.single, isinstance(node, ast.Constant)
+        kept = self.whole.single or isinstance(node, ast.Constant)
         if math.isnan(value):
             return "((mck_real)NAN)"
-        if value and not LEAST < abs(value) < MOST and math.isfinite(value) and (single or written):
+        if value and not LEAST < abs(value) < MOST and math.isfinite(value) and kept:
             what = f"the number {value!r}, which single precision has no room for, or rounds away"
             raise self.refusal(node, what, "name it, and add it to the table SINGLE of the module")
-        return literal(value, single=single)
+        return literal(value, single=self.whole.single)
 
     def _arithmetic(self, node: ast.BinOp | ast.AugAssign, one: Value, other: Value) -> Value:
         squared = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
@@ -644,8 +647,8 @@ class _Translator:
         return Value(f"{one.within(binds)} {word} {other.within(binds + 1)}", binds, kind)
 
     def _compare(self, node: ast.Compare) -> Value:
-        if isinstance(node.ops[0], ast.In):
-            choices = getattr(node.comparators[0], "elts", [])
+        if isinstance(node.ops[0], ast.In) and isinstance(node.comparators[0], ast.Tuple):
+            choices = node.comparators[0].elts
             each = [ast.Compare(node.left, [ast.Eq()], [one]) for one in choices]
             return self.value(ast.BoolOp(ast.Or(), [*each]))
         links = []
@@ -726,9 +729,8 @@ class _Translator:
             return self._accumulate(*node.args)
         callee = self._callee(node)
         pointers = pointers or [self._unused(kind) for kind in callee.returns[1:]]
-        texts = list(self._arguments(node, callee))
-        kind = next(iter(callee.returns), "")
-        return Value(f"{callee.name}({', '.join([*texts, *pointers])})", ATOM, kind)
+        texts = ", ".join([*self._arguments(node, callee), *pointers])
+        return Value(f"{callee.name}({texts})", ATOM, next(iter(callee.returns), ""))
 
     def _arguments(self, node: ast.Call, callee: Function) -> Iterator[str]:
         for each in callee.parameters:

@@ -221,10 +221,9 @@ def _variables(content: Mapping[str, Any], starts: Sequence[float]) -> list[dict
     """Return the channels as variables, all names different; time and status are taken."""
     taken = {"time", "status"}
     variables = []
-    rest = [0.0] * len(content["outputs"])
-    kinds = [("input", channel) for channel in content["inputs"]]
-    kinds += [("output", channel) for channel in content["outputs"]]
-    for (causality, channel), start in zip(kinds, [*starts, *rest], strict=True):
+    channels = [("input", *each) for each in zip(content["inputs"], starts, strict=True)]
+    channels += [("output", channel, 0.0) for channel in content["outputs"]]
+    for causality, channel, start in channels:
         name = channel["name"]
         while name in taken:
             name = f"{name}_{causality}"

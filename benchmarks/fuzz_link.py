@@ -3,7 +3,7 @@
     python benchmarks/fuzz_link.py --seconds 600 --seed 1
 
 To the servers go bytes of any kind, frames that are stuffed, checked and numbered as they should be with
-anything in them, coefficients and memory within the limits of the export, ticks, and starts. A crash, an
+anything in them, inputs within the limits of the export, ticks, and starts. A crash, an
 undefined operation, a call that hangs, or an output that is not finite or beyond its limits ends it with
 an error.
 """
@@ -22,7 +22,7 @@ from mckibben.errors import ModelError
 from mckibben.export.c.project import described, source_files
 from mckibben.export.c.serving import Serving, limits, served, served_files
 
-SERVING = Serving(watchdog=0.1, adjustable=0.3)
+SERVING = Serving(watchdog=0.1)
 WIDE = (-50.0, 50.0)
 """Limits of channels whose model knows none."""
 
@@ -140,30 +140,6 @@ static void set_inputs(mck_server *link, source *from)
     drain(link);
 }}
 
-static void load(mck_server *link, source *from, uint8_t what)
-{{
-    const int most = 20;
-    if (link->served->lowest[what] == NULL) {{
-        return; /* it can be read only */
-    }}
-    for (int first = 0; first < link->served->sizes[what]; first += most) {{
-        uint8_t body[3 + 20 * sizeof(mck_real)] = {{
-            what, (uint8_t)(first & 255), (uint8_t)(first >> 8)}};
-        const int left = link->served->sizes[what] - first;
-        const int n = left < most ? left : most;
-        for (int i = 0; i < n; i++) {{
-            put_between(body + 3 + i * (int)sizeof(mck_real), link->served->lowest[what][first + i],
-                        link->served->highest[what][first + i], next(from));
-        }}
-        sequence++;
-        send_frame(link, 8, body, 3 + n * (int)sizeof(mck_real));
-        drain(link);
-    }}
-    sequence++;
-    send_frame(link, 9, &what, 1);
-    drain(link);
-}}
-
 static void check(const mck_server *link)
 {{
     for (int i = 0; i < link->served->n_outputs; i++) {{
@@ -189,7 +165,7 @@ static void tried(mck_server *link, source *from)
         const uint8_t what = next(from);
         uint8_t bytes[ROOM];
         int n = 0;
-        switch (what % 10) {{
+        switch (what % 9) {{
         case 0:
             for (n = next(from); n > 0 && from->left > 0; n--) {{
                 mck_server_receive(link, next(from));
@@ -201,7 +177,7 @@ static void tried(mck_server *link, source *from)
             for (int i = 0; i < n; i++) {{
                 bytes[i] = next(from);
             }}
-            sequence += what % 50 == 1 ? next(from) : 1u;
+            sequence += what % 45 == 1 ? next(from) : 1u;
             send_frame(link, next(from) % 16, bytes, n);
             break;
         case 3:
@@ -212,18 +188,15 @@ static void tried(mck_server *link, source *from)
             set_inputs(link, from);
             break;
         case 6:
-            load(link, from, (uint8_t)(next(from) & 1u));
-            break;
-        case 7:
             for (n = next(from) % 16; n > 0; n--) {{
                 mck_server_tick(link);
             }}
             break;
-        case 8:
+        case 7:
             drain(link);
             break;
         default:
-            if (what % 100 == 9) {{
+            if (what % 90 == 8) {{
                 mck_server_init(link, next(from));
             }} else {{
                 (void)mck_server_send(link);
@@ -262,7 +235,7 @@ def servable() -> dict[str, tuple[Block, Serving]]:
             serving = SERVING
         except ModelError:
             wide = dict.fromkeys(channels, WIDE)
-            serving = Serving(wide, watchdog=SERVING.watchdog, adjustable=SERVING.adjustable)
+            serving = Serving(wide, watchdog=SERVING.watchdog)
         found[name] = (block, serving)
     return found
 

@@ -19,7 +19,7 @@ from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.laws.examples import examples
-from mckibben.export.c.emulation import Emulated, emulate
+from mckibben.export.c.emulation import Emulation, emulate
 
 SAMPLE_TIME = 0.01
 
@@ -130,7 +130,7 @@ def models() -> Iterator[tuple[str, Block]]:
         yield f"`{title}`", block
 
 
-def row(name: str, found: Emulated) -> str:
+def row(name: str, found: Emulation) -> str:
     steps = found.instructions[1:]
     counts = [np.median(steps), steps.max(), found.instructions[0]]
     sizes = [found.ram, found.stack, found.flash]

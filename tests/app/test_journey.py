@@ -70,7 +70,7 @@ def test_from_the_example_to_a_c_folder(page: Any, tmp_path: Path) -> None:
         archive.extractall(tmp_path)
     assert any(name.endswith("CMakeLists.txt") for name in names)
     if which("cc"):
-        from mckibben.export.c.building import self_test
+        from mckibben.export.programs import self_test
 
         folder = tmp_path / names[0].split("/")[0]
         assert self_test(folder, folder.name.removesuffix("-c"))

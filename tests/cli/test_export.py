@@ -59,10 +59,10 @@ def test_a_folder_that_compiles_as_it_is(options: list[str], cli: Cli, tmp_path:
     model = saved("gpi", tmp_path)
     result = done(cli, "export", "c", model, "-o", tmp_path / "out", "--check", "--json", *options)
     told = json.loads(result)
-    assert told["name"] == "model_gpi"
+    assert told["name"] == "gpi"
     assert told["self_test"]
     assert {"README.md", "CMakeLists.txt", "library.properties", "model.json"} <= set(told["files"])
-    assert (tmp_path / "out" / "examples" / "model_gpi" / "model_gpi.ino").is_file()
+    assert (tmp_path / "out" / "examples" / "gpi" / "gpi.ino").is_file()
 
 
 @pytest.mark.parametrize(

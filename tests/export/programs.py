@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.kernels import DERIVED, inlined, kernel, step, summing_step
 
 COUNT, SHARE = 3, 0.25
 CLOSED = 1e-12
@@ -58,16 +58,15 @@ def arithmetic(coefficients: Array, state: Array, inputs: Array, outputs: Array)
     b = 1.0 - -u if u < 0.0 else u**2
     m = n // 2 + n % 2
     outputs[0] = a + b * m - min(u, a, b) + max(1, n) * SHARE + abs(u) / COUNT
-    outputs[1] = (
-        float(m) if not (0.0 < u <= 1.0 and n != 2) or n in (5, 6) else math.copysign(2.0, u)
-    )
+    outputs[1] = m if not (0.0 < u <= 1.0 and n != 2) or n in (5, 6) else math.copysign(2.0, u)
+    outputs[1] += abs(m - 2 * n)
 
 
 @step
 def functions(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     u = inputs[0]
     outputs[0] = math.exp(-u * u) + math.tanh(u) + math.sqrt(abs(u)) + math.atan2(u, 2.0)
-    outputs[1] = 1.0 if math.isfinite(u / (u - u)) else math.floor(u) + np.sqrt(2.0) + math.pi
+    outputs[1] = math.floor(u) + np.sqrt(2.0) + math.pi if u < math.inf else 1.0
 
 
 @step
@@ -97,8 +96,8 @@ def results(coefficients: Array, state: Array, inputs: Array, outputs: Array) ->
     larger, first = both(inputs[0], state[0])
     outputs[0], _ = both(coefficients[0], larger)
     state[0], state[1] = state[1], state[0]
-    low, high = (inputs[0], larger) if first else (0.0, 1.0)
-    outputs[1] = both(low, high)[0] + both(low, high)[1]
+    low, high = inputs[0] if first else 0.0, larger if first else 1.0
+    outputs[1] = both(low, high)[0] + both(high, low)[0] / 3.0
 
 
 @step
@@ -111,14 +110,16 @@ def arrays(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> 
     row = rows[1]
     row[:] = rows[0]
     state[n:][0] = rest[-1]
-    outputs[0] = rows[0, n - 1] + polynomial(inputs[0], rest) + len(rest)
-    outputs[1] = polynomial(0.5, rows[1, 1:]) + row.size
+    outputs[0] = rows[0, n - 1] + polynomial(inputs[0], rest) + rest.size
+    outputs[1] = polynomial(0.5, rows[1][1:]) + row.size
 
 
 @step
 def solved(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     outputs[0] = bisect(cubic, -3.0, 3.0, (coefficients, inputs))
     outputs[1] = bisect(cubic, -9.0, 9.0, (coefficients[1:], inputs))
+    if DERIVED:
+        outputs[1] = np.nan
 
 
 @summing_step
@@ -155,6 +156,16 @@ def uses_a_list(x: float) -> float:
 @kernel
 def calls_numpy(x: Array) -> float:
     return np.sum(x)
+
+
+@kernel
+def measures_length(x: Array) -> float:
+    return x[len(x) - 1]
+
+
+@kernel
+def takes_the_second_result(x: float) -> float:
+    return x + both(x, 1.0)[1]
 
 
 @kernel
@@ -202,6 +213,22 @@ def calls_itself(x: float) -> float:
 
 
 @kernel
+def chooses_a_number(x: float) -> float:
+    return x and 2.0
+
+
+@kernel
+def adds_to_an_array(x: Array, n: int) -> None:
+    x[1:] += 1.0
+    x += 2.0
+
+
+@kernel
+def is_in_an_array(x: Array) -> bool:
+    return x[0] in x
+
+
+@kernel
 def takes_text(name: str) -> float:
     return 1.0
 
@@ -211,14 +238,19 @@ REFUSED = {
     loops_over_items: 2,
     uses_a_list: 1,
     calls_numpy: 1,
+    measures_length: 1,
+    takes_the_second_result: 1,
     has_a_tolerance: 1,
     steps_through: 1,
     takes_a_default: 0,
-    uses_the_counter: 1,
+    uses_the_counter: 3,
     powers: 1,
     raises: 2,
     divides_reals: 1,
     calls_itself: 0,
+    chooses_a_number: 1,
+    adds_to_an_array: 1,
+    is_in_an_array: 1,
     takes_text: 0,
 }
 """Kernels outside the language, and the line behind ``def`` that is."""

@@ -12,7 +12,7 @@ from mckibben import ModelError
 from mckibben.blocks.adaptive.adaptive import Adaptive
 from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
 from mckibben.export import export_c
-from mckibben.export.c.building import self_test
+from mckibben.export.programs import self_test
 from mckibben.registry import load
 from mckibben.stream import Step
 from tests.export.building import FLAGS, SAMPLE_TIME, Compiled, build

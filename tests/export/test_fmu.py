@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mckibben import Block, DataError, ModelError
 from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_fmu
-from mckibben.export.fmu.toolchains import own_platform
+from mckibben.export.fmu.unit import own_platform
 from tests.export.building import SAMPLE_TIME
 from tests.export.models import MODELS, difference, path_for, simulated
 from tests.tools import needs

@@ -11,8 +11,8 @@ from pathlib import Path
 from mckibben import PI
 from mckibben.blocks.base import Block
 from mckibben.export import Serving
-from mckibben.export.c.building import compile_c
 from mckibben.export.c.project import export_c
+from mckibben.export.programs import compile_c
 from tests.link.twin import Twin
 
 SAMPLE_TIME = 0.01

@@ -14,9 +14,9 @@ import pytest
 
 from mckibben.blocks.laws.examples import examples
 from mckibben.errors import DataError, ModelError
-from mckibben.export import Serving, export_c
+from mckibben.export import Serving, export_c, state_of
 from mckibben.export.c import emulation
-from mckibben.export.c.building import compile_c
+from mckibben.export.programs import compile_c
 from mckibben.files import read
 from mckibben.link import Descriptor, Link, open_port
 from mckibben.link.trying import emulated, hosted
@@ -49,18 +49,18 @@ def terminals() -> Iterator[tuple[int, str]]:
 def test_a_device_gives_the_numbers_of_the_export(start: Any, tmp_path: Path) -> None:
     block = examples()["pi"]
     inputs = path_for(block, 1, 200).astype(np.float32).astype(np.float64)
-    serving = Serving(SERVING.limits, watchdog=60.0, adjustable=0.3)
     precision = {"single": True} if start is hosted else {}
     expected = build({"pi": block}, "float32", tmp_path)["pi"](inputs)
     with (
-        start(block, sample_time=SAMPLE_TIME, serving=serving, **precision) as line,
+        start(block, sample_time=SAMPLE_TIME, serving=SERVING, **precision) as line,
         Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
     ):
         np.testing.assert_array_equal([link.step(row).outputs for row in inputs], expected)
-        memory = link.memory()
-        again = [link.step(row).outputs for row in inputs[:50]]
-        link.load_memory(memory)
-        np.testing.assert_array_equal([link.step(row).outputs for row in inputs[:50]], again)
+        stream = block.stream()
+        for row in inputs:
+            stream.step(row)
+        state = state_of(block, link.memory(), SAMPLE_TIME)
+        np.testing.assert_allclose(state, stream.state, rtol=1e-6)
     with pytest.raises(DataError):  # as it has been switched off
         link.step([1.0])
 

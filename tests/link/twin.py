@@ -16,7 +16,7 @@ HALF = 1 << 31
 
 @dataclass
 class Twin:
-    """Serves a primitive without scratch, in double precision, of which nothing can be adjusted."""
+    """Serves a primitive without scratch, in double precision."""
 
     block: Block
     serving: Serving
@@ -28,8 +28,7 @@ class Twin:
 
     def __post_init__(self) -> None:
         self.channels = [*self.block.inputs, *self.block.outputs]
-        found = limits(self.block, self.serving)
-        self.low, self.high, self.safe = found.low, found.high, found.safe
+        self.low, self.high, self.safe = limits(self.block, self.serving)
         self.n_in, self.n_out = len(self.block.inputs), len(self.block.outputs)
         self.most_silence = int(self.serving.watchdog / self.sample_time + 1e-9)
         self.switch_on()
@@ -128,12 +127,12 @@ class Twin:
         return struct.pack("<BI", self.flags(), self.steps) + self.outputs.tobytes()
 
     def tell(self, kind: int, body: bytes) -> bytes:
-        sizes = [0, len(self.numbers[1])]
+        memory = self.numbers[1]
         if kind == 1 and not body:
             told = [0, 8, self.flags(), self.fingerprint, round(1e6 * self.sample_time)]
-            told += [self.most_silence, self.steps, 0, self.dropped % (1 << 32)]
-            numbers = [self.n_in, self.n_out, *sizes, 0]
-            return struct.pack("<BBB8sIIIIIHHHHH", *told, *numbers)
+            told += [self.most_silence, self.steps, self.dropped % (1 << 32)]
+            numbers = [self.n_in, self.n_out, len(memory), 0]
+            return struct.pack("<BBB8sIIIIHHHH", *told, *numbers)
         if kind == 5 and not body:
             return b"\0" + self.stand() + self.inputs.tobytes()
         if kind == 2 and len(body) == 1 and body[0] < self.n_in + self.n_out:
@@ -142,10 +141,10 @@ class Twin:
             unit = (self.channels[place].unit or "1").encode()
             ends = struct.pack("<3d", self.low[place], self.high[place], self.safe[place])
             return b"\0" + ends + bytes([len(name)]) + name + bytes([len(unit)]) + unit
-        if kind == 7 and len(body) == 4 and body[0] < 2:
-            what, first, count = struct.unpack("<BHB", body)
-            if 8 * count < ROOM and first + count <= sizes[what]:
-                return b"\0" + self.numbers[what][first : first + count].tobytes()
+        if kind == 7 and len(body) == 3:
+            first, count = struct.unpack("<HB", body)
+            if 8 * count < ROOM and first + count <= len(memory):
+                return b"\0" + memory[first : first + count].tobytes()
         return b"\3"
 
     def opened(self, session: int, body: bytes) -> int:
@@ -164,16 +163,16 @@ class Twin:
         return 0
 
     def carried_out(self, kind: int, body: bytes) -> int:
-        if kind in (10, 11, 12):
+        if kind in (8, 9, 10):
             if body:
                 return 3
-            if kind == 12:
+            if kind == 10:
                 self.make_safe()
                 self.open = False
-            if kind == 10:
+            if kind == 8:
                 self.numbers[1][:] = 0
                 self.started = False
-            return 4 if kind == 11 and self.tripped else 0
+            return 4 if kind == 9 and self.tripped else 0
         if self.tripped:
             return 4
         if kind == 4:
@@ -183,10 +182,6 @@ class Twin:
                 return 3
             self.every, self.since = struct.unpack("<H", body)[0], 0
             return 0
-        if kind == 8:  # nothing can be adjusted
-            return 3 if len(body) < 11 or (len(body) - 3) % 8 or body[0] > 1 else 8
-        if kind == 9:
-            return 3 if len(body) != 1 or body[0] > 1 else 7
         return 3
 
     def take_inputs(self, body: bytes) -> int:
@@ -217,4 +212,4 @@ class Twin:
             self.since = 0
             if not self.sample:
                 body = b"\0" + self.stand() + self.inputs.tobytes()
-                self.sample = Frame(13 | 128, self.session, self.sequence, body).packed()
+                self.sample = Frame(11 | 128, self.session, self.sequence, body).packed()

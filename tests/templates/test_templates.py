@@ -17,8 +17,7 @@ from sklearn.model_selection import cross_val_score
 from mckibben import PI, ModelError, Recording, check_block, registry
 from mckibben import load as load_model
 from mckibben.errors import DataError
-from mckibben.export import export_c
-from mckibben.export.c.building import CompiledModel
+from tests.export.building import build
 from tests.tools import needs
 
 TEMPLATES = Path(__file__).parents[2] / "docs" / "templates"
@@ -98,7 +97,5 @@ def test_the_c_is_the_block(
     given = U[:, np.newaxis]
     if inverse:
         block, given = block.inverse(), block.simulate(given)
-    export_c(block, tmp_path / "c")
-    outputs, statuses = CompiledModel(tmp_path / "c", "model", 1, 1).run(given)
-    assert not statuses.any()
+    outputs = build({"model": block}, "double", tmp_path)["model"](given)
     np.testing.assert_allclose(outputs, block.simulate(given), rtol=0, atol=1e-12)

@@ -51,7 +51,6 @@ _WAYS = (
 """Options with their values, and what they are on a page."""
 
 _WORDS = {
-    "adjustable": "coefficients that are adjustable",
     "allow-shared": "“Allow the same data in training and test”",
     "check": "the check",
     "column": f"“{READING}”",

@@ -100,7 +100,7 @@ def solve_near(
             far, error_far, weight_far = u, error, error
             weight_near = 0.5 * weight_near if side == 2 else error_near
             side = 2
-    return (near, False) if abs(error_near) < abs(error_far) else (far, False)
+    return near if abs(error_near) < abs(error_far) else far, False
 
 
 MOST_HALVED = 200

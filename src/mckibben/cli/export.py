@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -40,13 +39,6 @@ Overwrite = Annotated[
 ]
 
 
-class Version(StrEnum):
-    """Of the Functional Mock-up Interface."""
-
-    TWO = "2.0"
-    THREE = "3.0"
-
-
 def _loaded(model: Path, inverse: bool) -> Block:
     from mckibben.blocks.force.feedforward import compensator
     from mckibben.blocks.saving import load
@@ -73,16 +65,15 @@ def _serving(
     limit: list[str],
     safe: list[str],
     watchdog: float | None,
-    adjustable: float | None,
 ) -> Serving | None:
     """Return how the model is served, where it is."""
     from mckibben.errors import ModelError
     from mckibben.export.c.serving import Serving
 
     if not link:
-        if limit or safe or watchdog is not None or adjustable is not None:
+        if limit or safe or watchdog is not None:
             raise ModelError(
-                "--limit, --safe, --watchdog and --adjustable are of a served model. Remedy: add --link."
+                "--limit, --safe and --watchdog are of a served model. Remedy: add --link."
             )
         return None
     limits = {}
@@ -95,7 +86,7 @@ def _serving(
         for text in safe
         for name, _, value in [text.partition("=")]
     }
-    return Serving(limits, values, 0.5 if watchdog is None else watchdog, adjustable or 0.0)
+    return Serving(limits, values, 0.5 if watchdog is None else watchdog)
 
 
 def _number(text: str, said: str) -> float:
@@ -153,25 +144,18 @@ def export_c(
         float | None,
         typer.Option(help="With --link: silence after which outputs are safe [s]. Default: 0.5."),
     ] = None,
-    adjustable: Annotated[
-        float | None,
-        typer.Option(
-            metavar="SHARE",
-            help="With --link: by how much coefficients may be set to others, as 0.2. Default: fixed.",
-        ),
-    ] = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
     """Write C99 that compiles as it is: on a PC, a microcontroller, Arduino, MATLAB."""
     from mckibben.export import export_c as write_c
-    from mckibben.export.c.building import self_test
     from mckibben.export.folders import refuse_folder
     from mckibben.export.naming import name_from
+    from mckibben.export.programs import self_test
     from mckibben.outputs import refuse_inputs
 
     chosen = name or name_from(model)
-    serving = _serving(link, limit or [], safe or [], watchdog, adjustable)
+    serving = _serving(link, limit or [], safe or [], watchdog)
     refuse_inputs(out, [model])
     refuse_folder(out, overwrite=overwrite)
     block = _loaded(model, inverse)
@@ -202,7 +186,6 @@ def export_c(
 def export_fmu(
     model: Model,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="FMU to write (.fmu).")],
-    fmi: Annotated[Version, typer.Option("--fmi", help="Version of the interface.")] = Version.TWO,
     name: Name = None,
     sample_time: SampleTime = None,
     inverse: Inverse = False,
@@ -211,7 +194,7 @@ def export_fmu(
         typer.Option(
             "--platforms",
             metavar="all|none|NAME,...",
-            help="linux, windows, macos, macos-arm, linux-arm; all that can be built here, or none.",
+            help="linux, windows, macos; all that can be built here, or none.",
         ),
     ] = "all",
     overwrite: Overwrite = False,
@@ -232,7 +215,6 @@ def export_fmu(
         _loaded(model, inverse),
         out,
         name=name or name_from(model),
-        version=fmi.value,
         sample_time=sample_time,
         platforms=None if platforms == "all" else [] if platforms == "none" else named,
         overwrite=overwrite,
@@ -240,11 +222,11 @@ def export_fmu(
     with zipfile.ZipFile(out) as archive:
         built = [path for path in archive.namelist() if path.startswith("binaries/")]
     if as_json:
-        print_json({"file": str(out), "fmi": fmi.value, "libraries": built})
+        print_json({"file": str(out), "fmi": "2.0", "libraries": built})
         return
     for path in built:
         say(f"Library: {path}")
-    say(f"Written: {out} (FMI {fmi.value})")
+    say(f"Written: {out} (FMI 2.0)")
 
 
 @app.command("ros2")

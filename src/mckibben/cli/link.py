@@ -160,7 +160,6 @@ def _told(device: Device) -> dict[str, Any]:
         "period": device.period,
         "watchdog": device.period * device.silence,
         "numbers": str(device.kind),
-        "coefficients": device.n_coefficients,
         "memory": device.n_memory,
         "inputs": [asdict(port) for port in device.inputs],
         "outputs": [asdict(port) for port in device.outputs],

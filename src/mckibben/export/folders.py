@@ -51,15 +51,15 @@ def refuse_folder(folder: Path, *, overwrite: bool = False) -> None:
         raise DataError("its folder does not exist", file=folder, remedy="create the folder first")
 
 
-def write_folder(folder: Path, files: Mapping[str, bytes], *, overwrite: bool = False) -> None:
+def write_folder(folder: Path, files: Mapping[str, str], *, overwrite: bool = False) -> None:
     """Write files, by their path in the folder; what was there before stays until all is written.
 
     Parameters
     ----------
     folder : Path
         Where; its parent must exist.
-    files : mapping of str to bytes
-        Contents by relative path.
+    files : mapping of str to str
+        Texts by relative path.
     overwrite : bool
         Whether what an export wrote there before may be replaced.
 
@@ -70,14 +70,12 @@ def write_folder(folder: Path, files: Mapping[str, bytes], *, overwrite: bool = 
     """
     folder = folder.absolute()
     refuse_folder(folder, overwrite=overwrite)
+    digests = {path: [manifest.digest(text.encode())] for path, text in files.items()}
     with written(folder):
         place = Path(tempfile.mkdtemp(prefix=PART, suffix=".part", dir=folder.parent))
         new, old = place / "new", place / "old"
         try:
-            for path, content in {**files, MANIFEST: _manifest(files)}.items():
-                target = new / path
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(content)
+            write_texts(new, {**files, MANIFEST: manifest.lines(digests)})
             if folder.exists():
                 folder.rename(old)
             new.rename(folder)
@@ -88,10 +86,11 @@ def write_folder(folder: Path, files: Mapping[str, bytes], *, overwrite: bool = 
             shutil.rmtree(place, ignore_errors=True)
 
 
-def _manifest(files: Mapping[str, bytes]) -> bytes:
-    return manifest.lines(
-        {path: [manifest.digest(content)] for path, content in files.items()}
-    ).encode()
+def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
+    """Write texts by their path in a folder of one's own."""
+    for path, text in texts.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(text.encode())
 
 
 def _check_own(folder: Path) -> None:

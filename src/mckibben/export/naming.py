@@ -11,20 +11,19 @@ from pathlib import Path
 
 from mckibben.errors import ModelError
 
-_WORDS = """
+WORDS = """
 auto break case char const continue default do double else enum extern float for goto if inline int
 long register restrict return short signed sizeof static struct switch typedef union unsigned void
 volatile while bool true false class delete new operator private protected public template this
 throw try catch namespace using virtual friend main
 """
 
-_HEADERS = """
+HEADERS = """
 assert complex ctype errno fenv float inttypes iso646 limits locale math mex setjmp signal stdarg
-stdatomic stdbool stddef stdint stdio stdlib string tgmath time uchar wchar unit unit_model fmi2 fmi3
-fmi2_refused fmi3_refused
+stdatomic stdbool stddef stdint stdio stdlib string tgmath time uchar wchar unit unit_model fmi2
 """
 
-RESERVED = frozenset((*_WORDS.split(), *_HEADERS.split()))
+RESERVED = frozenset((*WORDS.split(), *HEADERS.split()))
 """Words of C and C++, and headers that a model's own would stand before."""
 
 LONGEST = 40
@@ -55,12 +54,8 @@ def identifier(name: str) -> str:
 
 def name_from(path: Path) -> str:
     """Return an identifier like a file's name: what does not fit becomes an underscore."""
-    from mckibben.registry import names
-
     words = re.sub(r"[^A-Za-z0-9_]+", "_", path.stem).strip("_")[: LONGEST - 6]
-    kinds = {kind.replace("-", "_") for kind in names("blocks")}
-    taken = RESERVED | kinds | {f"{kind}_inverse" for kind in kinds}
-    fits = words and words[0].isalpha() and words.lower() not in taken
+    fits = words and words[0].isalpha() and words.lower() not in RESERVED
     return words if fits and not words.lower().startswith("mck") else f"model_{words}".rstrip("_")
 
 

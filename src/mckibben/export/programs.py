@@ -1,10 +1,11 @@
-"""Other people's programs: finding a C compiler, and running one that must succeed."""
+"""Other people's programs: finding a C compiler, and running what must succeed."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,6 +13,13 @@ from mckibben.errors import ModelError
 
 TIMEOUT = 600.0
 """Of a compiler, a self-test or an emulator [s]."""
+
+
+FLAGS = (
+    *("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow"),
+    *("-Werror", "-pedantic", "-ffp-contract=off"),
+)
+"""What exported C compiles with, cleanly."""
 
 
 def own_compiler() -> str | None:
@@ -43,3 +51,37 @@ def run(command: Sequence[str], failed: str, *, folder: Path | None = None) -> s
         complaint = found.stderr.strip() or found.stdout.strip()
         raise ModelError(f"{failed}: {complaint[:500]} Remedy: report it, with the model.")
     return found.stdout
+
+
+def compile_c(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()) -> None:
+    """Compile C files into a program or a library.
+
+    Raises
+    ------
+    ModelError
+        If there is no compiler, or it refuses; the text gives its first complaint.
+    """
+    compiler = own_compiler()
+    if compiler is None:
+        raise ModelError(
+            "there is no C compiler on this machine. Remedy: install gcc or clang, or leave --check "
+            "out and compile the folder elsewhere."
+        )
+    command = [compiler, *FLAGS, *options, "-o", str(out), *map(str, sources), "-lm"]
+    run(command, "the exported C does not compile")
+
+
+def self_test(folder: Path, name: str) -> str:
+    """Compile an exported folder elsewhere, run its self-test, and return what it says.
+
+    Raises
+    ------
+    ModelError
+        If it does not compile, or its results are not those of Python.
+    """
+    with tempfile.TemporaryDirectory() as place:
+        program = Path(place) / "selftest"
+        sources = sorted((folder / "src").glob("*.c"))
+        test = folder / "test" / f"{name}_selftest.c"
+        compile_c([*sources, test], program, options=[f"-I{folder / 'src'}"])
+        return run([str(program)], "the exported C does not give Python's numbers").strip()

@@ -1,16 +1,23 @@
-"""Templates of generated sources, set up the same way for C and for FMUs."""
+"""Generated sources: templates filled in, and numbers as C writes them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import textwrap
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 MARKUP = (".xml.j2", ".html.j2")
 """Endings of templates whose values are escaped; those of C come through `naming.said`."""
+
+WIDTH = 92
+"""Of rows of numbers, in columns."""
 
 
 def render(package: str, template: str, content: Mapping[str, Any]) -> str:
@@ -30,3 +37,30 @@ def _environment(package: str) -> Environment:
         keep_trailing_newline=True,
         autoescape=lambda template: template is not None and template.endswith(MARKUP),
     )
+
+
+def literal(value: float, *, single: bool = False) -> str:
+    """Return a number as a C constant: the shortest decimals that give back every bit.
+
+    >>> literal(0.1), literal(0.1, single=True), literal(3.0), literal(float("inf"))
+    ('0.1', '0.1f', '3.0', 'MCK_INFINITY')
+    """
+    if math.isinf(value):
+        return "MCK_INFINITY" if value > 0 else "-MCK_INFINITY"
+    if not single:
+        return repr(float(value))
+    # what single precision cannot hold becomes its largest number, not infinity
+    limit = float(np.finfo(np.float32).max)
+    text = str(np.float32(min(max(value, -limit), limit)))
+    return f"{text if any(mark in text for mark in '.e') else text + '.0'}f"
+
+
+def literals(values: Iterable[float], *, single: bool = False) -> str:
+    """Return numbers as C constants, with commas between them."""
+    return ", ".join(literal(float(value), single=single) for value in values)
+
+
+def rows(values: Iterable[float], *, single: bool = False) -> list[str]:
+    """Return lines of an initialiser, each ending in a comma."""
+    lines = textwrap.wrap(literals(values, single=single), WIDTH, break_on_hyphens=False)
+    return [f"{line.rstrip(',')}," for line in lines]

@@ -17,8 +17,6 @@ from numpy.typing import ArrayLike
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.link.device import (
-    COEFFICIENTS,
-    MEMORY,
     Counts,
     Device,
     Kind,
@@ -94,7 +92,7 @@ class Link:
         line = open_port(stream, baud=baud) if isinstance(stream, str | Path) else stream
         self._exchange = Exchange(line, timeout=timeout, patience=patience, clock=clock)
         self._lock_step, self._watchdog, self._reopen = lock_step, watchdog, reopen
-        self._session, self._led, self._loads, self._every = 0, False, 0, 0
+        self._session, self._led, self._every = 0, False, 0
         try:
             self.device = self._identify(fingerprint)
         except BaseException:
@@ -102,13 +100,12 @@ class Link:
             raise
 
     def _identify(self, fingerprint: str | None) -> Device:
-        device, counts, n_in, n_out = identified(self._exchange.ask(Kind.IDENTIFY))
+        device, _, n_in, n_out = identified(self._exchange.ask(Kind.IDENTIFY))
         if fingerprint is not None and fingerprint.lower() != device.fingerprint:
             raise LinkError(
                 f"the device holds model {device.fingerprint}, not {fingerprint:.40}",
                 remedy="load the program that was exported with it, or give the other fingerprint",
             )
-        self._loads = counts.loads
         ports: list[Port] = []
         for place in range(n_in + n_out):
             ports.append(described(self._exchange.ask(Kind.DESCRIBE, bytes([place])), device))
@@ -227,57 +224,21 @@ class Link:
         """Return what the device has counted; this leads nothing."""
         return identified(self._exchange.ask(Kind.IDENTIFY))[1]
 
-    def coefficients(self) -> Array:
-        """Return the coefficients of the model, in the order of its C; none where they are fixed."""
-        return self._read(COEFFICIENTS, self.device.n_coefficients)
-
     def memory(self) -> Array:
         """Return the memory of the model, in the order of its C; see `mckibben.export.state_of`."""
-        return self._read(MEMORY, self.device.n_memory)
-
-    def load_coefficients(self, values: ArrayLike) -> None:
-        """Set all coefficients at once, between two steps, within the limits fixed at export.
-
-        Raises
-        ------
-        LinkError
-            If they are fixed, not as many, or beyond limits; then none has changed.
-        """
-        self._load(COEFFICIENTS, values, self.device.n_coefficients)
-
-    def load_memory(self, values: ArrayLike) -> None:
-        """Set all of the memory at once, likewise."""
-        self._load(MEMORY, values, self.device.n_memory)
-
-    def _read(self, what: int, n: int) -> Array:
-        parts = [np.empty(0)]
+        n, parts = self.device.n_memory, [np.empty(0)]
         for first in range(0, n, self.device.most):
             count = min(self.device.most, n - first)
-            body = self._exchange.ask(Kind.READ, struct.pack("<BHB", what, first, count))
+            body = self._exchange.ask(Kind.READ, struct.pack("<HB", first, count))
             parts.append(self.device.numbers(body))
         found = np.concatenate(parts)
         if found.size != n:
             raise unfit("numbers")
         return found
 
-    def _load(self, what: int, values: ArrayLike, n: int) -> None:
-        numbers = np.asarray(values, dtype=np.float64).ravel()
-        if numbers.size != n or not n:
-            raise LinkError(
-                f"{numbers.size} numbers for {n} that can be set",
-                remedy="export with --adjustable, and give as many as are read"
-                if not n
-                else "give as many as are read",
-            )
-        for first in range(0, n, self.device.most):
-            part = self.device.packed(numbers[first : first + self.device.most])
-            self._lead(Kind.STAGE, struct.pack("<BH", what, first) + part, again=first == 0)
-        self._lead(Kind.LOAD, bytes([what]), again=False)
-        self._loads = (self._loads + 1) % WORDS
-
     # -- frames ------------------------------------------------------------------------------
 
-    def _lead(self, kind: Kind, body: bytes = b"", *, again: bool = True) -> bytes:
+    def _lead(self, kind: Kind, body: bytes = b"") -> bytes:
         """Ask within the session, which is opened first where it must be."""
         for tried in range(OPENINGS):
             try:
@@ -286,22 +247,17 @@ class Link:
                 return self._exchange.ask(kind, body, session=self._session)
             except LostError:
                 lost, self._led = self._led, False
-                if tried == OPENINGS - 1 or (lost and not (self._reopen and again)):
+                if tried == OPENINGS - 1 or (lost and not self._reopen):
                     raise
                 self.statistics.reopened += lost
         raise AssertionError("unreachable")
 
     def _open(self) -> None:
-        device, counts, *_ = identified(self._exchange.ask(Kind.IDENTIFY))
+        device, *_ = identified(self._exchange.ask(Kind.IDENTIFY))
         if device.fingerprint != self.device.fingerprint:
             raise LinkError(
                 f"the device holds model {device.fingerprint} now, not {self.device.fingerprint}",
                 remedy="open the link again if that is meant",
-            )
-        if counts.loads != self._loads:
-            raise LinkError(
-                "the device has lost the numbers that were loaded, or has been given others",
-                remedy="open the link again, and load them again",
             )
         ticks = device.silence
         if self._watchdog is not None:

@@ -23,12 +23,10 @@ class Kind(IntEnum):
     STATE = 5
     STREAM = 6
     READ = 7
-    STAGE = 8
-    LOAD = 9
-    RESET = 10
-    KEEP = 11
-    RELEASE = 12
-    SAMPLE = 13
+    RESET = 8
+    KEEP = 9
+    RELEASE = 10
+    SAMPLE = 11
 
 
 ANSWER = 128
@@ -44,8 +42,6 @@ class Status(IntEnum):
     IS_SAFE = 4
     OTHER_MODEL = 5
     OLD_SESSION = 6
-    NOT_STAGED = 7
-    IS_FIXED = 8
 
 
 class Note(IntFlag):
@@ -59,9 +55,7 @@ class Note(IntFlag):
     LOCK_STEP = 32
 
 
-COEFFICIENTS, MEMORY = 0, 1
-
-IDENTITY = struct.Struct("<BB8sIIIIIHHHHH")
+IDENTITY = struct.Struct("<BB8sIIIIHHHH")
 
 
 @dataclass(frozen=True)
@@ -98,10 +92,8 @@ class Device:
         Ticks without a frame after which its watchdog acts, at most.
     kind : dtype
         Of its numbers, float32 or float64.
-    n_coefficients : int
-        Numbers that can be set; 0 where they are fixed.
     n_memory : int
-        Numbers that can be read; an export says which of them can be set.
+        Numbers of the model's memory that can be read.
     inputs, outputs : tuple of Port
     n_missable : int
         Of the inputs the last, which may be missing.
@@ -111,7 +103,6 @@ class Device:
     period: float
     silence: int
     kind: np.dtype[np.floating]
-    n_coefficients: int
     n_memory: int
     n_missable: int = 0
     inputs: tuple[Port, ...] = ()
@@ -166,7 +157,6 @@ class Counts:
 
     notes: Note
     steps: int
-    loads: int
     dropped: int
 
 
@@ -174,16 +164,15 @@ def identified(body: bytes) -> tuple[Device, Counts, int, int]:
     """Return what an answer to `IDENTIFY` says, and how many inputs and outputs there are."""
     if len(body) != IDENTITY.size:
         raise unfit("an identity")
-    size, notes, print_, period, silence, steps, loads, dropped, *sizes = IDENTITY.unpack(body)
-    n_in, n_out, n_coefficients, n_memory, n_missable = sizes
+    size, notes, print_, period, silence, steps, dropped, *sizes = IDENTITY.unpack(body)
+    n_in, n_out, n_memory, n_missable = sizes
     if size not in (4, 8) or not period or not silence or not n_out or n_missable > n_in:
         raise unfit("an identity")
     if size * (n_in + n_out) > ROOM:  # which no frame would hold
         raise unfit("an identity")
     kind = np.dtype(f"<f{size}")
-    told = (n_coefficients, n_memory, n_missable)
-    device = Device(print_.hex(), 1e-6 * period, silence, kind, *told)
-    return device, Counts(Note(notes), steps, loads, dropped), n_in, n_out
+    device = Device(print_.hex(), 1e-6 * period, silence, kind, n_memory, n_missable)
+    return device, Counts(Note(notes), steps, dropped), n_in, n_out
 
 
 def described(body: bytes, device: Device) -> Port:

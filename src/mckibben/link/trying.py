@@ -10,10 +10,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from mckibben.blocks.base import Block
-from mckibben.export.c.building import compile_c
-from mckibben.export.c.emulation import EMULATOR, built, refuse_without_tools
+from mckibben.export.c.emulation import EMULATED, EMULATOR, built
 from mckibben.export.c.project import c_files
 from mckibben.export.c.serving import Serving
+from mckibben.export.folders import write_texts
+from mckibben.export.programs import compile_c
 from mckibben.link.ports import Descriptor
 
 
@@ -64,18 +65,14 @@ def emulated(
 
     Its time is the machine's own, as far as that keeps up. See `hosted`.
     """
-    refuse_without_tools()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         _write(folder, block, sample_time, True, serving)
         (folder / "main.c").write_bytes((folder / "examples" / "link_mps2.c").read_bytes())
-        built(folder)
+        program, _ = built(folder)
         command = [
-            *(EMULATOR, "-M", "mps2-an386", "-cpu", "cortex-m4"),
-            *("-semihosting-config", "enable=on,target=native"),
-            *("-display", "none", "-monitor", "none"),
-            *("-chardev", "stdio,id=wire,mux=on", "-serial", "chardev:wire", "-echr", "256"),
-            *("-kernel", str(folder / "model.elf")),
+            *(EMULATOR, *EMULATED, "-chardev", "stdio,id=wire,mux=on"),
+            *("-serial", "chardev:wire", "-echr", "256", "-kernel", str(program)),
         ]
         with _running(command) as line:
             yield line
@@ -85,9 +82,7 @@ def _write(
     folder: Path, block: Block, sample_time: float, single: bool, serving: Serving | None
 ) -> None:
     files = c_files(block, sample_time=sample_time, single=single, serving=serving or Serving())
-    for path, text in files.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
+    write_texts(folder, files)
 
 
 @contextmanager

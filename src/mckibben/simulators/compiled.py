@@ -9,7 +9,7 @@ from typing import Any
 
 from mckibben.errors import ModelError
 from mckibben.export import export_c
-from mckibben.export.c.building import compile_c
+from mckibben.export.programs import compile_c
 from mckibben.simulators.installed import mujoco
 from mckibben.simulators.pulling import Pulling
 

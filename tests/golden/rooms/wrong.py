@@ -277,7 +277,6 @@ class Device32:
             period=0.01,
             silence=50,
             kind=np.dtype(np.float64),
-            n_coefficients=0,
             n_memory=0,
             inputs=(port(name="displacement", unit="mm"),),
             outputs=(port(name="pressure", unit="bar"),),

@@ -58,9 +58,6 @@ def build(desk: Desk, model: Any) -> None:
         }
         step = ui.number("Time between steps [s]", value=forms.STEP, min=1e-6).classes("w-full")
         single = ui.switch("single precision (C)", value=False)
-        with ui.row().classes("items-center gap-2"):
-            ui.label("FMI").classes("text-sm")
-            version = ui.toggle(["2.0", "3.0"], value="2.0").props("dense")
 
         def chosen() -> tuple[str, str, dict[str, Any]]:
             kind = str(form.value)
@@ -103,14 +100,14 @@ def build(desk: Desk, model: Any) -> None:
             from mckibben.export import export_fmu
             from mckibben.export.naming import name_from
 
-            one, fmi = taken(), version.value
+            one = taken()
             name = name_from(Path(f"{one.stem}.json"))
             path = desk.workspace.new_path("takeaway", f"{name}.fmu")
 
             def write() -> str:
                 block, options = one.block_and_options()
-                export_fmu(block, path, name=name, version=fmi, overwrite=True, **options)
-                return one.exported("fmu", path.name, options, f" --fmi {fmi}")
+                export_fmu(block, path, name=name, overwrite=True, **options)
+                return one.exported("fmu", path.name, options)
 
             hand_over(desk, path, await asyncio.to_thread(write))
 

@@ -229,7 +229,8 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
                 low, low_rate = share, rate
             if high < 0.0:
                 share *= 2.0
-            else:  # where the rate would vanish were it straight, but well inside
+            else:
+                # where the rate would vanish were it straight, but well inside
                 width = high - low
                 share = low + width * min(max(-low_rate / (high_rate - low_rate), 0.1), 0.9)
     if DERIVED:

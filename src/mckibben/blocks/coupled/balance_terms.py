@@ -105,7 +105,9 @@ def area(c: Array, own: int, y: float) -> tuple[float, float]:
     slope /= c[8]
     value += slope * (y - inside)
     least = LEAST_AREA * c[place]
-    return (value, slope) if value > least else (least, 0.0)
+    if value > least:
+        return value, slope
+    return least, 0.0
 
 
 @kernel

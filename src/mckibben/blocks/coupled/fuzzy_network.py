@@ -92,7 +92,8 @@ def fuzzy_network_inverse_step(
             share = 1.0
         elif least < SOLVED * size:
             break
-        else:  # a shorter step from the best
+        else:
+            # a shorter step from the best
             share *= 0.5
             if share < 1e-3:
                 break

@@ -48,6 +48,12 @@ def cubic(coefficients: Array, first: int, x: float) -> float:
     ) * x + coefficients[first + 3]
 
 
+@kernel
+def lagrange(e: float, own: float, one: float, two: float, three: float) -> float:
+    """Return the polynomial that is 1 at ``own`` and 0 at three other places."""
+    return (e - one) / (own - one) * ((e - two) / (own - two)) * ((e - three) / (own - three))
+
+
 @step
 def activation_pressure_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
@@ -59,15 +65,12 @@ def activation_pressure_step(
     """
     e, force = inputs[0], inputs[1]
     rate = coefficients[0] * state[1] + coefficients[1] * (e - state[0])
-    y = 0.0
-    for j in range(4):
-        share = 1.0
-        own = cubic(coefficients, 7 + 4 * j, force)
-        for k in range(4):
-            if k != j:
-                other = cubic(coefficients, 7 + 4 * k, force)
-                share *= (e - other) / (own - other)
-        y += share * cubic(coefficients, 23 + 4 * j, force)
+    one, two = cubic(coefficients, 7, force), cubic(coefficients, 11, force)
+    three, four = cubic(coefficients, 15, force), cubic(coefficients, 19, force)
+    y = lagrange(e, one, two, three, four) * cubic(coefficients, 23, force)
+    y += lagrange(e, two, one, three, four) * cubic(coefficients, 27, force)
+    y += lagrange(e, three, one, two, four) * cubic(coefficients, 31, force)
+    y += lagrange(e, four, one, two, three) * cubic(coefficients, 35, force)
     outputs[0] = y + coefficients[2] * cubic(coefficients, 3, force) * rate
     state[0], state[1] = e, rate
 

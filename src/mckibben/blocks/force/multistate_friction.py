@@ -97,7 +97,8 @@ def multistate_friction_step(
     step = coefficients[0]
     v = (inputs[0] - state[n]) / step
     state[n] = inputs[0]
-    first, sign = (3, 1.0) if v >= 0.0 else (6, -1.0)
+    first = 3 if v >= 0.0 else 6
+    sign = 1.0 if v >= 0.0 else -1.0
     force = 0.0
     for i in range(n):
         place = first + 6 * i

@@ -49,7 +49,8 @@ def plan_one(
                 high = min(high, end)
             else:
                 low = max(low, end)
-    fall, rise = high - low, high - low
+    fall = high - low
+    rise = fall
     for i in range(m):
         if rows[3 * i] > 0.0:
             if rows[3 * i + 2] > 0.0:

@@ -15,35 +15,33 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.export.c.project import described, render, source_files, test_content
-from mckibben.export.c.vectors import Vectors, vectors
-from mckibben.export.programs import run
-from mckibben.system.atomic import written
+from mckibben.export.c.project import described, render, source_files, vectors
+from mckibben.export.folders import write_texts
+from mckibben.export.programs import FLAGS, run
 
 BOARD = Path(__file__).parent / "cortex_m4f"
 COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
 
 MACHINE = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
-FLAGS = (
-    *("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror"),
-    *("-pedantic", "-ffp-contract=off", "-ffunction-sections", "-fdata-sections"),
+EMULATED = (
+    *("-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none", "-monitor", "none"),
+    *("-semihosting-config", "enable=on,target=native"),
 )
+"""The board that the emulator is."""
 
 TICKS_PER_INSTRUCTION = 1.6
 """Of the 25 MHz timer, an instruction taking 64 ns of the emulator's time (icount shift 6)."""
 
 
 @dataclass(frozen=True)
-class Emulated:
+class Emulation:
     """What a model did on the emulated microcontroller.
 
     Parameters
     ----------
-    outputs : array, shape (n, n_outputs)
-        On the test inputs.
-    expected : Vectors
-        What Python made of them.
-    instructions : array, shape (n,)
+    difference : float
+        Largest from Python on the test inputs, relative to the range of each output.
+    instructions : array, shape (n_samples,)
         Of every step; the first one starts the memory too.
     ram : int
         Bytes of one model.
@@ -53,17 +51,11 @@ class Emulated:
         Bytes of code and constants, without the C library's.
     """
 
-    outputs: Array
-    expected: Vectors
+    difference: float
     instructions: Array
     ram: int
     stack: int
     flash: int
-
-    @property
-    def difference(self) -> float:
-        """Largest difference from Python, relative to the range of each output."""
-        return float((np.abs(self.outputs - self.expected.outputs) / self.expected.ranges).max())
 
     def __str__(self) -> str:
         """Return one sentence."""
@@ -81,23 +73,7 @@ def missing_tools() -> list[str]:
     return [tool for tool in (COMPILER, SIZE, EMULATOR) if shutil.which(tool) is None]
 
 
-def refuse_without_tools() -> None:
-    """Refuse to emulate where a program is missing.
-
-    Raises
-    ------
-    ModelError
-        That says which.
-    """
-    missing = missing_tools()
-    if missing:
-        raise ModelError(
-            f"not on this machine: {', '.join(missing)}. Remedy: install gcc-arm-none-eabi, "
-            "libnewlib-arm-none-eabi and qemu-system-arm."
-        )
-
-
-def emulate(block: Block, *, sample_time: float | None = None, seed: int = 0) -> Emulated:
+def emulate(block: Block, *, sample_time: float | None = None) -> Emulation:
     """Cross-compile a model in single precision and run it on the emulated microcontroller.
 
     Raises
@@ -105,54 +81,51 @@ def emulate(block: Block, *, sample_time: float | None = None, seed: int = 0) ->
     ModelError
         If tools are missing, it does not compile, or the emulated program fails.
     """
-    refuse_without_tools()
     content = described(block, name="model", sample_time=sample_time, single=True)
-    tests = vectors(block, content["sample_time"], single=True, seed=seed)
-    content |= test_content(tests, single=True)
+    content |= vectors(block, content["sample_time"], single=True)
+    texts = source_files(content) | {"main.c": render("emulated.c.j2", content)}
     with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        texts = source_files(content) | {"main.c": render("emulated.c.j2", content)}
-        with written(folder):
-            for path, text in texts.items():
-                (folder / path).parent.mkdir(exist_ok=True)
-                (folder / path).write_text(text, encoding="utf-8")
-        flash = built(folder)
+        write_texts(Path(place), texts)
+        program, flash = built(Path(place))
         told = _run(
-            EMULATOR,
-            *("-M", "mps2-an386", "-cpu", "cortex-m4", "-icount", "shift=6"),
-            *("-semihosting-config", "enable=on,target=native"),
-            *("-display", "none", "-monitor", "none", "-serial", "none"),
-            *("-kernel", str(folder / "model.elf")),
+            *(EMULATOR, *EMULATED, "-icount", "shift=6"),
+            *("-serial", "none", "-kernel", str(program)),
         )
-    first, *lines = told.splitlines()
-    empty, stack, ram = map(int, first.split())
-    words = [line.split() for line in lines]
-    ticks = np.array([int(line[0]) for line in words])
-    bits = np.array([[int(word, 16) for word in line[1:]] for line in words], dtype=np.uint32)
-    return Emulated(
-        bits.view(np.float32).astype(np.float64),
-        tests,
-        np.round((ticks - empty) / TICKS_PER_INSTRUCTION),
-        ram,
-        stack,
-        flash,
-    )
+    (empty, stack, ram), *lines = (line.split() for line in told.splitlines())
+    ticks = np.array([int(line[0]) for line in lines])
+    bits = np.array([[int(word, 16) for word in line[1:]] for line in lines], dtype=np.uint32)
+    off = np.abs(bits.view(np.float32).astype(np.float64) - content["expected"])
+    instructions = np.round((ticks - int(empty)) / TICKS_PER_INSTRUCTION)
+    difference = float((off / content["spans"]).max())
+    return Emulation(difference, instructions, int(ram), int(stack), flash)
 
 
-def built(folder: Path) -> int:
-    """Compile and link, and return the bytes of code and constants."""
-    objects = []
+def built(folder: Path) -> tuple[Path, int]:
+    """Compile and link, and return the program, and the bytes of code and constants.
+
+    Raises
+    ------
+    ModelError
+        If tools are missing, or it does not compile.
+    """
+    if missing := missing_tools():
+        raise ModelError(
+            f"not on this machine: {', '.join(missing)}. Remedy: install gcc-arm-none-eabi, "
+            "libnewlib-arm-none-eabi and qemu-system-arm."
+        )
+    objects, program = [], folder / "model.elf"
     for source in sorted((folder / "src").glob("*.c")):
         objects.append(source.with_suffix(".o"))
-        _run(COMPILER, *MACHINE, *FLAGS, "-c", str(source), "-o", str(objects[-1]))
+        sections = ("-ffunction-sections", "-fdata-sections")
+        _run(COMPILER, *MACHINE, *FLAGS, *sections, "-c", str(source), "-o", str(objects[-1]))
     rest = [str(folder / "main.c"), str(BOARD / "startup.c")]
     link = ["--specs=rdimon.specs", "-Wl,--gc-sections", "-T", str(BOARD / "memory.ld")]
     _run(
         *(COMPILER, *MACHINE, "-O2", "-ffp-contract=off", f"-I{folder / 'src'}"),
-        *(*rest, *map(str, objects), *link, "-lm", "-o", str(folder / "model.elf")),
+        *(*rest, *map(str, objects), *link, "-lm", "-o", str(program)),
     )
     table = _run(SIZE, *map(str, objects)).splitlines()[1:]
-    return sum(int(line.split()[0]) for line in table)
+    return program, sum(int(line.split()[0]) for line in table)
 
 
 def _run(*command: str) -> str:

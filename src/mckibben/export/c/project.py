@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping
+from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
+from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.blocks.saving import to_text
-from mckibben.errors import ModelError
-from mckibben.export.c.literals import literal, rows
-from mckibben.export.c.parts import check_single
-from mckibben.export.c.rounding import warn_of_rounding
+from mckibben.errors import ModelError, ModelWarning
 from mckibben.export.c.serving import Serving, served, served_files
 from mckibben.export.c.translator import Translation
-from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
 from mckibben.export.folders import refuse_folder, write_folder
 from mckibben.export.naming import identifier, macros, said
+from mckibben.export.templating import literals, rows
 from mckibben.export.templating import render as rendered
+
+render = partial(rendered, "mckibben.export.c")
+"""Fills in a template of this folder."""
 
 TOLERANCES = {False: "1e-9", True: "1e-4"}
 """Of the self-test, relative to the range: in double and in single precision."""
@@ -31,6 +37,15 @@ SHARED = Path(__file__).parent / "server" / "mck.h"
 
 LONGEST_STEP = 1e6
 """Time between steps of an exported model [s]."""
+
+PACE, TURNS = 9, 24
+"""Samples from one turning point of test inputs to the next, and how many of those."""
+
+NOTICED = 5e-5
+"""Error of a filter in single precision, relative to the range of its output."""
+
+SAMPLES, MOST_PRODUCTS = 100_000, 30_000_000
+"""On which that is found: fewer samples of filters with very many states."""
 
 
 def export_c(
@@ -79,7 +94,7 @@ def export_c(
     folder = Path(folder)
     refuse_folder(folder, overwrite=overwrite)
     files = c_files(block, name=name, sample_time=sample_time, single=single, serving=serving)
-    write_folder(folder, {path: text.encode() for path, text in files.items()}, overwrite=overwrite)
+    write_folder(folder, files, overwrite=overwrite)
     return folder
 
 
@@ -95,8 +110,7 @@ def c_files(
     content = described(block, name=name, sample_time=sample_time, single=single)
     if serving is not None:
         content |= served(block, content, serving, sample_time or own_time(block))
-    tests = vectors(block, content["sample_time"], single=single)
-    content |= test_content(tests, single=single)
+    content |= vectors(block, content["sample_time"], single=single)
     return {
         **source_files(content),
         **(served_files(content) if serving is not None else {}),
@@ -111,14 +125,37 @@ def c_files(
     }
 
 
-def test_content(tests: Vectors, *, single: bool) -> dict[str, Any]:
-    """Return test vectors as the templates write them."""
+def vectors(block: Block, sample_time: float | None, *, single: bool = False) -> dict[str, Any]:
+    """Return test vectors: inputs within the range of the model, and what Python makes of them.
+
+    Inputs have minor loops and holds; single precision can hold them where it is asked for.
+
+    Raises
+    ------
+    ModelError
+        If the model's outputs are not finite on them.
+    """
+    inputs = wander(*input_limits(block), np.random.default_rng(0), PACE, TURNS)
+    if single:
+        inputs = inputs.astype(np.float32).astype(np.float64)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        outputs = block.simulate(inputs, sample_time=sample_time)
+    if not np.isfinite(outputs).all():
+        raise ModelError(
+            f"{block.kind!r} gives outputs that are not finite on inputs within its range. "
+            "Remedy: identify it again, or give it an input range."
+        )
+    # or their size, where they hardly move
+    ranges = np.maximum(np.ptp(outputs, axis=0), 1e-4 * np.abs(outputs).max(axis=0) + 1e-9)
     return {
+        "expected": outputs,
+        "spans": ranges,
         "tolerance": TOLERANCES[single],
-        "n_samples": len(tests.inputs),
-        "input_rows": [_row(row, single) for row in tests.inputs],
-        "output_rows": [_row(row, single) for row in tests.outputs],
-        "ranges": _row(tests.ranges, single),
+        "n_samples": len(inputs),
+        "input_rows": [literals(row, single=single) for row in inputs],
+        "output_rows": [literals(row, single=single) for row in outputs],
+        "ranges": literals(ranges, single=single),
     }
 
 
@@ -147,23 +184,17 @@ def described(
     wiring = Wiring(block, step)
     if single:
         for call in wiring.calls:
-            check_single(call.part.block)
-            warn_of_rounding(call.part.block, step)
+            check_single(call.block, step)
     own = (f"{name}_{end}" for end in ("init", "reset", "step", "model"))
-    translation = Translation(single=single, taken=own)
-    if name.lower().startswith("mck"):
-        raise ModelError(f"{name!r} is the package's own name. Remedy: give another --name.")
+    translation, index = Translation(single=single, taken=own), count()
+    steps = [
+        _call(each, next(index), translation) if isinstance(each, Call) else each
+        for each in wiring.steps
+    ]
+    calls = [each for each in steps if isinstance(each, dict)]
     inputs, outputs = _told(block.inputs), _told(block.outputs)
-    cost, size = wiring.cost, 4 if single else 8
-    n_numbers = max(wiring.n_numbers, 1)
-    calls = [_call(call, index, translation) for index, call in enumerate(wiring.calls)]
-    first = 0
-    for told in calls:
-        told["first_coefficient"] = first
-        told["adjusted"] = f"self->coefficients + {first}"
-        first += max(told["n_coefficients"], 1)
-    order = {id(call): told for call, told in zip(wiring.calls, calls, strict=True)}
-    constants = sum(call.part.coefficients.size for call in wiring.calls)
+    cost, size, n_numbers = wiring.cost, 4 if single else 8, max(wiring.n_numbers, 1)
+    constants = sum(call.coefficients.size for call in wiring.calls)
     return {
         "name": name,
         "version": __version__,
@@ -176,16 +207,13 @@ def described(
         "outputs": outputs,
         "constants": _constants(inputs, outputs, step),
         "calls": calls,
-        "kinds": [call["kind"] for call in calls],
-        "steps": [order[id(item)] if isinstance(item, Call) else item for item in wiring.steps],
-        "stateful": [call for call in calls if call["n_states"]],
+        "kinds": [call.block.title for call in wiring.calls],
+        "steps": steps,
         "given": wiring.outputs,
         "n_needed": len(inputs) - block.n_missable,
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
-        "n_coefficients": first,
-        "adjustable": False,
-        "n_states": sum(call["n_states"] for call in calls),
+        "n_memory": wiring.n_numbers,
         "starts": _starts(wiring.calls),
         "kernels": translation.text(),
         "zero": "0.0f" if single else "0.0",
@@ -196,6 +224,53 @@ def described(
         "usual": cost.usual,
         "worst": cost.worst,
     }
+
+
+def check_single(block: Block, sample_time: float | None) -> None:
+    """Refuse what single precision cannot hold, and warn of a filter that it would lead astray.
+
+    Raises
+    ------
+    ModelError
+        If two knots, levels or thresholds that follow one another become one, or the block says that
+        it needs more.
+    """
+    if block.needs_double:
+        raise ModelError(
+            f"{block.title!r} {block.needs_double}. Remedy: export in double precision."
+        )
+    for name, places in block.kept_apart():
+        if np.any(np.diff(np.array(places, dtype=np.float32)) <= 0) and np.all(np.diff(places) > 0):
+            raise ModelError(
+                f"{name} of {block.title!r} are too close for single precision. "
+                "Remedy: export in double precision, or identify with fewer of them."
+            )
+    if block.filters and hasattr(block, "kernel"):
+        _warn_of_rounding(block, sample_time)
+
+
+def _warn_of_rounding(block: Block, sample_time: float | None) -> None:
+    """Run the same kernel on single and on double precision numbers."""
+    rng = np.random.default_rng(0)
+    samples = min(SAMPLES, MOST_PRODUCTS // max(block.n_states, 1))
+    inputs = wander(*input_limits(block), rng, 400, samples // 400).astype(np.float32)
+    single, double = (_run(block, inputs.astype(kind), sample_time) for kind in (np.float32, float))
+    off = float(np.abs(single - double).max() / max(np.ptp(double), 1e-300))
+    if not off <= NOTICED:
+        warnings.warn(
+            f"in single precision {block.kind!r} is off by about {off:.1g} of its range: its poles are "
+            "slow for this sample time. Export it in double precision, or with a longer sample time",
+            ModelWarning,
+            stacklevel=2,
+        )
+
+
+def _run(block: Block, inputs: np.ndarray, sample_time: float | None) -> np.ndarray:
+    kind = inputs.dtype
+    state = block.initial_state(inputs[0].astype(np.float64)).astype(kind)
+    outputs = np.empty((len(inputs), 1), dtype=kind)
+    block.kernel.batch(block.coefficients(sample_time).astype(kind), state, inputs, outputs)
+    return outputs.astype(np.float64)
 
 
 def checked_sample_time(block: Block, sample_time: float | None) -> float | None:
@@ -227,57 +302,51 @@ def own_time(block: Block) -> float | None:
     """Return the sample time that a block, or a part of it, is bound to."""
     if block.sample_time is not None:
         return block.sample_time
-    for part in getattr(block, "parts", ()):
-        step = own_time(part)
-        if step is not None:
-            return step
-    return None
+    steps = (own_time(part) for part in getattr(block, "parts", ()))
+    return next((step for step in steps if step is not None), None)
 
 
 def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:
-    part, block, single = call.part, call.part.block, translation.single
-    name, state = f"coefficients_{index}", ("state", block.n_states)
-    numbers, sample = (name, part.coefficients.size), ("x", len(block.inputs))
-    outputs = (f"signals + {call.first_output}", len(block.outputs))
-    calls: list[str] = []
+    """Return what the templates say of a block that is run."""
+    block, single, name = call.block, translation.single, f"coefficients_{index}"
+    numbers, state = (name, call.coefficients.size), ("state", block.n_states)
+    sample, outputs = (
+        ("x", len(block.inputs)),
+        (f"signals + {call.first_output}", len(block.outputs)),
+    )
+    texts: list[str] = []
     # a state that is given is copied, and has no start
-    for kernel in part.kernels[: 1 if part.state is not None else 2]:
+    for kernel in block.c_kernels[: 1 if call.state is not None else 2]:
         scratch = [(f"state + {block.n_states}", block.n_scratch)] * in_scratch(kernel)
-        end = (str(int(part.virgin)), 0) if calls else outputs
-        calls.append(translation.add(kernel).call(numbers, state, *scratch, sample, end))
+        end = (str(int(block.start == "virgin")), 0) if texts else outputs
+        texts.append(translation.add(kernel).call(numbers, state, *scratch, sample, end))
     given = ", ".join(said(channel.name) for channel in block.inputs)
     gives = ", ".join(said(channel.name) for channel in block.outputs)
     return {
         "index": index,
-        "kind": block.title,
         "words": f"{block.title}: {given} to {gives}",
-        "step": calls[0],
-        "start": calls[-1],
-        "numbers": name,
-        "reads": any(name in text for text in calls),
+        "step": texts[0],
+        "start": texts[-1],
+        "reads": any(name in text for text in texts),
         "n_numbers": block.n_states + block.n_scratch,
         "inputs": call.inputs,
         "first_state": call.first_state,
-        "first_output": call.first_output,
-        "n_coefficients": part.coefficients.size,
         "n_states": block.n_states,
-        "n_inputs": len(block.inputs),
-        "n_outputs": len(block.outputs),
-        "rows": rows(part.coefficients, single=single) or ["0"],
-        "state_rows": [] if part.state is None else rows(part.state, single=single),
+        "rows": rows(call.coefficients, single=single) or ["0"],
+        "state_rows": [] if call.state is None else rows(call.state, single=single),
     }
 
 
 def _starts(calls: list[Call]) -> str:
-    """Return how the memory of parts starts, in words."""
-    parts = [call.part for call in calls if call.part.block.n_states]
+    """Return how the memory of blocks starts, in words."""
     words = [
         "as the model gives it"
-        if part.state is not None
+        if call.state is not None
         else "at rest, whatever its inputs"
-        if part.virgin
+        if call.block.start == "virgin"
         else "from its inputs"
-        for part in parts
+        for call in calls
+        if call.block.n_states
     ]
     return " or ".join(dict.fromkeys(words or ["from its inputs"]))
 
@@ -300,12 +369,3 @@ def _constants(
             for place, ending in enumerate(endings)
         ]
     return [*told, ("SAMPLE_TIME", repr(step), "s")] if step else told
-
-
-def _row(values: Any, single: bool) -> str:
-    return ", ".join(literal(float(value), single=single) for value in values)
-
-
-def render(template: str, content: Mapping[str, Any]) -> str:
-    """Return a template of this folder filled in."""
-    return rendered("mckibben.export.c", template, content)

@@ -15,10 +15,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.export.c.adjusting import coefficient_limits, memory_limits
-from mckibben.export.c.literals import literal, rows
-from mckibben.export.c.wiring import Wiring
-from mckibben.export.templating import render
+from mckibben.export.templating import literal, render
 
 SERVER = tuple(Path(__file__).parent / "server" / f"mck_server.{end}" for end in ("c", "h"))
 
@@ -45,28 +42,15 @@ class Serving:
         Of an output, what stands there while no host leads; default its lowest.
     watchdog : float
         How long a host may be silent at most [s].
-    adjustable : float
-        Share by which coefficients may be set to others, 0 for not at all; with it, memory may be set
-        too, where the model's own runs take it.
     """
 
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     safe: Mapping[str, float] = field(default_factory=dict)
     watchdog: float = 0.5
-    adjustable: float = 0.0
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Ranges of a model's channels, and its safe outputs."""
-
-    low: Array
-    high: Array
-    safe: Array
-
-
-def limits(block: Block, serving: Serving) -> Limits:
-    """Return the limits of all inputs, then outputs, each of shape (n_inputs + n_outputs,).
+def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
+    """Return the lowest, highest and safe values of inputs, then outputs, each of shape (n_channels,).
 
     Raises
     ------
@@ -107,7 +91,7 @@ def limits(block: Block, serving: Serving) -> Limits:
                 f"the safe value of {name} is {safe[place]:g}, beyond its limits {low[place]:g} to "
                 f"{high[place]:g}. Remedy: give one within."
             )
-    return Limits(low, high, safe)
+    return low, high, safe
 
 
 def _known(block: Block) -> tuple[Array, Array]:
@@ -139,55 +123,31 @@ def served(
             f"{n} channels do not fit into a frame of the wire. Remedy: export in single precision, "
             "--float32, or fewer channels."
         )
-    if not 0 <= serving.adjustable < 1:
-        raise ModelError(
-            f"coefficients adjustable by {serving.adjustable:g} of their values. Remedy: give a share "
-            "from 0 to below 1, such as 0.2."
-        )
-    found = limits(block, serving)
-    wiring = Wiring(block, content["sample_time"])
-    adjusted: dict[str, dict[str, list[str]]] = {}
-    # memory can be read anyhow: what has been learnt is there
-    sizes = [0, wiring.n_numbers if wiring.n_numbers <= MOST_NUMBERS else 0]
-    if serving.adjustable:
-        inputs = slice(0, len(block.inputs))
-        ways = {
-            "coefficients": coefficient_limits(wiring, serving.adjustable),
-            "memory": memory_limits(wiring, found.low[inputs], found.high[inputs]),
-        }
-        for place, (what, ends) in enumerate(ways.items()):
-            if ends is not None and 0 < ends[0].size <= MOST_NUMBERS:
-                sizes[place] = ends[0].size
-                named = zip(("lowest", "highest"), ends, strict=True)
-                adjusted[what] = {end: rows(numbers, single=single) for end, numbers in named}
-    kept = ["coefficients", "memory"]
     told = {
         "period": period,
         "microseconds": round(1e6 * period),
         "silence": ticks,
         "channels": [
-            channel
-            | {
-                end: literal(float(numbers[place]), single=single)
-                for end, numbers in (("low", found.low), ("high", found.high), ("safe", found.safe))
-            }
-            for place, channel in enumerate((*content["inputs"], *content["outputs"]))
+            channel | dict(zip(("low", "high", "safe"), numbers, strict=True))
+            for channel, *numbers in zip(
+                (*content["inputs"], *content["outputs"]),
+                *(
+                    [literal(value, single=single) for value in each]
+                    for each in limits(block, serving)
+                ),
+                strict=True,
+            )
         ],
-        "adjusted": adjusted,
-        "sizes": sizes,
-        "lowest": [f"{what}_lowest" if what in adjusted else "NULL" for what in kept],
-        "highest": [f"{what}_highest" if what in adjusted else "NULL" for what in kept],
-        "staged": max([1, *(sizes[kept.index(what)] for what in adjusted)]),
+        "n_memory": content["n_memory"] if content["n_memory"] <= MOST_NUMBERS else 0,
         "fingerprint_bytes": "",
     }
-    full = {**content, "adjustable": bool(serving.adjustable), "served": told}
+    full = {**content, "served": told}
     texts = [render("mckibben.export.c", file, full) for file in ("model.c.j2", "server.c.j2")]
     digest = hashlib.sha256("\n".join([*texts, repr(single)]).encode()).digest()[:8]
     told["fingerprint"] = digest.hex()
     told["fingerprint_bytes"] = ", ".join(f"0x{byte:02X}" for byte in digest)
     return {
         "served": told,
-        "adjustable": bool(serving.adjustable),
         "shared": [*content["shared"], *SERVER],
         "sources": [*content["sources"], SERVER[0].name, f"{content['name']}_server.c"],
     }
@@ -195,15 +155,10 @@ def served(
 
 def _ticks(serving: Serving, period: float | None) -> int:
     """Return after how many silent ticks the watchdog acts."""
-    if period is None:
+    if period is None or not 1 <= 1e6 * period <= MOST_MICROSECONDS:
         raise ModelError(
-            "a served model ticks, and this one has no time of its own. Remedy: give the time between "
-            "steps, --sample-time SECONDS."
-        )
-    if not 1 <= 1e6 * period <= MOST_MICROSECONDS:
-        raise ModelError(
-            f"a served model ticks every {period:g} s, which is told in whole microseconds. Remedy: "
-            f"give --sample-time from 1e-6 to {1e-6 * MOST_MICROSECONDS:.0f} s."
+            f"a served model ticks, and its time between steps is {period}. Remedy: give --sample-time "
+            f"SECONDS, from 1e-6 to {1e-6 * MOST_MICROSECONDS:.0f}."
         )
     ticks = serving.watchdog / period if math.isfinite(serving.watchdog) else math.inf
     if not 1 <= ticks <= MOST_TICKS:

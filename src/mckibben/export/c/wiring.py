@@ -10,15 +10,29 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Cost
-from mckibben.errors import DataError
-from mckibben.export.c.parts import Part, part_of
+from mckibben.errors import DataError, ModelError
 
 
 @dataclass(frozen=True)
 class Call:
-    """One part run on signals: C expressions in, places of the signal table out."""
+    """A block run on signals.
 
-    part: Part
+    Parameters
+    ----------
+    block : Block
+    coefficients : array
+        What its kernels read.
+    state : array or None
+        The starting memory itself, where the model gives it.
+    inputs : tuple of str
+        C expressions.
+    first_output, first_state : int
+        Places in the tables of signals and of memory.
+    """
+
+    block: Block
+    coefficients: Array
+    state: Array | None
     inputs: tuple[str, ...]
     first_output: int
     first_state: int
@@ -56,19 +70,32 @@ class Wiring:
 
     @property
     def calls(self) -> list[Call]:
-        """The parts, in order."""
+        """The blocks that are run, in order."""
         return [step for step in self.steps if isinstance(step, Call)]
 
     @property
     def cost(self) -> Cost:
         """What a step costs."""
-        costs = (call.part.block.cost(self.sample_time) for call in self.calls)
+        costs = (call.block.cost(self.sample_time) for call in self.calls)
         return sum(costs, start=Cost(0, 0))
 
     def call(self, block: Block, given: Sequence[str]) -> list[str]:
-        """Append a part, and return the signals that it gives."""
-        call = Call(part_of(block, self.sample_time), tuple(given), self.n_signals, self.n_numbers)
-        self.steps.append(call)
+        """Append a block, and return the signals that it gives.
+
+        Raises
+        ------
+        ModelError
+            If it has no kernel of a start.
+        """
+        if not block.c_kernels:
+            raise ModelError(
+                f"{block.title!r} has no C. Remedy: declare a start_kernel beside its kernel, as blocks "
+                "of the package do."
+            )
+        zeros = np.zeros(len(block.inputs))
+        state = None if isinstance(block.start, str) else block.initial_state(zeros)
+        numbers, places = block.coefficients(self.sample_time), (self.n_signals, self.n_numbers)
+        self.steps.append(Call(block, numbers, state, tuple(given), *places))
         self.n_numbers += block.n_states + block.n_scratch
         return self._new_signals(len(block.outputs))
 
@@ -80,12 +107,12 @@ class Wiring:
         return self._new_signals(1)[0]
 
     def resume(self, state: Sequence[float]) -> None:
-        """Start the parts called last from the memory of them all."""
+        """Start the blocks called last from the memory of them all."""
         left = np.array(state, dtype=np.float64)
         for place, step in reversed(list(enumerate(self.steps))):
             if isinstance(step, Call) and left.size:
-                left, own = np.split(left, [left.size - step.part.block.n_states])
-                self.steps[place] = replace(step, part=replace(step.part, state=own))
+                left, own = np.split(left, [left.size - step.block.n_states])
+                self.steps[place] = replace(step, state=own)
 
     def _new_signals(self, count: int) -> list[str]:
         first = self.n_signals
@@ -120,5 +147,5 @@ def state_of(block: Block, memory: ArrayLike, sample_time: float | None) -> Arra
             f"the memory has {numbers.size} numbers, that of {block.title!r} {wiring.n_numbers}",
             remedy="give the block that was exported",
         )
-    states = [numbers[c.first_state :][: c.part.block.n_states] for c in wiring.calls]
+    states = [numbers[c.first_state :][: c.block.n_states] for c in wiring.calls]
     return np.concatenate([np.empty(0), *states])

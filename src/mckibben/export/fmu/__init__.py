@@ -1,1 +1,1 @@
-"""Blocks as functional mock-up units: FMI 2.0 and 3.0, for co-simulation."""
+"""Blocks as functional mock-up units for co-simulation, by FMI 2.0."""

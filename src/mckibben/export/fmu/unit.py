@@ -3,20 +3,25 @@
 One zip: the description, the C it is built from, libraries for the platforms that this machine can
 build for, and a page on how to import it. The same model gives the same bytes on the same machine.
 
-Source: FMI 2.0.4 and 3.0.1, Modelica Association.
+Source: FMI 2.0.4, Modelica Association.
 """
 
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import json
+import platform
+import shutil
+import sys
 import tarfile
 import tempfile
+import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,18 +29,18 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.laws.trial import input_limits
 from mckibben.blocks.saving import to_dict, to_text
 from mckibben.errors import DataError, ModelError
-from mckibben.export.c.literals import literal
 from mckibben.export.c.project import described, source_files
-from mckibben.export.fmu.refusals import refusals
-from mckibben.export.fmu.toolchains import PLATFORMS, build_library, buildable
-from mckibben.export.folders import zipped
-from mckibben.export.templating import render as rendered
+from mckibben.export.folders import write_texts, zipped
+from mckibben.export.programs import own_compiler, run
+from mckibben.export.templating import literals, render
 from mckibben.system import ordinary
-from mckibben.system.atomic import replacing, written
-
-Version = Literal["2.0", "3.0"]
+from mckibben.system.atomic import replacing
 
 HERE = Path(__file__).parent
+
+_render = partial(render, "mckibben.export.fmu")
+
+FLAGS = ("-std=c99", "-O2", "-s", "-ffp-contract=off", "-shared")
 
 DEFAULT_STEP = 0.01
 """Communication step suggested where the model has no time of its own [s]."""
@@ -58,12 +63,27 @@ BASE_UNITS: dict[str, dict[str, str] | None] = {
 """What units are of the SI; others are named without."""
 
 
+class Platform(NamedTuple):
+    """A kind of machine that an FMU runs on: its folder in an FMU, its libraries, its target for zig."""
+
+    folder: str
+    suffix: str
+    zig: str
+
+
+PLATFORMS = {
+    "linux": Platform("linux64", ".so", "x86_64-linux-gnu.2.17"),
+    "windows": Platform("win64", ".dll", "x86_64-windows-gnu"),
+    "macos": Platform("darwin64", ".dylib", "x86_64-macos"),
+}
+"""Those that FMI 2.0 has a folder for, by our name."""
+
+
 def export_fmu(
     block: Block,
     path: str | Path,
     *,
     name: str = "model",
-    version: Version = "2.0",
     sample_time: float | None = None,
     platforms: Sequence[str] | None = None,
     overwrite: bool = False,
@@ -78,13 +98,11 @@ def export_fmu(
         File to write, ending in ``.fmu``.
     name : str
         Of the model: a letter, then letters, digits and underscores.
-    version : {"2.0", "3.0"}
-        Of the interface.
     sample_time : float, optional
         Time between steps of the model [s]; needed by rate-dependent blocks.
     platforms : sequence of str, optional
-        Of linux, windows, macos, macos-arm and linux-arm; default all that this machine can build
-        for. Empty for sources only.
+        Of linux, windows and macos; default all that this machine can build for. Empty for sources
+        only.
     overwrite : bool
         Whether what an export wrote there before may be replaced.
 
@@ -104,27 +122,21 @@ def export_fmu(
     if path.suffix != ".fmu":
         raise DataError("an FMU is a file that ends in .fmu", file=path, remedy="name it so")
     refuse_file(path, overwrite=overwrite)
-    offered = [name for name in buildable() if version == "3.0" or PLATFORMS[name].fmi2]
-    wanted = offered if platforms is None else list(platforms)
-    unknown = [platform for platform in wanted if platform not in PLATFORMS]
+    wanted = buildable() if platforms is None else list(platforms)
+    unknown = [each for each in wanted if each not in PLATFORMS]
     if unknown:
         raise ModelError(
             f"there is no platform {unknown[0]!r}. Remedy: use one of {', '.join(PLATFORMS)}."
-        )
-    nameless = [name for name in wanted if version == "2.0" and not PLATFORMS[name].fmi2]
-    if nameless:
-        raise ModelError(
-            f"FMI 2.0 has no name for {nameless[0]}. Remedy: ask for FMI 3.0, or other platforms."
         )
     if platforms is None and not wanted:
         raise ModelError(
             "there is no C compiler on this machine, so the FMU would hold no library. Remedy: "
             "install one, or ask for no platforms (--platforms none): importers can build the sources."
         )
-    files = fmu_files(block, name=name, version=version, sample_time=sample_time)
-    files |= _libraries(files, name, version, wanted)
+    files = fmu_files(block, name=name, sample_time=sample_time)
+    texts = {path: text.encode() for path, text in files.items()}
     with replacing(path) as new:
-        new.write_bytes(zipped(files))
+        new.write_bytes(zipped(texts | _libraries(files, name, wanted)))
     return path
 
 
@@ -157,68 +169,61 @@ def _is_own(path: Path) -> bool:
 
 
 def fmu_files(
-    block: Block,
-    *,
-    name: str = "model",
-    version: Version = "2.0",
-    sample_time: float | None = None,
-) -> dict[str, bytes]:
-    """Return the files of an FMU but for its libraries, by path in the zip."""
+    block: Block, *, name: str = "model", sample_time: float | None = None
+) -> dict[str, str]:
+    """Return the files of an FMU but for its libraries, text by path in the zip."""
     content = described(block, name=name, sample_time=sample_time, single=False)
     low, high = input_limits(block)
     starts = np.where(np.isfinite(low) & np.isfinite(high), np.clip(0.0, low, high), 0.0)
+    channels = (*content["inputs"], *content["outputs"])
     content |= {
-        "fmi": version,
-        "token": _token(block, content["sample_time"], version),
+        "token": _token(block, content["sample_time"]),
         "description": f"{content['inputs'][0]['name']} to {content['outputs'][0]['name']}: "
         + ", ".join(content["kinds"]),
-        "starts": ", ".join(literal(float(start)) for start in starts),
+        "starts": literals(starts),
         "step": content["sample_time"] or DEFAULT_STEP,
         "variables": _variables(content, starts.tolist()),
-        "units": _units(content, version),
+        "units": [
+            {"name": unit, "base": BASE_UNITS.get(unit)}
+            for unit in sorted({channel["unit"] for channel in channels})
+        ],
     }
-    digit = version[0]
-    sources = {Path(path).name: text for path, text in source_files(content).items()}
-    sources["unit_model.h"] = _render("unit_model.h.j2", content)
-    ours = [HERE / "c" / f"{stem}" for stem in ("unit.h", "unit.c", f"fmi{digit}.c")]
-    sources |= {path.name: path.read_text(encoding="utf-8") for path in ours}
-    sources |= {name: text for name, text in _headers().items() if name.startswith(f"fmi{digit}")}
-    own, types = sources[f"fmi{digit}.c"], sources[f"fmi{digit}FunctionTypes.h"]
-    sources[f"fmi{digit}_refused.c"] = refusals(types, own)
+    sources = {
+        **{Path(path).name: text for path, text in source_files(content).items()},
+        **_headers(),
+        "unit_model.h": _render("unit_model.h.j2", content),
+        "fmi2.c": (HERE / "c" / "fmi2.c").read_text(encoding="utf-8"),
+    }
     content["unit_sources"] = sorted(source for source in sources if source.endswith(".c"))
-    texts = {f"sources/{source}": text for source, text in sources.items()}
-    texts["modelDescription.xml"] = _render(f"fmi{digit}.xml.j2", content)
-    texts["documentation/index.html"] = _render("index.html.j2", content)
-    texts["resources/model.json"] = to_text(block)
-    if version == "3.0":
-        texts["sources/buildDescription.xml"] = _render("build.xml.j2", content)
-    return {path: text.encode() for path, text in texts.items()}
+    return {
+        **{f"sources/{source}": text for source, text in sources.items()},
+        "modelDescription.xml": _render("fmi2.xml.j2", content),
+        "documentation/index.html": _render("index.html.j2", content),
+        "resources/model.json": to_text(block),
+    }
 
 
 @cache
 def _headers() -> dict[str, str]:
-    """Return the headers of FMI 2.0 and 3.0, unchanged, with the notices of their licence (BSD)."""
+    """Return the headers of FMI 2.0, unchanged, with the notices of their licence (BSD)."""
     with tarfile.open(HERE / "headers.tar.xz") as packed:
         parts = {name: packed.extractfile(name) for name in packed.getnames()}
         return {name: part.read().decode() for name, part in parts.items() if part}
 
 
-def _token(block: Block, sample_time: float | None, version: str) -> str:
+def _token(block: Block, sample_time: float | None) -> str:
     """Return what tells this model from others: a digest of what it is."""
-    what = json.dumps([to_dict(block), sample_time, version], sort_keys=True)
-    digest = hashlib.sha256(what.encode()).hexdigest()
-    cuts = [digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32]]
-    return "{" + "-".join(cuts) + "}"
+    digest = hashlib.sha256(json.dumps([to_dict(block), sample_time], sort_keys=True).encode())
+    return f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
 
 
 def _variables(content: Mapping[str, Any], starts: Sequence[float]) -> list[dict[str, Any]]:
     """Return the channels as variables, all names different; time and status are taken."""
     taken = {"time", "status"}
     variables = []
-    rest = [0.0] * len(content["outputs"])
-    kinds = [("input", channel) for channel in content["inputs"]]
-    kinds += [("output", channel) for channel in content["outputs"]]
-    for (causality, channel), start in zip(kinds, [*starts, *rest], strict=True):
+    channels = [("input", *each) for each in zip(content["inputs"], starts, strict=True)]
+    channels += [("output", channel, 0.0) for channel in content["outputs"]]
+    for causality, channel, start in channels:
         name = channel["name"]
         while name in taken:
             name = f"{name}_{causality}"
@@ -229,36 +234,65 @@ def _variables(content: Mapping[str, Any], starts: Sequence[float]) -> list[dict
     return variables
 
 
-def _units(content: Mapping[str, Any], version: str) -> list[dict[str, Any]]:
-    named = {channel["unit"] for channel in (*content["inputs"], *content["outputs"])}
-    if version == "3.0":
-        named.add("s")
-    return [{"name": unit, "base": BASE_UNITS.get(unit)} for unit in sorted(named)]
-
-
-def _libraries(
-    files: Mapping[str, bytes], name: str, version: Version, platforms: Sequence[str]
-) -> dict[str, bytes]:
+def _libraries(files: Mapping[str, str], name: str, platforms: Sequence[str]) -> dict[str, bytes]:
     """Return the library for each platform, by path in the zip."""
     built: dict[str, bytes] = {}
-    if not platforms:
-        return built
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        for path, content in files.items():
-            if path.startswith("sources/"):
-                with written(folder):
-                    (folder / Path(path).name).write_bytes(content)
+        own = {Path(path).name: files[path] for path in files if path.startswith("sources/")}
+        write_texts(folder, own)
         sources = sorted(path.name for path in folder.glob("*.c"))
-        for platform in (PLATFORMS[key] for key in platforms):
-            where = platform.fmi2 if version == "2.0" else platform.fmi3
-            if where:
-                out = folder / f"{name}{platform.suffix}"
-                build_library(platform.name, folder, sources, out)
-                built[f"binaries/{where}/{out.name}"] = out.read_bytes()
-                out.unlink()
+        for each in platforms:
+            out = folder / f"{name}{PLATFORMS[each].suffix}"
+            build_library(each, folder, sources, out)
+            built[f"binaries/{PLATFORMS[each].folder}/{out.name}"] = out.read_bytes()
+            out.unlink()
     return built
 
 
-def _render(template: str, content: Mapping[str, Any]) -> str:
-    return rendered("mckibben.export.fmu", template, content)
+def own_platform() -> str | None:
+    """Return the name of the platform that this machine is, if it is one of them."""
+    if platform.machine() not in ("x86_64", "AMD64"):
+        return None
+    return {"linux": "linux", "win32": "windows", "darwin": "macos"}.get(sys.platform)
+
+
+def buildable() -> list[str]:
+    """Return the platforms that this machine can build for."""
+    return [name for name in PLATFORMS if _command(name) is not None]
+
+
+def _command(name: str) -> list[str] | None:
+    """Return the start of a compiler's command line for a platform, or None."""
+    if importlib.util.find_spec("ziglang") is not None:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[name].zig]
+    if name == own_platform():
+        found = own_compiler()
+        return [found] if found else None
+    if name == "windows":
+        mingw = shutil.which("x86_64-w64-mingw32-gcc")
+        return [mingw, "-Wl,--no-insert-timestamp", "-static-libgcc"] if mingw else None
+    return None
+
+
+def build_library(name: str, folder: Path, sources: Sequence[str], out: Path) -> None:
+    """Compile C files of a folder into a shared library for a platform.
+
+    Raises
+    ------
+    ModelError
+        If this machine cannot build for it, or the compiler refuses.
+    """
+    command = _command(name)
+    if command is None:
+        raise ModelError(
+            f"this machine cannot build for {name}. Remedy: install a C compiler, or pip install "
+            "'mckibben[cross]' for all platforms."
+        )
+    position = [] if PLATFORMS[name].suffix == ".dll" else ["-fPIC"]
+    maths = [] if PLATFORMS[name].suffix != ".so" else ["-lm"]
+    run(
+        [*command, *FLAGS, *position, "-I.", *sources, *maths, "-o", str(out)],
+        f"the FMU does not compile for {name}",
+        folder=folder,
+    )

@@ -7,6 +7,7 @@ differs are names and numbers. It is written for Jazzy and later.
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 from mckibben.blocks.base import Block
@@ -56,7 +57,7 @@ def export_ros2(
     folder = Path(folder)
     refuse_folder(folder, overwrite=overwrite)
     files = ros2_files(block, name=name, sample_time=sample_time)
-    write_folder(folder, {path: text.encode() for path, text in files.items()}, overwrite=overwrite)
+    write_folder(folder, files, overwrite=overwrite)
     return folder
 
 
@@ -88,9 +89,7 @@ def ros2_files(
         "class_name": "".join(word.capitalize() for word in name.split("_")) + "Controller",
     }
 
-    def filled(template: str) -> str:
-        return render("mckibben.export.ros2", template, content)
-
+    filled = partial(render, "mckibben.export.ros2", content=content)
     return {
         **{f"c/{Path(path).name}": text for path, text in source_files(content).items()},
         "package.xml": filled("package.xml.j2"),

@@ -17,12 +17,10 @@
 #define STATE 5u
 #define STREAM 6u
 #define READ 7u
-#define STAGE 8u
-#define LOAD 9u
-#define RESET 10u
-#define KEEP 11u
-#define RELEASE 12u
-#define SAMPLE 13u
+#define RESET 8u
+#define KEEP 9u
+#define RELEASE 10u
+#define SAMPLE 11u
 
 /* What an answer begins with. */
 #define OK 0u
@@ -32,8 +30,6 @@
 #define IS_SAFE 4u
 #define OTHER_MODEL 5u
 #define OLD_SESSION 6u
-#define NOT_STAGED 7u
-#define IS_FIXED 8u
 
 /* Notes beside outputs. */
 #define NOTE_RUNNING 1u
@@ -250,7 +246,6 @@ static uint8_t open_session(mck_server *self, uint32_t session, const uint8_t *b
     self->lock_step = body[8];
     self->open = 1;
     self->tripped = 0;
-    self->staged_what = -1;
     return OK;
 }
 
@@ -286,63 +281,6 @@ static uint8_t take_inputs(mck_server *self, const uint8_t *body, int n)
     return OK;
 }
 
-static uint8_t stage(mck_server *self, const uint8_t *body, int n)
-{
-    if (n < 3 + NUMBER || (n - 3) % NUMBER != 0 || body[0] > 1u) {
-        return MALFORMED;
-    }
-    const int what = body[0];
-    const int first = (int)get16(body + 1);
-    const int count = (n - 3) / NUMBER;
-    if (self->served->lowest[what] == NULL) {
-        return IS_FIXED;
-    }
-    if (first == 0) {
-        self->staged_what = what;
-        self->staged_count = 0;
-    }
-    if (what != self->staged_what || first != self->staged_count) {
-        return NOT_STAGED;
-    }
-    if (first + count > self->served->sizes[what]) {
-        return MALFORMED;
-    }
-    const mck_real *lowest = self->served->lowest[what] + first;
-    const mck_real *highest = self->served->highest[what] + first;
-    for (int i = 0; i < count; i++) {
-        const mck_real value = get_number(body + 3 + i * NUMBER);
-        if (lowest[i] <= highest[i] && !within(value, lowest[i], highest[i])) {
-            self->staged_what = -1;
-            return BEYOND_LIMITS;
-        }
-        self->staged[first + i] = value;
-    }
-    self->staged_count = first + count;
-    return OK;
-}
-
-static uint8_t load(mck_server *self, const uint8_t *body, int n)
-{
-    if (n != 1 || body[0] > 1u) {
-        return MALFORMED;
-    }
-    const int what = body[0];
-    if (what != self->staged_what || self->staged_count != self->served->sizes[what]) {
-        return NOT_STAGED;
-    }
-    for (int i = 0; i < self->staged_count; i++) {
-        if (self->served->lowest[what][i] <= self->served->highest[what][i]) {
-            self->places[what][i] = self->staged[i];
-        }
-    }
-    if (what == 1) {
-        *self->started = 1;
-    }
-    self->staged_what = -1;
-    self->loads++;
-    return OK;
-}
-
 /* Carry out what changes something, once. */
 static uint8_t carried_out(mck_server *self, uint8_t kind, const uint8_t *body, int n)
 {
@@ -371,10 +309,6 @@ static uint8_t carried_out(mck_server *self, uint8_t kind, const uint8_t *body, 
         self->every = (uint16_t)get16(body);
         self->since = 0;
         return OK;
-    case STAGE:
-        return stage(self, body, n);
-    case LOAD:
-        return load(self, body, n);
     default:
         return MALFORMED;
     }
@@ -392,12 +326,10 @@ static void identify(const mck_server *self, writing *to)
     put(to, served->period, 4);
     put(to, served->silence, 4);
     put(to, self->steps, 4);
-    put(to, self->loads, 4);
     put(to, self->dropped, 4);
     put(to, (uint32_t)served->n_inputs, 2);
     put(to, (uint32_t)served->n_outputs, 2);
-    put(to, (uint32_t)served->sizes[0], 2);
-    put(to, (uint32_t)served->sizes[1], 2);
+    put(to, (uint32_t)served->n_memory, 2);
     put(to, (uint32_t)served->n_missable, 2);
 }
 
@@ -419,10 +351,10 @@ static void tell(const mck_server *self, writing *to, uint8_t kind, const uint8_
         put_numbers(to, &channel->safe, 1);
         put_text(to, channel->name);
         put_text(to, channel->unit);
-    } else if (kind == READ && n == 4 && body[0] < 2u && body[3] * NUMBER < ROOM &&
-               (int)get16(body + 1) + body[3] <= served->sizes[body[0]]) {
+    } else if (kind == READ && n == 3 && body[2] * NUMBER < ROOM &&
+               (int)get16(body) + body[2] <= served->n_memory) {
         put(to, OK, 1);
-        put_numbers(to, self->places[body[0]] + get16(body + 1), body[3]);
+        put_numbers(to, self->memory + get16(body), body[2]);
     } else {
         put(to, MALFORMED, 1);
     }
@@ -498,9 +430,6 @@ void mck_server_init(mck_server *self, uint32_t start)
     self->steps = 0;
     self->since = 0;
     self->dropped = 0;
-    self->staged_what = -1;
-    self->staged_count = 0;
-    self->loads = 0;
     self->length = 0;
     self->too_long = 0;
     self->answer.length = 0;

@@ -34,9 +34,7 @@ typedef struct {
     int n_inputs;
     int n_missable; /* of them the last, which may be missing: NaN */
     int n_outputs;
-    int sizes[2];               /* coefficients, 0 where they are fixed, and numbers of the memory */
-    const mck_real *lowest[2];  /* of each; NULL where they are fixed */
-    const mck_real *highest[2]; /* below the lowest where a number is scratch, which is not taken */
+    int n_memory; /* numbers of the model's memory that can be read */
     const mck_channel *channels; /* inputs, then outputs */
     int (*step)(void *model, const mck_real *in, mck_real *out);
     void (*reset)(void *model);
@@ -54,13 +52,8 @@ typedef struct {
     void *model;
     mck_real *in;
     mck_real *out;
-    uint8_t *own;        /* of every input: set by the firmware, not by frames */
-    mck_real *places[2]; /* coefficients and memory of the model */
-    int *started;
-    mck_real *staged;
-    int staged_what; /* -1 where nothing is staged */
-    int staged_count;
-    uint32_t loads;
+    uint8_t *own; /* of every input: set by the firmware, not by frames */
+    const mck_real *memory;
 
     uint32_t session;
     uint32_t sequence;

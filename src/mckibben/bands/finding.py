@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.bands.held import BLOCK, Held, memory_of, off_as_a_whole
 from mckibben.bands.scale import SHAPES, Scale, Shape, Terms, scale_of
-from mckibben.blocks.bands.band import Band
-from mckibben.blocks.bands.state_of_motion import look_along
+from mckibben.blocks.bands import Band, look_along
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import rows, vector
 from mckibben.errors import DataError

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.bands.band import FARTHEST
+from mckibben.blocks.bands import FARTHEST
 
 RIDGES = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e3)
 """Of weights, per sample."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.laws.trial import wander
+from mckibben.blocks.laws import wander
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.export.c.wiring import Call, Wiring
 

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 
 from mckibben.blocks.base import Block
-from mckibben.blocks.laws.trial import input_limits, wander
+from mckibben.blocks.laws import input_limits, wander
 from mckibben.errors import ModelWarning
 
 NOTICED = 5e-5

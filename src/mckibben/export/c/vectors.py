@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.laws.trial import input_limits, wander
+from mckibben.blocks.laws import input_limits, wander
 from mckibben.errors import ModelError, ModelWarning
 
 PACE, TURNS = 9, 24

@@ -190,7 +190,7 @@ class Band(Block):
     mean, spread : vector, shape (s,)
         Of the state of motion.
     bells : rows, shape (b, s)
-        RBF centres, in deviations from the mean; calibration gives none, earlier versions did.
+        RBF centres, in deviations from the mean: none but in bands of earlier versions.
     sharpness : float
         Of these, per squared deviation.
     shift, log_scale : rows, shape (outputs, 1 + s + b)

@@ -24,7 +24,7 @@ from mckibben import Recording
 from mckibben.bands.finding import find_band
 from mckibben.bands.held import Held
 from mckibben.bands.scale import SHAPES
-from mckibben.blocks.bands.band import Band
+from mckibben.blocks.bands import Band
 from mckibben.blocks.base import Block
 from mckibben.comparison.calibrating import held_of
 from mckibben.measured.sets import sets_in

@@ -17,7 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 from mckibben.export.c.project import described, source_files
 from mckibben.export.programs import own_compiler
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from fuzz_c import SAMPLE_TIME, fuzzed
 from mckibben.blocks.base import Block
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, source_files
 from mckibben.export.c.serving import Serving, limits, served, served_files

@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 import mckibben
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.feedback import FeedforwardFeedback
 from mckibben.control import tune_pid
 from mckibben.signals import decaying_triangle
 from mckibben.stream import FixedRate, Step, UDPLink

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from mckibben import PI, DataError, ModelError
-from mckibben.blocks.bands.band import Band
-from mckibben.blocks.bands.banded import Banded
+from mckibben.blocks.bands import Band, Banded
 from mckibben.control import Twin
 from mckibben.rigs import load_rig, rig_names
 

@@ -5,7 +5,7 @@ from . import example as example
 from . import muscles as muscles
 from . import rigs as rigs
 from . import signals as signals
-from .blocks.bands.banded import Banded as Banded
+from .blocks.bands import Banded as Banded
 from .blocks.base import Block as Block
 from .blocks.compose import Parallel as Parallel
 from .blocks.compose import PerChannel as PerChannel
@@ -16,10 +16,10 @@ from .blocks.hysteresis.gpi import GPI as GPI
 from .blocks.hysteresis.pi import PI as PI
 from .blocks.hysteresis.play import Play as Play
 from .blocks.hysteresis.rate_dependent_pi import RateDependentPI as RateDependentPI
-from .blocks.laws.check import check_block as check_block
-from .blocks.memoryless.affine import Affine as Affine
-from .blocks.memoryless.piecewise_linear import PiecewiseLinear as PiecewiseLinear
-from .blocks.memoryless.polynomial import Polynomial as Polynomial
+from .blocks.laws import check_block as check_block
+from .blocks.memoryless import Affine as Affine
+from .blocks.memoryless import PiecewiseLinear as PiecewiseLinear
+from .blocks.memoryless import Polynomial as Polynomial
 from .blocks.saving import load as load
 from .characterization import characterize as characterize
 from .comparison.calibrating import calibrate as calibrate

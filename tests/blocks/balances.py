@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.fields import Channel, rows, vector
-from mckibben.blocks.laws.trial import wander
+from mckibben.blocks.laws import wander
 from tests.blocks.strategies import numbers
 
 Array = NDArray[np.float64]

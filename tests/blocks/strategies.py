@@ -17,7 +17,7 @@ from mckibben.blocks.hysteresis.envelopes.piecewise_linear import PiecewiseLinea
 from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
 from mckibben.blocks.hysteresis.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
 from mckibben.blocks.hysteresis.preisach import Preisach
-from mckibben.blocks.laws.trial import through
+from mckibben.blocks.laws import through
 
 Array = NDArray[np.float64]
 

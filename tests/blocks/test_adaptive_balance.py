@@ -15,7 +15,7 @@ from mckibben.blocks.adaptive.adaptive import Adaptive
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_adapting import FRICTION, STIFFNESS
 from mckibben.blocks.inverse import Inverse
-from mckibben.blocks.laws.trial import wander
+from mckibben.blocks.laws import wander
 from tests.blocks.balances import ALONE, STEP, balances
 
 Array = NDArray[np.float64]

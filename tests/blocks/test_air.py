@@ -14,7 +14,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from mckibben import ModelWarning, Series
 from mckibben.blocks.dynamics.air import Air
-from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.memoryless import Affine
 from mckibben.export import export_c
 from tests.blocks.strategies import numbers, paths
 

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import ModelWarning
-from mckibben.blocks.bands.state_of_motion import look_along
+from mckibben.blocks.bands import look_along
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_terms import HEAD
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
@@ -26,7 +26,7 @@ from mckibben.blocks.force.multistate_friction import deflected
 from mckibben.blocks.hysteresis.bouc_wen_flow import flow
 from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
 from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach, _output, _solve, everett
-from mckibben.blocks.laws.trial import wander
+from mckibben.blocks.laws import wander
 from mckibben.blocks.solving import eliminate, solve_near
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_starts import begin_at

@@ -9,7 +9,7 @@ import pytest
 
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.equations import quantities, written
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 from mckibben.blocks.notation import Written
 from mckibben.report.mathematics import mathml
 

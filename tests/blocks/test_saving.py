@@ -12,7 +12,7 @@ import pytest
 
 from mckibben import GPI, PI, DataError, ModelError, load
 from mckibben.blocks import saving
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 
 EXAMPLES = examples()
 GOOD: dict[str, Any] = GPI.example().to_dict()

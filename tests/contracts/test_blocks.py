@@ -27,7 +27,7 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
 from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
 from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 
 EXAMPLES = examples()
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mckibben import PI, Block, RateDependentPI, check_block
 from mckibben.blocks.inverse import Inverse
-from mckibben.blocks.laws.check import LAWS
+from mckibben.blocks.laws import LAWS
 from mckibben.blocks.running import Stream
 from mckibben.errors import ContractError
 

@@ -14,7 +14,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.complex_step import twin
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.jacobian import Tangents, jacobian
-from mckibben.blocks.laws.trial import input_limits, wander
+from mckibben.blocks.laws import input_limits, wander
 from mckibben.registry import load, names
 from mckibben.system.compiling import deferred
 

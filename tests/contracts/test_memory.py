@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mckibben import GPI, Affine, ModelError, ModelWarning, Play, Series
 from mckibben.blocks.fields import vector
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 from mckibben.registry import load
 from tests.blocks.strategies import (
     HIGH,

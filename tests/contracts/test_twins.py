@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben.blocks.laws.examples import examples
-from mckibben.blocks.laws.trial import Trial
+from mckibben.blocks.laws import Trial, examples
 from mckibben.registry import load, names
 from mckibben.system.compiling import Deferred
 from tests.twins import ENVELOPES, STEP_ERROR, STEPPED, TWINS

@@ -11,8 +11,7 @@ import pytest
 
 from mckibben import PI, Affine, DataError, ModelError, Recording, Series, load, load_rig
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.control import DisturbanceObserver, Twin, control_law, track, tune_pid
 from mckibben.control.pressure_loop import PressureLoop

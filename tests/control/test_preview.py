@@ -10,10 +10,9 @@ import pytest
 
 from mckibben import PI, Recording, Series
 from mckibben.blocks.dynamics.air import Air
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.memoryless import Affine
 from mckibben.control import DisturbanceObserver, EstimatedLoad, Twin, track
 from mckibben.control.controller import BlockController
 from tests.cli.conftest import cli as cli  # a fixture

@@ -21,9 +21,9 @@ from mckibben import (
     load_rig,
     write,
 )
-from mckibben.blocks.bands.band import Band
+from mckibben.blocks.bands import Band
 from mckibben.blocks.base import Block
-from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.feedback import PIDFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.control import Twin, before, track, tune_pid
 from mckibben.control.suiting import doubts_of_feedback

@@ -14,7 +14,7 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE
 from mckibben.blocks.inverse import Inverse
-from mckibben.blocks.memoryless.contact import Contact
+from mckibben.blocks.memoryless import Contact
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_loads import under
 from mckibben.estimators.coupled.balance_slopes import run

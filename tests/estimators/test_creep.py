@@ -10,7 +10,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.dynamics.creep_start import begun_places, begun_state
-from mckibben.blocks.memoryless.negative import Negative
+from mckibben.blocks.memoryless import Negative
 from mckibben.comparison.free_run import run_free
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.separable import SeparableEstimator

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, Recording
-from mckibben.blocks.force.chou_hannaford import ChouHannaford
+from mckibben.blocks.force.laws import ChouHannaford, TonduLopez
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
-from mckibben.blocks.force.tondu_lopez import TonduLopez
 from mckibben.estimators.coupled.balance_force import BalanceForceEstimator
 from mckibben.estimators.force.activation_pressure import ActivationPressureEstimator
 from mckibben.estimators.force.multistate import MultistateEstimator, extract_hysteresis
@@ -69,7 +68,7 @@ def test_static_laws_recover_their_own_forces() -> None:
 
 
 def test_chou_hannaford_recovers_thread_and_turns() -> None:
-    from mckibben.blocks.force.chou_hannaford import ChouHannaford
+    from mckibben.blocks.force.laws import ChouHannaford
 
     truth = ChouHannaford(260.0, 1.6, -3.0)
     fit: Any = ChouHannafordEstimator().fit(isometric(truth))

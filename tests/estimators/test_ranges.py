@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from mckibben import Recording
+from mckibben.blocks.force.laws import PolynomialForce
 from mckibben.blocks.force.multistate_friction import ELEVEN, MultistateFriction
-from mckibben.blocks.force.polynomial_force import PolynomialForce
 from mckibben.estimators.core.ranges import parameter_ranges
 from mckibben.registry import load
 

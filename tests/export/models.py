@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from mckibben import Block, ModelError, ModelWarning
 from mckibben.blocks.adaptive.adaptive import Adaptive
 from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
-from mckibben.blocks.laws.examples import examples
-from mckibben.blocks.laws.trial import input_limits, wander
+from mckibben.blocks.laws import examples, input_limits, wander
 from mckibben.registry import load
 from tests.export.building import SAMPLE_TIME
 from tests.golden.models import all_models, registered

@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelError
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 from mckibben.export import export_fmu
 from mckibben.export.fmu.unit import own_platform
 from tests.export.building import SAMPLE_TIME

@@ -12,7 +12,7 @@ import pytest
 
 from mckibben import GPI, ModelError, muscles
 from mckibben.blocks.base import Block
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 from mckibben.export import export_ros2
 from mckibben.export.ros2.package import ros2_files
 from tests.tools import needs

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 from mckibben.errors import DataError, ModelError
 from mckibben.export import Serving, export_c, state_of
 from mckibben.export.c import emulation

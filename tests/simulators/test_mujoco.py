@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from mckibben import PI, muscles
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
+from mckibben.blocks.force.laws import TonduLopez
 from mckibben.blocks.force.multistate_friction import MultistateFriction
-from mckibben.blocks.force.tondu_lopez import TonduLopez
 from mckibben.errors import DataError, ModelError
 from tests.tools import needs
 

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from mckibben import Recording
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws import examples
 from mckibben.validation.describing import describe
 
 STEP = 0.05

@@ -17,7 +17,7 @@ from mckibben.errors import MckibbenError
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
-    from mckibben.blocks.bands.band import Band
+    from mckibben.blocks.bands import Band
     from mckibben.blocks.base import Block
     from mckibben.control import Twin
 
@@ -100,7 +100,7 @@ class Workspace(Changing):
 
     def band(self, name: str) -> Band | None:
         """Return the band of a model, or None where it has none."""
-        from mckibben.blocks.bands.banded import Banded
+        from mckibben.blocks.bands import Banded
 
         if self.path("banded", f"{name}.json").exists():
             with suppress(MckibbenError):

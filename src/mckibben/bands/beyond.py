@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mckibben.arrays import Array
-from mckibben.blocks.bands.band import WIDENS, Band
+from mckibben.blocks.bands import WIDENS, Band
 from mckibben.numerals import numeral
 
 

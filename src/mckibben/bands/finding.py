@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.bands.held import BLOCK, Held, memory_of, off_as_a_whole
 from mckibben.bands.scale import SHAPES, Scale, Shape, Terms, scale_of
-from mckibben.blocks.bands.band import Band
-from mckibben.blocks.bands.state_of_motion import look_along
+from mckibben.blocks.bands import Band, look_along
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import rows, vector
 from mckibben.errors import DataError
@@ -145,11 +144,11 @@ def find_band(
         )
     shown = np.concatenate(seen)
     made = Terms.of(shown)
-    terms, n_seen = made(shown), shown.shape[1]
+    terms = made(shown)
     level = min(LEVEL, n_units / (n_units + 1))
     best, scores, widths = [], [], []
     for errors in np.concatenate(all_missed).T:
-        scale, own_scores, *width = _best(terms, errors, of, apart, n_seen, level, shapes)
+        scale, own_scores, *width = _best(terms, errors, of, apart, level, shapes)
         best.append(scale)
         scores.append(_calibrated(own_scores, of))
         widths.append(width)
@@ -161,8 +160,8 @@ def find_band(
         times=times,
         mean=vector(made.mean),
         spread=vector(made.spread),
-        bells=rows(made.bells),
-        sharpness=made.sharpness,
+        bells=(),
+        sharpness=1.0,
         shift=rows(np.array([scale.shift for scale in best])),
         log_scale=rows(np.array([scale.log_scale for scale in best])),
         limits=rows(np.array([scale.limits for scale in best])),
@@ -181,7 +180,6 @@ def _best(
     errors: Array,
     of: NDArray[np.intp],
     apart: NDArray[np.intp],
-    n_seen: int,
     level: float,
     shapes: Sequence[Shape],
 ) -> tuple[Scale, Array, float, float]:
@@ -196,7 +194,7 @@ def _best(
     some = np.arange(0, len(errors), every)
 
     def scale_on(known: NDArray[np.intp], shape: Shape) -> Scale:
-        return scale_of(terms[known], errors[known], apart[known], shape, n_seen, typical)
+        return scale_of(terms[known], errors[known], apart[known], shape, typical)
 
     def tried(shape: Shape) -> tuple[Scale, Array, float]:
         scores, width = np.empty(len(errors)), 0.0

@@ -1,8 +1,8 @@
 """How much a model misses by the state of motion: few weights, as many as runs left out bear out.
 
-What is missed on average, and the logarithm of what is missed beside, are sums of weights times what is
-seen of the motion, and times bells round places that motion came by. Weights are small (ridge), by how
-well they tell what is missed on runs left out; with no state that tells anything the scale is constant.
+What is missed on average, and the logarithm of what is missed beside, are linear in the state of motion.
+Weights are small (ridge), by how well they foresee what is missed on runs left out; with no state that
+foresees anything the scale is constant.
 """
 
 from __future__ import annotations
@@ -14,13 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.bands.band import FARTHEST
+from mckibben.blocks.bands import FARTHEST
 
 RIDGES = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e3)
 """Of weights, per sample."""
-
-N_BELLS, SHARPNESS = 100, 2.0
-"""Bells, and how sharp they are, per squared deviation of all that is seen; by cross-validation."""
 
 FLOOR = 0.1
 """Of the median miss, below which misses count as alike."""
@@ -30,20 +27,13 @@ PARTS = 4
 
 
 class Shape(NamedTuple):
-    """What a scale may be made of: a shift by state, a scale by state, bells in both."""
+    """What a scale may be made of: a shift by state, a scale by state."""
 
     shift: bool
     scale: bool
-    bells: bool
 
 
-SHAPES = (
-    Shape(False, False, False),
-    Shape(False, True, False),
-    Shape(True, True, False),
-    Shape(False, True, True),
-    Shape(True, True, True),
-)
+SHAPES = (Shape(False, False), Shape(False, True), Shape(True, True))
 """From the simplest on."""
 
 
@@ -54,31 +44,22 @@ class Terms:
     Parameters
     ----------
     mean, spread : array, shape (s,)
-        Of what is seen.
-    bells : array, shape (b, s)
-    sharpness : float
+        Of the state of motion.
     """
 
     mean: Array
     spread: Array
-    bells: Array
-    sharpness: float
 
     @classmethod
     def of(cls, seen: Array) -> Terms:
-        """Return terms for what is seen, shape (n, s); bells at samples evenly through it."""
-        mean, spread = seen.mean(axis=0), seen.std(axis=0)
-        spread = np.where(spread > 1e-9, spread, 1.0)
-        places = np.unique(np.linspace(0, len(seen) - 1, N_BELLS).astype(int))
-        bells = ((seen[places] - mean) / spread).clip(-FARTHEST, FARTHEST)
-        return cls(mean, spread, bells, SHARPNESS / seen.shape[1])
+        """Return terms for states of motion, shape (n, s)."""
+        spread = seen.std(axis=0)
+        return cls(seen.mean(axis=0), np.where(spread > 1e-9, spread, 1.0))
 
     def __call__(self, seen: Array) -> Array:
-        """Return 1, what is seen, and bells, shape (n, 1 + s + b)."""
+        """Return 1, and the state of motion in deviations from its mean, shape (n, 1 + s)."""
         z = ((seen - self.mean) / self.spread).clip(-FARTHEST, FARTHEST)
-        far = (z**2).sum(axis=1)[:, None] + (self.bells**2).sum(axis=1) - 2 * z @ self.bells.T
-        bells = np.exp(-self.sharpness * far.clip(0.0))
-        return np.column_stack([np.ones(len(z)), z, bells])
+        return np.column_stack([np.ones(len(z)), z])
 
 
 @dataclass(frozen=True)
@@ -114,7 +95,6 @@ def scale_of(
     missed: Array,
     units: NDArray[np.intp],
     shape: Shape,
-    n_seen: int,
     typical: Array,
 ) -> Scale:
     """Return the scale that misses (n,) ask for.
@@ -126,7 +106,7 @@ def scale_of(
     Parameters
     ----------
     terms : array, shape (n, t)
-        Of which the first is 1, the next ``n_seen`` what is seen, the others bells.
+        Of which the first is 1, the others the state of motion.
     units : array of int, shape (n,)
         Which run, or block, a sample is of: weights are tried on some that they do not know.
     shape : Shape
@@ -134,17 +114,16 @@ def scale_of(
     typical : array, shape (t,)
         Mean of all terms there are, also of units left out.
     """
-    used = terms.shape[1] if shape.bells else 1 + n_seen
-    given, part = terms[:, :used], _parts(units)
+    part = _parts(units)
     shift, left = np.zeros(terms.shape[1]), missed
     if shape.shift:
-        shift[:used], foreseen = _ridge(given, missed, part)
+        shift, foreseen = _ridge(terms, missed, part)
         left = missed - foreseen
     size = np.abs(left)
     floor = FLOOR * float(np.median(size)) or float(size.mean()) or 1.0
     log_scale = np.zeros(terms.shape[1])
     if shape.scale:
-        log_scale[:used], _ = _ridge(given, np.log(size + floor), part)
+        log_scale, _ = _ridge(terms, np.log(size + floor), part)
         log_scale[0] -= typical @ log_scale
     m, s = terms @ shift, terms @ log_scale
     low, high = np.quantile(s, [0.01, 0.999])

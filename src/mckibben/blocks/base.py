@@ -113,6 +113,11 @@ class Block(DrawsItself, Parametrised):
     undoing: ClassVar[bool] = False
     """Whether blocks of this class undo another, which `undone` gives."""
 
+    no_inverse: ClassVar[str] = (
+        "has no exact inverse. Remedy: use an invertible model (pi, gpi, mpi)."
+    )
+    """Why it cannot be undone and what to do instead, if it cannot: behind its kind, as an error."""
+
     increasing: ClassVar[tuple[str, ...]] = ()
     """Fields of numbers in increasing order, which single precision must not make one."""
 
@@ -296,9 +301,7 @@ class Block(DrawsItself, Parametrised):
         ModelError
             If this block has no inverse; the text says which condition fails and what to do.
         """
-        raise ModelError(
-            f"{self.kind!r} has no exact inverse. Remedy: use an invertible model (pi, gpi, mpi)."
-        )
+        raise ModelError(f"{self.kind!r} {self.no_inverse}")
 
     @property
     def undone(self) -> Block | None:

@@ -276,7 +276,7 @@ class Series(Composition):
     def example(cls) -> Self:
         """Return a modified Prandtl-Ishlinskii model: a PI model and a saturating curve."""
         from mckibben.blocks.hysteresis.pi import PI
-        from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
+        from mckibben.blocks.memoryless import PiecewiseLinear
 
         return cls((PI.example(), PiecewiseLinear.example()))
 

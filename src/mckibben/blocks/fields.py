@@ -22,7 +22,8 @@ def _plain(values: Any) -> Any:
     return tuple(values.tolist()) if isinstance(values, np.ndarray) else values
 
 
-def _plain_sequence(values: Any) -> Any:
+def plain_sequence(values: Any) -> Any:
+    """Return a list or an array as the tuple that a field keeps; anything else as it is."""
     values = _plain(values)
     return tuple(values) if isinstance(values, list) else values
 
@@ -30,11 +31,11 @@ def _plain_sequence(values: Any) -> Any:
 MOST_NUMBERS, MOST_COEFFICIENTS = 1_000_000, 1000
 """That a field may hold; polynomials, whose roots are sought, have fewer."""
 
-Vector = Annotated[tuple[FiniteFloat, ...], MaxLen(MOST_NUMBERS), BeforeValidator(_plain_sequence)]
+Vector = Annotated[tuple[FiniteFloat, ...], MaxLen(MOST_NUMBERS), BeforeValidator(plain_sequence)]
 """Finite numbers; arrays and lists are accepted and kept as a tuple."""
 
 Coefficients = Annotated[
-    tuple[FiniteFloat, ...], MaxLen(MOST_COEFFICIENTS), BeforeValidator(_plain_sequence)
+    tuple[FiniteFloat, ...], MaxLen(MOST_COEFFICIENTS), BeforeValidator(plain_sequence)
 ]
 """Those of a polynomial."""
 
@@ -42,7 +43,7 @@ Coefficients = Annotated[
 def rows(value: Any) -> Any:
     """Return a table of numbers as a field of a block holds it."""
     listed = value.tolist() if isinstance(value, np.ndarray) else value
-    return tuple(map(_plain_sequence, listed)) if isinstance(listed, tuple | list) else listed
+    return tuple(map(plain_sequence, listed)) if isinstance(listed, tuple | list) else listed
 
 
 Rows = Annotated[tuple[Vector, ...], BeforeValidator(rows)]

@@ -217,3 +217,38 @@ def eliminate(matrix: Array, right: Array) -> None:
             right[row] -= matrix[row, j] * right[j]
         scale = matrix[row, row]
         right[row] /= scale if scale != 0.0 else NOTHING
+
+
+@inlined
+def newton(
+    evaluate: Any,
+    slope: Any,
+    target: float,
+    low: float,
+    high: float,
+    start: float,
+    least_step: float,
+    memory: Any,
+) -> float:
+    """Return where a rising ``evaluate(x, memory)`` is the target, between two ends that bracket it.
+
+    Newton's method inside a shrinking bracket, with ``slope(x, value, memory)`` given the value there;
+    ends when the step is at most ``least_step``, or the bracket cannot shrink any further.
+    """
+    x = start
+    for _ in range(MOST_STEPS):
+        error = evaluate(x, memory) - target
+        if error == 0.0:
+            break
+        if error > 0.0:
+            high = x
+        else:
+            low = x
+        steepness = slope(x, error + target, memory)
+        candidate = x - error / steepness if steepness > 0.0 else low
+        if not low < candidate < high:
+            candidate = 0.5 * (low + high)
+        if abs(candidate - x) <= least_step or candidate in (low, high):
+            break
+        x = candidate
+    return x

@@ -153,7 +153,7 @@ def _started_elsewhere(block: Any, recording: Any) -> list[str]:
 
 def _parted(block: Any, interval: float | None) -> tuple[Any, Any]:
     """Return the model with its band, if one is asked for, and the model."""
-    from mckibben.blocks.bands.banded import Banded
+    from mckibben.blocks.bands import Banded
 
     if interval is None:
         return None, block.forward if isinstance(block, Banded) else block

@@ -87,7 +87,7 @@ def track(
     Beside it stands what no compensation does: pressures read off one slow rise of the same plant.
     """
     from mckibben.blocks.base import Block
-    from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+    from mckibben.blocks.feedback import FeedforwardFeedback
     from mckibben.blocks.saving import load
     from mckibben.control import (
         UNCOMPENSATED,
@@ -276,7 +276,7 @@ def _figures(tracked: Tracked | None) -> dict[str, object] | None:
 
 def _fits(block: Block, plant: Plant, reference: Recording) -> None:
     """Refuse a model in place of an inverse, and references without what the inverse needs."""
-    from mckibben.blocks.feedback.pid import MEASURED
+    from mckibben.blocks.feedback import MEASURED
     from mckibben.control.roles import driven_by
 
     for name in driven_by(block):

@@ -12,8 +12,7 @@ from mckibben.arrays import Array
 from mckibben.bands.finding import find_band
 from mckibben.bands.held import Held
 from mckibben.bands.scale import SHAPES
-from mckibben.blocks.bands.band import Band
-from mckibben.blocks.bands.banded import Banded
+from mckibben.blocks.bands import Band, Banded
 from mckibben.blocks.base import Block
 from mckibben.errors import DataError
 from mckibben.numerals import numeral

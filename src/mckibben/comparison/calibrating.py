@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.bands.finding import Found, Unit, find_band
 from mckibben.bands.held import Held
-from mckibben.blocks.bands.banded import Banded, inside
+from mckibben.blocks.bands import Banded, inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.inverse import commands
 from mckibben.comparison.free_run import refuse_runaway, run_free

@@ -10,8 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
 from mckibben.blocks.running import Stream
 from mckibben.control.preview import dead_time_undone
 

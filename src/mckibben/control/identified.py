@@ -6,7 +6,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from mckibben.blocks.bands.banded import Banded, inside
+from mckibben.blocks.bands import Banded, inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance_in import balance_in

@@ -10,8 +10,7 @@ from collections.abc import Callable
 
 from mckibben import registry
 from mckibben.blocks.base import Block
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.feedback import FeedforwardFeedback, PIDFeedback
 from mckibben.control.controller import Controller
 from mckibben.control.observer import DisturbanceObserver
 from mckibben.control.roles import Plant

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 
-from mckibben.blocks.bands.banded import inside
+from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.control.identified import known_ranges
 from mckibben.control.roles import Plant

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.feedback import PIDFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.inverse import COMMANDS
 from mckibben.control.roles import MOVED, Plant, actuated, resting

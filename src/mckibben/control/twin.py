@@ -2,7 +2,7 @@
 
     y[t] = P[u][t] + m(z) + s(z) w sign(g[t]) Q(|g[t]|),   (1 - r / q)² g = c n
 
-where P is the model; m, s, w and z are its band's (`mckibben.blocks.bands.band`), Q gives the score that
+where P is the model; m, s, w and z are its band's (`mckibben.blocks.bands`), Q gives the score that
 the share of |g| below it reaches, n is white and normal, 1 / q delays, and c makes g of variance 1. So
 the band at any level holds that share of the samples, or more, and r keeps them alike for as long as the
 misses were that calibration saw. No muscle jumps, so what is drawn does not either: Q rises straight
@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.blocks.bands.band import Band
-from mckibben.blocks.bands.banded import Banded, inside
+from mckibben.blocks.bands import Band, Banded, inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.inverse import commands, drives
 from mckibben.blocks.running import Stream

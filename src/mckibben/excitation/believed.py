@@ -11,7 +11,7 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
-from mckibben.blocks.bands.banded import inside
+from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.comparison.offered import default_model
 from mckibben.comparison.shared_rows import check_shared

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.blocks.bands.banded import inside
+from mckibben.blocks.bands import inside
 from mckibben.comparison.shared_rows import without_copies
 from mckibben.errors import DataError
 from mckibben.excitation.coupling import coupling

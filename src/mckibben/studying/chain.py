@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.feedback import MEASURED
 from mckibben.comparison.free_run import measured_start
 from mckibben.control.twin import COMMAND
 from mckibben.errors import ModelWarning

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.bands.banded import inside
+from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
 from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.control.twin import COMMAND
 from mckibben.errors import DataError, ModelError

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.bands.banded import inside
+from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.recording import Recording, listed
 from mckibben.signals.reversals import noise_level, reversals

@@ -12,7 +12,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.blocks.memoryless.negative import Negative
+from mckibben.blocks.memoryless import Negative
 from mckibben.recording import Recording
 from mckibben.validation.residuals import Run
 

@@ -33,10 +33,10 @@ from mckibben.blocks.adaptive.learning import (
 )
 from mckibben.blocks.base import Block, Cost, Kernel, Start, explicit_state, needs_sample_time
 from mckibben.blocks.compose import Series
-from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.feedback import MEASURED
 from mckibben.blocks.fields import STRICT, Channel, Initial, Vector, vector
 from mckibben.blocks.inverse import Inverse
-from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 

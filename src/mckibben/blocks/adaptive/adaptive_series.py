@@ -22,7 +22,7 @@ from mckibben.blocks.adaptive.adaptive import Adaptive, check_settings, learner_
 from mckibben.blocks.adaptive.drift import Drift
 from mckibben.blocks.base import Block, Board, Run
 from mckibben.blocks.compose import Composition, Series
-from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.feedback import MEASURED
 from mckibben.blocks.fields import STRICT, Channel, Initial, Vector
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.saving import nested

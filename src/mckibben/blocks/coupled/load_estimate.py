@@ -27,7 +27,7 @@ from mckibben.blocks.coupled.balance_law import begin, keep, unbalanced
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.blocks.fields import STRICT, Channel
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError

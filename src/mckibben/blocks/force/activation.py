@@ -1,31 +1,379 @@
-"""What models of the pressure for a contraction share: a force that schedules them, a filtered rate."""
+"""Activation pressure: what gives a contraction under a force that schedules it.
+
+Both models add a static pressure and a hysteresis, with the rate of the contraction, measured and
+noisy, through an optional first-order filter. The published one has all its hysteresis in the rate,
+and is bound to the frequency of a test signal; ours carries dry friction by operators, and is bound to
+none.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from typing import Annotated, ClassVar, Self
 
-from mckibben.blocks.base import Block, Ports
+import numpy as np
+from annotated_types import Ge, Interval
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.fields import (
+    CONTRACTION,
+    FORCE,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
+PORTS: Ports = ("input",), ("force",), ("output",)
 
-class Activation(Block):
-    """From contraction, at a force that schedules it, to pressure; it depends on a filtered rate."""
+UNDOES_A_MUSCLE = (
+    "has no inverse here: it already gives the pressure for a contraction. Remedy: use it as the "
+    "compensator, or fit pressure to contraction by another model."
+)
 
+
+def rate_filter(time_constant: float, step: float) -> tuple[float, float]:
+    """Return what the filter of the rate keeps over a step, and its gain of the input's change."""
+    smoothing = math.exp(-step / time_constant) if time_constant > 0 else 0.0
+    return smoothing, (1 - smoothing) / step
+
+
+# -- the published model ---------------------------------------------------------------------
+
+POINTS = 4
+
+
+@kernel
+def cubic(coefficients: Array, first: int, x: float) -> float:
+    """Return the cubic whose coefficients, highest power first, start at ``first``."""
+    return (
+        (coefficients[first] * x + coefficients[first + 1]) * x + coefficients[first + 2]
+    ) * x + coefficients[first + 3]
+
+
+@kernel
+def lagrange(e: float, own: float, one: float, two: float, three: float) -> float:
+    """Return the polynomial that is 1 at ``own`` and 0 at three other places."""
+    return (e - one) / (own - one) * ((e - two) / (own - two)) * ((e - three) / (own - three))
+
+
+@step
+def activation_pressure_step(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; the state is [previous contraction, filtered rate].
+
+    Coefficients are [smoothing, gain of the rate, gamma, phi (4), contractions (16), pressures
+    (16)].
+    """
+    e, force = inputs[0], inputs[1]
+    rate = coefficients[0] * state[1] + coefficients[1] * (e - state[0])
+    one, two = cubic(coefficients, 7, force), cubic(coefficients, 11, force)
+    three, four = cubic(coefficients, 15, force), cubic(coefficients, 19, force)
+    y = lagrange(e, one, two, three, four) * cubic(coefficients, 23, force)
+    y += lagrange(e, two, one, three, four) * cubic(coefficients, 27, force)
+    y += lagrange(e, three, one, two, four) * cubic(coefficients, 31, force)
+    y += lagrange(e, four, one, two, three) * cubic(coefficients, 35, force)
+    outputs[0] = y + coefficients[2] * cubic(coefficients, 3, force) * rate
+    state[0], state[1] = e, rate
+
+
+@kernel
+def activation_pressure_start(
+    coefficients: Array, state: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start at rest at the first contraction."""
+    state[0], state[1] = inputs[0], 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class ActivationPressure(Block):
+    """Pressure that gives a contraction under a force, at one frequency of excitation.
+
+    Source: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and
+    Particle Swarm Optimization", Eqs. (2) to (15).
+
+    Parameters
+    ----------
+    contractions : sequence of float, length 16
+        Cubics of the force, a b c d with a of the third power, for e_1 to e_4: at the lowest point,
+        the highest, the inflection and the tangent.
+    pressures : sequence of float, length 16
+        The same for y_1 to y_4 [bar].
+    phi : sequence of float, length 4
+        Cubic of the force [bar s].
+    gamma : (float, float)
+        Slope [1/Hz] and constant of gamma by frequency.
+    frequency : float
+        Of the excitation [Hz]; not negative.
+    rate_time_constant : float
+        Of the filter of the rate [s]; 0 for none.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest.
+    input, force, output : Channel
+        Contraction, force and pressure.
+    """
+
+    kind: ClassVar[str] = "activation-pressure"
+    ports: ClassVar[Ports] = PORTS
+    kernel: ClassVar[Kernel] = activation_pressure_step
+    start_kernel: ClassVar[Start] = activation_pressure_start
     rate_dependent: ClassVar[bool] = True
-    ports: ClassVar[Ports] = ("input",), ("force",), ("output",)
+    no_inverse: ClassVar[str] = UNDOES_A_MUSCLE
+    parameters: ClassVar[tuple[str, ...]] = ("contractions", "pressures", "phi", "gamma")
+    notation: ClassVar[Notation] = Notation(
+        r"p = \sum_{k=0}^{3} b_k(F)\, \epsilon^k + \gamma\, \phi(F)\, \dot{\epsilon}",
+        r"\text{the cubic goes through } (\epsilon_j(F),\, y_j(F)),\; j = 1, \ldots, 4,\; "
+        r"\text{each coordinate a cubic of } F",
+        r"\gamma = \gamma_1 \nu + \gamma_2,\quad \phi(F) = \phi_1 F^3 + \phi_2 F^2 + "
+        r"\phi_3 F + \phi_4",
+        contractions=r"\epsilon_k [1/N^3|1/N^2|1/N|1]",
+        pressures="y_k [bar/N^3|bar/N^2|bar/N|bar]",
+        phi=r"\phi_k [bar s/N^3|bar s/N^2|bar s/N|bar s]",
+        gamma=r"\gamma_k [1/Hz|1]",
+        frequency=r"\nu [Hz]",
+        rate_time_constant="T [s]",
+        input=r"\epsilon",
+        force="F",
+        output="p",
+    )
 
-    rate_time_constant: float
+    contractions: Vector
+    pressures: Vector
+    phi: Vector
+    gamma: tuple[FiniteFloat, FiniteFloat]
+    frequency: Annotated[FiniteFloat, Ge(0)]
+    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = CONTRACTION
+    force: ChannelField = FORCE
+    output: ChannelField = PRESSURE
 
-    def rate_filter(self, step: float) -> tuple[float, float]:
-        """Return what the filter of the rate keeps over a step, and its gain of the input's change."""
-        tau = self.rate_time_constant
-        smoothing = math.exp(-step / tau) if tau > 0 else 0.0
-        return smoothing, (1 - smoothing) / step
+    def __post_init__(self) -> None:
+        sizes = (len(self.contractions), len(self.pressures), len(self.phi))
+        if sizes != (4 * POINTS, 4 * POINTS, 4):
+            raise ModelError(
+                f"{self.kind!r} has {sizes} coefficients of contractions, pressures and phi. Remedy: "
+                f"give {4 * POINTS}, {4 * POINTS} and 4."
+            )
 
-    def inverse(self) -> Block:
-        """Refuse: this model is itself the inverse of a muscle."""
-        raise ModelError(
-            f"{self.kind!r} has no inverse here: it already gives the pressure for a contraction. "
-            "Remedy: use it as the compensator, or fit pressure to contraction by another model."
+    @property
+    def n_states(self) -> int:
+        """Previous contraction and filtered rate."""
+        return 2
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        step = needs_sample_time(self.kind, sample_time)
+        rate = rate_filter(self.rate_time_constant, step)
+        gamma = self.gamma[0] * self.frequency + self.gamma[1]
+        return np.array([*rate, gamma, *self.phi, *self.contractions, *self.pressures])
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a model for contractions and forces of a few units."""
+        return cls(
+            (
+                *(0.0, 0.0, 0.0, -1.0),
+                *(0.0, 0.0, 0.01, 6.0),
+                *(0.0, 0, 0, 2.0),
+                *(0, 0.001, 0, 4.0),
+            ),
+            (*(0.0, 0.0, 0.1, 0.2), *(0.0, 0.0, 0.1, 4.0), *(0.0, 0, 0.1, 1.0), *(0, 0, 0.1, 2.0)),
+            (0.0, 0.0, 0.01, 0.3),
+            (0.27, 0.67),
+            1.0,
+        )
+
+
+# -- the model with memory -------------------------------------------------------------------
+
+
+@step
+def activation_memory_step(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; the state is [play operators, previous contraction, filtered rate, x_m].
+
+    Coefficients are [smoothing, gain of the rate, contraction's centre and scale, force's centre
+    and scale, degree by contraction, degree by force, number of x_m, c row by row, thresholds, a,
+    b, d, g, h, decays of x_m].
+    """
+    degree, by_force, m = int(coefficients[6]), int(coefficients[7]), int(coefficients[8])
+    n = state.size - 2 - m
+    thresholds = 9 + (degree + 1) * (by_force + 1)
+    surface, r = coefficients[9:thresholds], coefficients[thresholds:]
+    friction = r[n:]
+    viscosity = friction[2 * n :]
+    relaxation = viscosity[2:]
+    decays = relaxation[2 * m :]
+    followers = state[n + 2 :]
+    e = inputs[0]
+    x = (e - coefficients[2]) / coefficients[3]
+    f = (inputs[1] - coefficients[4]) / coefficients[5]
+    rate = coefficients[0] * state[n + 1] + coefficients[1] * (e - state[n])
+    p = 0.0
+    for i in range(degree, -1, -1):
+        row = 0.0
+        for j in range(by_force, -1, -1):
+            row = row * f + surface[i * (by_force + 1) + j]
+        p = p * x + row
+    for k in range(n):
+        state[k] = min(max(state[k], e - r[k]), e + r[k])
+        p += (friction[k] + f * friction[n + k]) * (e - state[k])
+    p += (viscosity[0] + f * viscosity[1]) * rate
+    for k in range(m):
+        followers[k] = decays[k] * followers[k] + (1.0 - decays[k]) * x
+        p += (relaxation[k] + f * relaxation[m + k]) * (followers[k] - x)
+    state[n], state[n + 1] = e, rate
+    outputs[0] = p
+
+
+@kernel
+def activation_memory_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start where the contraction has only risen to the first one, or has never moved."""
+    m = int(coefficients[8])
+    n = state.size - 2 - m
+    thresholds = 9 + (int(coefficients[6]) + 1) * (int(coefficients[7]) + 1)
+    e = inputs[0]
+    for k in range(n):
+        state[k] = e if virgin else e - coefficients[thresholds + k]
+    state[n], state[n + 1] = e, 0.0
+    state[n + 2 :] = (e - coefficients[2]) / coefficients[3]
+
+
+@dataclass(frozen=True, config=STRICT)
+class ActivationMemory(Block):
+    """Pressure that gives a contraction under a force, whatever the frequency.
+
+    Dry friction is carried by stop operators, which keep it while the muscle rests and through minor
+    loops; what follows the contraction relaxes as a visco-elastic muscle does.
+
+    Parameters
+    ----------
+    surface : sequence of float, length (degree + 1) (force_degree + 1)
+        c [bar], for every power of the contraction all powers of the force, ascending.
+    thresholds : sequence of float, length K
+        Of the operators, in contraction: 0 < r_0 < r_1 < ...
+    friction : sequence of float, length 2 K
+        a, then b [bar per contraction].
+    viscosity : (float, float)
+        d [bar s].
+    relaxation : sequence of float, length 2 M
+        g, then h [bar].
+    time_constants : sequence of float, length M
+        tau [s], positive.
+    degree, force_degree : int
+        Of the surface.
+    input_scale, force_scale : (float, float)
+        Centre and half the range of contraction and force [N]; the latter positive.
+    rate_time_constant : float
+        Of the filter of the rate [s]; 0 for none.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: the contraction has only risen, or has never moved.
+    input, force, output : Channel
+        Contraction, force and pressure.
+    """
+
+    kind: ClassVar[str] = "activation-memory"
+    ports: ClassVar[Ports] = PORTS
+    kernel: ClassVar[Kernel] = activation_memory_step
+    start_kernel: ClassVar[Start] = activation_memory_start
+    rate_dependent: ClassVar[bool] = True
+    no_inverse: ClassVar[str] = UNDOES_A_MUSCLE
+    parameters: ClassVar[tuple[str, ...]] = ("surface", "friction", "viscosity", "relaxation")
+    notation: ClassVar[Notation] = Notation(
+        r"p = \sum_{ij} c_{ij} x^i f^j + \sum_k (a_k + b_k f) S_k[\epsilon] + (d_0 + d_1 "
+        r"f) \dot{\epsilon} + \sum_m (g_m + h_m f)(x_m - x)",
+        r"x = (\epsilon - \epsilon_1) / \epsilon_2,\quad f = (F - F_1) / F_2,\quad "
+        r"S_k[\epsilon] = \epsilon - F_{r_k}[\epsilon],\quad \tau_m \dot{x}_m = x - x_m",
+        surface="c_k [bar]",
+        thresholds="r_k",
+        friction="a_k [bar]",
+        viscosity="d_k from 0 [bar s]",
+        relaxation="g_k [bar]",
+        time_constants=r"\tau_m [s]",
+        input_scale=r"\epsilon_i",
+        force_scale="F_i [N]",
+        rate_time_constant="T [s]",
+        input=r"\epsilon",
+        force="F",
+        output="p",
+    )
+
+    surface: Vector
+    thresholds: Vector
+    friction: Vector
+    viscosity: tuple[FiniteFloat, FiniteFloat]
+    relaxation: Vector
+    time_constants: Vector
+    degree: Annotated[int, Interval(ge=0, le=9)]
+    force_degree: Annotated[int, Interval(ge=0, le=9)]
+    input_scale: tuple[FiniteFloat, FiniteFloat]
+    force_scale: tuple[FiniteFloat, FiniteFloat]
+    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = CONTRACTION
+    force: ChannelField = FORCE
+    output: ChannelField = PRESSURE
+
+    def __post_init__(self) -> None:
+        size = (self.degree + 1) * (self.force_degree + 1)
+        r = np.array(self.thresholds)
+        if len(self.surface) != size or len(self.friction) != 2 * r.size:
+            raise ModelError(
+                f"{self.kind!r} has {len(self.surface)} numbers in its surface and "
+                f"{len(self.friction)} of friction. Remedy: give {size} and {2 * r.size}."
+            )
+        if np.any(np.diff(r, prepend=0.0) <= 0):
+            raise ModelError(
+                f"the thresholds of {self.kind!r} are not 0 < r_0 < r_1 < ... "
+                "Remedy: sort them and drop repeated ones."
+            )
+        taus = self.time_constants
+        if len(self.relaxation) != 2 * len(taus) or min(taus, default=1.0) <= 0:
+            raise ModelError(
+                f"{self.kind!r} has {len(self.relaxation)} numbers of relaxation and the time constants "
+                f"{taus}. Remedy: give two to every positive time constant."
+            )
+        if not (self.input_scale[1] > 0 and self.force_scale[1] > 0):
+            raise ModelError(
+                f"{self.kind!r} has a scale that is not positive. Remedy: give (centre, half range)."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """Operators, previous contraction, filtered rate, and what follows."""
+        return len(self.thresholds) + 2 + len(self.time_constants)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        step = needs_sample_time(self.kind, sample_time)
+        rate = rate_filter(self.rate_time_constant, step)
+        scales = [*self.input_scale, *self.force_scale]
+        counts = [self.degree, self.force_degree, len(self.time_constants)]
+        operators = [*self.thresholds, *self.friction]
+        decays = np.exp(-step / np.array(self.time_constants))
+        slow = [*self.viscosity, *self.relaxation, *decays]
+        return np.array([*rate, *scales, *counts, *self.surface, *operators, *slow])
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a model for contractions and forces of a few units."""
+        return cls(
+            surface=(2.0, 0.5, 1.5, 0.1, 0.2, 0.0),
+            thresholds=(0.2, 0.8),
+            friction=(0.3, 0.2, 0.1, 0.0),
+            viscosity=(0.05, 0.01),
+            relaxation=(0.1, 0.02),
+            time_constants=(0.5,),
+            degree=2,
+            force_degree=1,
+            input_scale=(2.5, 2.5),
+            force_scale=(2.5, 2.5),
         )

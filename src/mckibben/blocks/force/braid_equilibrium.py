@@ -1,12 +1,11 @@
 """Where a braided muscle comes to rest: pressure against load and elasticity; and its inverse.
 
 p A g(e) = load + stiffness e + hardening e^3,  g(e) = a (1 - e)^2 - b,
-a = 3 / tan(angle)^2,  b = 1 / sin(angle)^2,  displacement = rest_length e + offset,
+displacement = rest_length e + offset,
 
-with A the muscle's cross-section at rest. Sources: Chou and Hannaford 1996; Tondu and Lopez 2000
-(braid geometry). The balance gives the pressure of a contraction in closed form, so it is the
-inverse that is explicit; forward it is solved for every sample by Newton's method inside a
-shrinking bracket.
+with A, a and b of the braid (`mckibben.blocks.force.laws.braid`). Sources: Chou and Hannaford 1996;
+Tondu and Lopez 2000 (braid geometry). The balance gives the pressure of a contraction in closed form,
+so it is the inverse that is explicit; forward it is solved for every sample.
 """
 
 from __future__ import annotations
@@ -15,19 +14,18 @@ import math
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from annotated_types import Gt, Interval
+from annotated_types import Ge, Gt, Interval
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Kernel, Start
-from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, Initial
+from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField
+from mckibben.blocks.force.laws import braid
 from mckibben.blocks.inverse import Invertible, nothing_clipped
 from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
 from mckibben.blocks.notation import Notation
-
-NEWTONS_PER_BAR = 0.1
-"""Force of one bar on one square millimetre [N]."""
+from mckibben.blocks.solving import newton
 
 SHARE = 0.995
 """Of the contraction at which the braid pulls no more: the furthest that the muscle goes."""
@@ -47,6 +45,13 @@ def balance(e: float, c: Array) -> float:
     return (c[0] + e * (c[1] + c[2] * e * e)) / (c[3] * (c[4] * (1.0 - e) ** 2 - c[5]))
 
 
+@kernel
+def balance_slope(e: float, p: float, c: Array) -> float:
+    """Return how that pressure rises with the contraction, given it."""
+    pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
+    return (c[1] + 3.0 * c[2] * e * e + p * 2.0 * c[3] * c[4] * (1.0 - e)) / pull
+
+
 @step
 def braid_equilibrium_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
@@ -59,28 +64,13 @@ def braid_equilibrium_step(
     c = coefficients
     p = inputs[0]
     low, high = c[6], c[7]
-    e = min(max(0.0, low), high)
     if p <= balance(low, c):
         e = low
     elif p >= balance(high, c):
         e = high
     else:
-        for _ in range(200):
-            error = balance(e, c) - p
-            if error == 0.0:
-                break
-            if error > 0.0:
-                high = e
-            else:
-                low = e
-            pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
-            slope = (c[1] + 3.0 * c[2] * e * e + (error + p) * 2.0 * c[3] * c[4] * (1.0 - e)) / pull
-            candidate = e - error / slope if slope > 0.0 else low
-            if not low < candidate < high:
-                candidate = 0.5 * (low + high)
-            if abs(candidate - e) <= STILL or candidate in (low, high):
-                break
-            e = candidate
+        start = min(max(0.0, low), high)
+        e = newton(balance, balance_slope, p, low, high, start, STILL, c)
         if DERIVED:
             e = improved(balance, p, e, c)
     outputs[0] = c[8] * e + c[9]
@@ -135,7 +125,6 @@ class BraidEquilibrium(Invertible):
         "rest_length",
         "offset",
     )
-    initial: ClassVar[Initial] = "first_sample"
     notation: ClassVar[Notation] = Notation(
         r"p A \left(a (1 - \epsilon)^2 - b\right) = F + k \epsilon + h \epsilon^3,\quad A "
         r"= \frac{\pi d^2}{4}",
@@ -152,8 +141,8 @@ class BraidEquilibrium(Invertible):
     )
 
     load: Annotated[FiniteFloat, Gt(0)]
-    stiffness: Annotated[FiniteFloat, Interval(ge=0)]
-    hardening: Annotated[FiniteFloat, Interval(ge=0)]
+    stiffness: Annotated[FiniteFloat, Ge(0)]
+    hardening: Annotated[FiniteFloat, Ge(0)]
     braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95)]
     rest_length: Annotated[FiniteFloat, Gt(0)]
     offset: FiniteFloat = 0.0
@@ -168,10 +157,7 @@ class BraidEquilibrium(Invertible):
         return float(balance(c[6], c)), float(balance(c[7], c))
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads."""
-        del sample_time
-        a, b = 3.0 / math.tan(self.braid_angle) ** 2, 1.0 / math.sin(self.braid_angle) ** 2
-        area = 0.25 * math.pi * self.diameter**2 * NEWTONS_PER_BAR
+        area, a, b = braid(self.braid_angle, self.diameter)
         largest = SHARE * (1.0 - math.sqrt(b / a))
         # below, the bladder would have to pull harder than the load
         least = LEAST
@@ -181,12 +167,10 @@ class BraidEquilibrium(Invertible):
         return np.array([*head, self.rest_length, self.offset])
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the displacements at the least and largest contraction, each of shape (1,)."""
         c = self.coefficients(None)
         return np.array([c[8] * c[6] + c[9]]), np.array([c[8] * c[7] + c[9]])
 
     def inverse_numbers(self, own: Array) -> Array:
-        """Return those of this model."""
         return own
 
     @classmethod

@@ -1,4 +1,4 @@
-"""The pressure that gives a wished-for force at a measured length, in closed form.
+"""The pressure that gives a desired force at a measured length, in closed form.
 
 f = p g(l) + h(l) + s(p) f_h(l, l'), s(p) = 1 + gain (p - reference), is linear in p, so
 p = (f - h - f_h (1 - gain reference)) / (g + gain f_h). This is the feedforward compensation of
@@ -19,13 +19,12 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Kernel, Start
 from mckibben.blocks.compose import Parallel
 from mckibben.blocks.fields import STRICT, Channel, Initial
-from mckibben.blocks.force.law import ForceLaw
+from mckibben.blocks.force.laws import ForceLaw, PolynomialForce
 from mckibben.blocks.force.multistate_friction import (
     MultistateFriction,
     multistate_friction_start,
     multistate_friction_step,
 )
-from mckibben.blocks.force.polynomial_force import PolynomialForce
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.saving import nested
@@ -78,7 +77,7 @@ def kernels_of(law: type[ForceLaw]) -> tuple[Step, Start]:
 
 @dataclass(frozen=True, config=STRICT)
 class ForceFeedforward(Block):
-    """Pressure by wished-for force and measured length.
+    """Pressure by desired force and measured length.
 
     Parameters
     ----------
@@ -106,11 +105,6 @@ class ForceFeedforward(Block):
                 "pressure."
             )
 
-    @property
-    def undone(self) -> Block:
-        """The force, of the law alone or with friction."""
-        return self.law if self.friction is None else Parallel((self.law, self.friction))
-
     @classmethod
     def of(cls, model: Block) -> Self | None:
         """Return the feedforward of a model of force, or None if the model is another.
@@ -133,28 +127,38 @@ class ForceFeedforward(Block):
         return None
 
     @property
+    def undone(self) -> Block:
+        """The force, of the law alone or with friction."""
+        return self.law if self.friction is None else Parallel((self.law, self.friction))
+
+    @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
         """Whether there is friction."""
         return self.friction is not None
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
-        """Force wished for, then length."""
+        """Desired force, then length."""
         return (self.law.output, self.law.input)
 
     @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Pressure."""
-        return (self.law.pressure,)
-
-    @property
     def scheduling(self) -> tuple[str, ...]:
-        """Length."""
         return (self.law.input.name,)
 
     @property
+    def outputs(self) -> tuple[Channel, ...]:
+        return (self.law.pressure,)
+
+    @property
+    def kernel(self) -> Kernel:  # type: ignore[override]
+        return kernels_of(type(self.law))[0]
+
+    @property
+    def start_kernel(self) -> Start | None:  # type: ignore[override]
+        return None if self.friction is None else kernels_of(type(self.law))[1]
+
+    @property
     def n_states(self) -> int:
-        """Those of the friction."""
         return 0 if self.friction is None else self.friction.n_states
 
     @property
@@ -163,27 +167,15 @@ class ForceFeedforward(Block):
         return 3 + (0 if self.friction is None else self.friction.n_scratch)
 
     @property
-    def kernel(self) -> Kernel:  # type: ignore[override]
-        """That of its kind of law."""
-        return kernels_of(type(self.law))[0]
-
-    @property
-    def start_kernel(self) -> Start | None:  # type: ignore[override]
-        """That of its kind of law, if there is friction."""
-        return None if self.friction is None else kernels_of(type(self.law))[1]
-
-    @property
     def start(self) -> Initial:
-        """The friction's."""
         return self.law.start if self.friction is None else self.friction.start
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [size of the law's, the law's], then the friction's."""
         law = self.law.coefficients(sample_time)
-        own = [law.size, *law]
-        if self.friction is not None:
-            own += self.friction.coefficients(sample_time).tolist()
-        return np.array(own)
+        own = np.array([law.size, *law])
+        if self.friction is None:
+            return own
+        return np.append(own, self.friction.coefficients(sample_time))
 
     @classmethod
     def example(cls) -> Self:
@@ -192,9 +184,7 @@ class ForceFeedforward(Block):
 
 
 def compensator(model: Block) -> Block:
-    """Return what gives a model's commands for a wished-for output: of a force its feedforward.
-
-    Of any other model that is its inverse.
+    """Return what gives a model's commands for a desired output: a feedforward, or the inverse.
 
     Raises
     ------

@@ -38,18 +38,30 @@ from mckibben.blocks.fields import (
     ChannelField,
     StoredInitial,
     Vector,
+    plain_sequence,
 )
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.notation import Notation, tex, with_unit
 from mckibben.errors import ModelError
 
 Direction = Literal["shared", "both", "lengthening", "shortening"]
-SIZES: dict[str, int] = {"shared": 5, "both": 6, "lengthening": 3, "shortening": 3}
+WAYS = ("lengthening", "shortening")
+QUANTITIES = ("k [N/mm]", "sigma [N s/mm]", "F_c [N]")
+"""Numbers of an element in one direction; first come those of lengthening, then those of shortening."""
+
+PLACES: dict[Direction, tuple[int, ...]] = {
+    "shared": (0, 1, 2, 4, 5),
+    "both": (0, 1, 2, 3, 4, 5),
+    "lengthening": (0, 1, 2),
+    "shortening": (3, 4, 5),
+}
+"""Which of these six the values of an element are. Without its own, a direction has the k and sigma of
+the other, and no F_c."""
+
+SIZES = {element: len(places) for element, places in PLACES.items()}
 ELEVEN: tuple[Direction, ...] = ("shared", "shortening", "shortening")
 EACH_WAY: tuple[Direction, ...] = ("shared", "lengthening", "shortening")
 EIGHTEEN: tuple[Direction, ...] = ("both", "both", "both")
-QUANTITIES = ("k [N/mm]", "sigma [N s/mm]", "F_c [N]")
-"""Numbers of an element in one direction."""
 
 
 @kernel
@@ -132,10 +144,6 @@ def multistate_friction_start(
     state[n] = inputs[0]
 
 
-def _directions(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else value
-
-
 @dataclass(frozen=True, config=STRICT)
 class MultistateFriction(Block):
     """Friction force by length, with elements that switch with the direction of motion.
@@ -164,6 +172,10 @@ class MultistateFriction(Block):
     kernel: ClassVar[Kernel] = multistate_friction_step
     start_kernel: ClassVar[Start] = multistate_friction_start
     rate_dependent: ClassVar[bool] = True
+    no_inverse: ClassVar[str] = (
+        "has no inverse: while it slips, one force belongs to many lengths. Remedy: compensate it by "
+        "ForceFeedforward(law, friction), in closed form."
+    )
     notation: ClassVar[Notation] = Notation(
         r"f = \left(1 + g_p (p - p_r)\right) \sum_i \operatorname{sat}(F_{c,i},\, k_i x_i "
         r"+ \sigma_i \dot{l})",
@@ -177,7 +189,7 @@ class MultistateFriction(Block):
         output="f",
     )
 
-    elements: Annotated[tuple[Direction, ...], BeforeValidator(_directions)]
+    elements: Annotated[tuple[Direction, ...], BeforeValidator(plain_sequence)]
     values: Vector
     pressure_gain: FiniteFloat = 0.0
     reference_pressure: FiniteFloat = 0.0
@@ -202,16 +214,13 @@ class MultistateFriction(Block):
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """Element, direction and quantity, with its unit, of every value."""
-        names: list[str] = []
-        for place, element in enumerate(self.elements, start=1):
-            both = element in ("shared", "both")
-            for way in ("lengthening", "shortening") if both else (element,):
-                names += [f"element {place}, {way}: {quantity}" for quantity in QUANTITIES]
-            if element == "shared":
-                names[-6:] = [f"element {place}: {QUANTITIES[0]}", *names[-5:-3], *names[-2:]]
-        if self.pressure_gain != 0:
-            names.append("pressure gain [1/bar]")
-        return tuple(names)
+        names = []
+        for number, element in enumerate(self.elements, start=1):
+            for place in PLACES[element]:
+                both = element == "shared" and place == 0
+                way = "" if both else f", {WAYS[place // 3]}"
+                names.append(f"element {number}{way}: {QUANTITIES[place % 3]}")
+        return (*names, "pressure gain [1/bar]") if self.pressure_gain != 0 else tuple(names)
 
     @property
     def n_states(self) -> int:
@@ -220,17 +229,13 @@ class MultistateFriction(Block):
 
     def table(self) -> Array:
         """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where inactive."""
-        rows, values = [], list(self.values)
-        for element in self.elements:
-            own, values = values[: SIZES[element]], values[SIZES[element] :]
-            if element == "shared":
-                own = [*own[:3], own[0], *own[3:]]
-            elif element == "lengthening":
-                own = [*own, own[0], own[1], 0.0]
-            elif element == "shortening":
-                own = [own[0], own[1], 0.0, *own]
-            rows.append(own)
-        return np.array(rows)
+        table, values = np.full((len(self.elements), 6), np.nan), iter(self.values)
+        for row, element in zip(table, self.elements, strict=True):
+            for place in PLACES[element]:
+                row[place] = next(values)
+        other = np.roll(table, 3, axis=1)
+        other[:, [2, 5]] = 0.0
+        return np.where(np.isnan(table), other, table)
 
     @property
     def n_scratch(self) -> int:
@@ -238,22 +243,9 @@ class MultistateFriction(Block):
         return len(self.elements)
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [sample time, pressure gain, reference pressure, table].
-
-        Raises
-        ------
-        ModelError
-            Without a sample time.
-        """
+        """Return [sample time, pressure gain, reference pressure, table]."""
         step = needs_sample_time(self.kind, sample_time)
         return np.array([step, self.pressure_gain, self.reference_pressure, *self.table().ravel()])
-
-    def inverse(self) -> Block:
-        """Refuse: one force belongs to many lengths."""
-        raise ModelError(
-            f"{self.kind!r} has no inverse: while it slips, one force belongs to many lengths. Remedy: "
-            "compensate it by ForceFeedforward(law, friction), in closed form."
-        )
 
     def worked(self) -> tuple[str, ...]:
         """Return the numbers of every element in each direction."""

@@ -36,7 +36,7 @@ from mckibben.blocks.fields import (
 from mckibben.blocks.hysteresis.bouc_wen_flow import flow
 from mckibben.blocks.hysteresis.differential_loop import BoucWenLoop, bouc_wen_start
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
+from mckibben.blocks.memoryless import least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solve_sample, solved_start
 

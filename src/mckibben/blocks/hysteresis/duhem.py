@@ -35,7 +35,7 @@ from mckibben.blocks.fields import (
 from mckibben.blocks.hysteresis.differential_loop import Loop
 from mckibben.blocks.inverse import check_input_range
 from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.memoryless.reversible import polynomial_at
+from mckibben.blocks.memoryless import polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solve_sample, solved_start
 from mckibben.errors import ModelError

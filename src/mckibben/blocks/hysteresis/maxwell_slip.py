@@ -35,7 +35,7 @@ from mckibben.blocks.fields import (
 from mckibben.blocks.hysteresis.play_operators import check_thresholds
 from mckibben.blocks.inverse import Invertible, check_input_range
 from mckibben.blocks.kernels import accumulate, kernel, step
-from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
+from mckibben.blocks.memoryless import least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solve_input, solved_start
 from mckibben.errors import ModelError

@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.memoryless import Affine
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
 

@@ -14,8 +14,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel, vector
-from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.memoryless.polynomial import Polynomial
+from mckibben.blocks.memoryless import PiecewiseLinear, Polynomial
 from mckibben.errors import ModelError
 
 

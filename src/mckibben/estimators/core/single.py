@@ -12,7 +12,7 @@ import numpy as np
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.memoryless.negative import Negative
+from mckibben.blocks.memoryless import Negative
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Estimator, resting

@@ -20,8 +20,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.load_estimate import parts_of
 from mckibben.blocks.fields import rows
-from mckibben.blocks.memoryless.affine import Affine
-from mckibben.blocks.memoryless.contact import LOST, Contact
+from mckibben.blocks.memoryless import LOST, Affine, Contact
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Grid

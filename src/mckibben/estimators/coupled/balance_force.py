@@ -16,7 +16,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.memoryless import Affine
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import ErrorsUnknown
 from mckibben.estimators.core.single import SingleEstimator

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.memoryless.contact import Contact
+from mckibben.blocks.memoryless import Contact
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_loads import check_loads, with_own_loads
 from mckibben.estimators.coupled.balance_prior import likely

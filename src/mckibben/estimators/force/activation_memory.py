@@ -11,7 +11,7 @@ from annotated_types import Ge, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
-from mckibben.blocks.force.activation_memory import ActivationMemory
+from mckibben.blocks.force.activation import ActivationMemory
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import SeparableEstimator

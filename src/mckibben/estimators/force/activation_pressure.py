@@ -16,7 +16,7 @@ from annotated_types import Ge
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
-from mckibben.blocks.force.activation_pressure import ActivationPressure
+from mckibben.blocks.force.activation import ActivationPressure
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.searching import SearchingEstimator
 from mckibben.estimators.core.uncertainty import simulate_all

@@ -13,7 +13,7 @@ from annotated_types import Ge, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.force.law import ForceLaw
+from mckibben.blocks.force.laws import ForceLaw
 from mckibben.blocks.force.multistate_friction import (
     EACH_WAY,
     EIGHTEEN,

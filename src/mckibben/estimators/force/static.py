@@ -11,10 +11,13 @@ from annotated_types import Gt
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel, vector
-from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
-from mckibben.blocks.force.chou_hannaford import ChouHannaford
-from mckibben.blocks.force.polynomial_force import PolynomialForce
-from mckibben.blocks.force.tondu_lopez import MU_DECAY, TonduLopez
+from mckibben.blocks.force.laws import (
+    MU_DECAY,
+    NEWTONS_PER_BAR,
+    ChouHannaford,
+    PolynomialForce,
+    TonduLopez,
+)
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.presets import preset

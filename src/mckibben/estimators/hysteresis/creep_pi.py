@@ -17,7 +17,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.memoryless.logarithm import Logarithm
+from mckibben.blocks.memoryless import Logarithm
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.output_maps import PolynomialMap

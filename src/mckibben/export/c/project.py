@@ -15,7 +15,7 @@ import numpy as np
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
-from mckibben.blocks.laws.trial import input_limits, wander
+from mckibben.blocks.laws import input_limits, wander
 from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.export.c.serving import Serving, served, served_files

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mckibben.blocks.base import Block
-from mckibben.blocks.laws.trial import input_limits
+from mckibben.blocks.laws import input_limits
 from mckibben.blocks.saving import to_dict, to_text
 from mckibben.errors import DataError, ModelError
 from mckibben.export.c.project import described, source_files

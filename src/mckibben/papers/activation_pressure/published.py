@@ -6,7 +6,7 @@ Particle Swarm Optimization", Tables 1 and 2.
 
 from __future__ import annotations
 
-from mckibben.blocks.force.activation_pressure import ActivationPressure
+from mckibben.blocks.force.activation import ActivationPressure
 
 CONTRACTIONS = (
     *(-4.33e-9, 3.58e-6, -1.11e-3, 1.33e-1),

@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.force.activation_memory import ActivationMemory
-from mckibben.blocks.force.activation_pressure import ActivationPressure
+from mckibben.blocks.force.activation import ActivationMemory, ActivationPressure
 from mckibben.comparison.kept import Kept
 from mckibben.estimators.force.activation_memory import ActivationMemoryEstimator
 from mckibben.estimators.force.activation_pressure import ActivationPressureEstimator

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.blocks.force.feedforward import ForceFeedforward
-from mckibben.blocks.force.law import ForceLaw
+from mckibben.blocks.force.laws import ForceLaw
 from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.control import track
 from mckibben.papers.multistate_friction.protocol import IDENTIFIED_AT, LONGEST, SAMPLE_TIME

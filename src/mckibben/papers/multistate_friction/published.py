@@ -6,8 +6,8 @@ Mechanical Response of Pneumatic Artificial Muscles", Tables 1 and 2.
 
 from __future__ import annotations
 
+from mckibben.blocks.force.laws import PolynomialForce
 from mckibben.blocks.force.multistate_friction import ELEVEN, MultistateFriction
-from mckibben.blocks.force.polynomial_force import PolynomialForce
 
 REFERENCE = 4.0
 """Pressure at which the friction was identified [bar], Section 4."""

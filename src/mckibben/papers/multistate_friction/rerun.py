@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from mckibben import registry
-from mckibben.blocks.force.law import ForceLaw
+from mckibben.blocks.force.laws import ForceLaw
 from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.comparison.kept import Kept
 from mckibben.estimators.force.multistate import (

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.force.law import ForceLaw
+from mckibben.blocks.force.laws import ForceLaw
 from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.estimators.core.ranges import parameter_ranges
 from mckibben.metrics import score

@@ -11,7 +11,7 @@ import numpy as np
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
-from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.feedback import PIDFeedback
 from mckibben.comparison.kept import Kept
 from mckibben.control import Controller, Tracked, control_law, track, tune_pid
 from mckibben.errors import ModelWarning

@@ -14,7 +14,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.fields import STRICT, Vector
 from mckibben.blocks.hysteresis.envelopes.base import Envelope, EnvelopeKernel, envelope_kernel
-from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
+from mckibben.blocks.memoryless import check_increasing, interpolate
 from mckibben.blocks.notation import Notation
 
 

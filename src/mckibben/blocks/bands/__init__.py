@@ -1,1 +1,0 @@
-"""Blocks that say how far off a model may be."""

@@ -1,0 +1,319 @@
+"""Feedback as blocks, so that it is saved, streamed and exported like a compensator.
+
+u = base + kp e + integral - kd rate,  e = reference - measured,
+
+one loop a muscle: the derivative is of the measurement, through a first-order filter; the integral
+stops where the output is at a limit and would be driven further (Åström and Hägglund, "Advanced PID
+Control", ch. 3). What runs on the robot is a compensator with such feedback on top.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge
+from pydantic import BeforeValidator, FiniteFloat, InstanceOf
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import SEVERAL, Block, Board, Kernel, Ports, Run, Start, needs_sample_time
+from mckibben.blocks.compose import Composition
+from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Vector
+from mckibben.blocks.kernels import accumulate, kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.saving import nested
+from mckibben.errors import ModelError
+
+MEASURED = "_measured"
+"""What the name of a reference ends with where it is measured."""
+
+
+@step
+def pid_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the loops; the state is [integrals, rates, last measurements, last references].
+
+    Coefficients are [sample time, share of the filter, lowest, highest, whether there is a base,
+    whether references are late, kp, ki, kd]; inputs are references, measurements, bases.
+    """
+    n = outputs.size
+    step, share = coefficients[0], coefficients[1]
+    lowest, highest = coefficients[2], coefficients[3]
+    based, late = coefficients[4] > 0.0, coefficients[5] > 0.0
+    kp, ki, kd = coefficients[6 : 6 + n], coefficients[6 + n : 6 + 2 * n], coefficients[6 + 2 * n :]
+    for k in range(n):
+        reference, measured = inputs[k], inputs[n + k]
+        error = (state[3 * n + k] if late else reference) - measured
+        state[n + k] += share * ((measured - state[2 * n + k]) / step - state[n + k])
+        state[2 * n + k], state[3 * n + k] = measured, reference
+        base = inputs[2 * n + k] if based else 0.0
+        wanted = base + kp[k] * error + state[k] - kd[k] * state[n + k]
+        way = ki[k] * error
+        further = (wanted > highest and way > 0.0) or (wanted < lowest and way < 0.0)
+        if not further:
+            state[k] = accumulate(state[k], ki[k] * step * error, scratch, k)
+        outputs[k] = min(max(wanted, lowest), highest)
+
+
+@kernel
+def pid_start(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start with empty integrals and rates, at the first measurements."""
+    n = state.size // 4
+    state[: 2 * n] = 0.0
+    state[2 * n : 3 * n] = inputs[n : 2 * n]
+    state[3 * n :] = inputs[n : 2 * n]
+    scratch[:] = 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class PIDFeedback(Block):
+    """Independent PID loops of n muscles.
+
+    Parameters
+    ----------
+    kp, ki, kd : sequence of n floats
+        Gains [bar/mm], [bar/(mm s)], [bar s/mm].
+    limits : (float, float)
+        Of the output [bar], lowest first.
+    filter_time : float
+        Of the derivative [s]; not negative.
+    driven : sequence of n Channel
+        References.
+    scheduled : sequence of n or 2 n Channel
+        Measurements, then, if any, what feedback is added to.
+    given : sequence of n Channel
+        Outputs.
+    late : bool
+        Whether the measurement answers the reference of the step before, as behind a compensator.
+    """
+
+    kind: ClassVar[str] = "pid"
+    ports: ClassVar[Ports] = SEVERAL
+    kernel: ClassVar[Kernel] = pid_step
+    start_kernel: ClassVar[Start] = pid_start
+    rate_dependent: ClassVar[bool] = True
+    no_inverse: ClassVar[str] = "has no inverse. Remedy: invert the model of the muscle."
+    parameters: ClassVar[tuple[str, ...]] = ("kp", "ki", "kd")
+    notation: ClassVar[Notation] = Notation(
+        r"p_i = p_{b,i} + k_{p,i} e_i + k_{i,i} \int e_i\, dt - k_{d,i} \dot{y}_i,\quad "
+        "e_i = r_i - y_i",
+        kp="k_{p,i} [bar/mm]",
+        ki="k_{i,i} [bar/mm s]",
+        kd="k_{d,i} [bar s/mm]",
+        filter_time="T [s]",
+        limits=r"p_{\pm,i} [bar]",
+        driven="r_i",
+        scheduled="x_i",
+        given="p_i",
+    )
+
+    kp: Vector
+    ki: Vector
+    kd: Vector
+    limits: tuple[FiniteFloat, FiniteFloat]
+    filter_time: Annotated[FiniteFloat, Ge(0)]
+    driven: Channels
+    scheduled: Channels
+    given: Channels
+    late: bool = False
+
+    def __post_init__(self) -> None:
+        self.check_channels()
+        n = len(self.driven)
+        sizes = (len(self.kp), len(self.ki), len(self.kd), len(self.given))
+        if set(sizes) != {n} or len(self.scheduled) not in (n, 2 * n):
+            raise ModelError(
+                f"{self.kind!r} of {n} references has {sizes} kp, ki, kd and outputs, and "
+                f"{len(self.scheduled)} measurements and bases. Remedy: give {n} of each."
+            )
+        if not self.limits[0] < self.limits[1]:
+            raise ModelError(
+                f"limits of {self.kind!r} are {self.limits}. Remedy: give lowest, then highest."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """Integrals, filtered rates, last measurements, last references."""
+        return 4 * len(self.driven)
+
+    @property
+    def n_scratch(self) -> int:
+        """What single precision loses of the integrals."""
+        return len(self.driven)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        step = needs_sample_time(self.kind, sample_time)
+        share = step / (self.filter_time + step)
+        based = len(self.scheduled) > len(self.driven)
+        head = [step, share, *self.limits, float(based), float(self.late)]
+        return np.array([*head, *self.kp, *self.ki, *self.kd])
+
+    @classmethod
+    def of(
+        cls,
+        references: Channels,
+        outputs: Channels,
+        kp: Sequence[float],
+        ki: Sequence[float],
+        kd: Sequence[float] | None = None,
+        *,
+        limits: tuple[float, float],
+        filter_time: float = 0.1,
+    ) -> Self:
+        """Return feedback by itself, from references and what is measured of them to outputs.
+
+        Parameters are those of the class; without kd the derivative is left out.
+        """
+        kd = [0.0] * len(kp) if kd is None else kd
+        gains = (tuple(kp), tuple(ki), tuple(kd))
+        measured = _called(references, MEASURED)
+        return cls(*gains, limits, filter_time, references, measured, outputs)
+
+    def behind(self, compensator: Block) -> Self:
+        """Return the same feedback on top of what a compensator gives."""
+        references = compensator.inputs[: len(compensator.inputs) - len(compensator.scheduling)]
+        outputs = compensator.outputs
+        beside = (*_called(references, MEASURED), *_called(outputs, "_base"))
+        return replace(self, driven=references, scheduled=beside, given=outputs, late=True)
+
+    @classmethod
+    def example(cls) -> Self:
+        driven = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
+        given = tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2))
+        beside = (*_called(driven, MEASURED), *_called(given, "_base"))
+        gains = ((0.05, 0.04), (0.2, 0.3), (0.002, 0.0))
+        return cls(*gains, (0.0, 5.0), 0.1, driven, beside, given, late=True)
+
+
+def _called(channels: Channels, ending: str) -> Channels:
+    """Return channels whose names have an ending."""
+    return tuple(Channel(f"{channel.name}{ending}", channel.unit) for channel in channels)
+
+
+@dataclass(frozen=True, config=STRICT)
+class FeedforwardFeedback(Composition):
+    """Outputs of a compensator, corrected by what is measured.
+
+    Inputs are the references, what is measured, and what schedules the compensator.
+
+    Parameters
+    ----------
+    compensator : Block
+        From references, and what schedules it, to pressures.
+    feedback : PIDFeedback
+        Whose references are the compensator's, and whose bases are what the compensator gives.
+    """
+
+    kind: ClassVar[str] = "feedforward-feedback"
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("compensator", "feedback")
+
+    compensator: Annotated[InstanceOf[Block], BeforeValidator(nested)]
+    feedback: Annotated[InstanceOf[PIDFeedback], BeforeValidator(nested)]
+
+    def __post_init__(self) -> None:
+        self.check_parts()
+        n = len(self.compensator.outputs)
+        n_driven = len(self.compensator.inputs) - len(self.compensator.scheduling)
+        if (len(self.feedback.driven), len(self.feedback.scheduled)) != (n_driven, n + n_driven):
+            raise ModelError(
+                f"feedback of {len(self.feedback.driven)} references with "
+                f"{len(self.feedback.scheduled)} measurements and bases does not fit a compensator of "
+                f"{n_driven} references and {n} outputs. Remedy: give one measurement to a reference "
+                "and one base to an output."
+            )
+        self.check_channels()
+
+    @classmethod
+    def of(cls, compensator: Block, feedback: PIDFeedback) -> Self:
+        """Return a compensator with feedback, which may have stood by itself, on top."""
+        return cls(compensator, feedback.behind(compensator))
+
+    @property
+    def parts(self) -> tuple[Block, ...]:  # type: ignore[override]
+        return (self.compensator, self.feedback)
+
+    @property
+    def path_dependent(self) -> bool:  # type: ignore[override]
+        return self.compensator.path_dependent
+
+    @property
+    def undone(self) -> Block | None:
+        return self.compensator.undone
+
+    @property
+    def samples_ahead(self) -> int:  # type: ignore[override]
+        return self.compensator.samples_ahead
+
+    @property
+    def measured(self) -> tuple[Channel, ...]:
+        """What is measured."""
+        return self.feedback.scheduled[: len(self.feedback.driven)]
+
+    @cached_property
+    def inputs(self) -> tuple[Channel, ...]:
+        """References, measurements, and what else the compensator takes, which may learn from these."""
+        n = len(self.feedback.driven)
+        others = (c for c in self.compensator.inputs[n:] if c not in self.measured)
+        return (*self.compensator.inputs[:n], *self.measured, *others)
+
+    @cached_property
+    def scheduling(self) -> tuple[str, ...]:
+        """All inputs but the references."""
+        return tuple(channel.name for channel in self.inputs[len(self.feedback.driven) :])
+
+    @cached_property
+    def _taken(self) -> list[int]:
+        """Which inputs the compensator takes."""
+        return [self.inputs.index(channel) for channel in self.compensator.inputs]
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        return self.compensator.outputs
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        own, feedback = self._shared_initial(initial)
+        n = len(self.feedback.driven)
+        both = np.concatenate([first[: 2 * n], np.zeros(n)])
+        ahead = self.compensator.initial_state(np.asarray(first)[self._taken], own)
+        return np.concatenate([ahead, self.feedback.initial_state(both, feedback)])
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        n, length = len(self.feedback.driven), inputs.shape[0]
+        ahead, asked = self._states(state)
+        wanted = np.empty((length, len(self.compensator.inputs)))
+        base = np.empty((length, len(self.outputs)))
+        given = np.empty((length, len(self.feedback.inputs)))
+        compensate = self.compensator.bind(sample_time, ahead, wanted, base)
+        correct = self.feedback.bind(sample_time, asked, given, outputs)
+
+        def run() -> None:
+            wanted[:] = inputs[:, self._taken]
+            compensate()
+            given[:, : 2 * n] = inputs[:, : 2 * n]
+            given[:, 2 * n :] = base
+            correct()
+
+        return run
+
+    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+        n = len(self.feedback.driven)
+        bases = self.compensator.wired(board, [given[place] for place in self._taken])
+        return self.feedback.wired(board, [*given[: 2 * n], *bases])
+
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return the sum of what both give, the feedback from the compensator's references."""
+        return f"p = {parts[0]}[r] + {parts[1]}[r, y]"
+
+    @classmethod
+    def example(cls) -> Self:
+        from mckibben.blocks.coupled.balance import Balance
+
+        return cls(Balance.example(), PIDFeedback.example())

@@ -1,0 +1,306 @@
+"""Static force laws: force by length, at a pressure that is measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt, Interval
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block, Kernel, Ports
+from mckibben.blocks.fields import FORCE, LENGTH, PRESSURE, STRICT, Channel, ChannelField, Vector
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.memoryless import polynomial_at
+from mckibben.blocks.notation import Notation
+from mckibben.errors import ModelError
+
+NEWTONS_PER_BAR = 0.1
+"""Force of one bar on one square millimetre [N]."""
+
+
+def braid(angle: float, diameter: float) -> tuple[float, float, float]:
+    """Return the geometry of a braid at rest, by its angle [rad] and diameter [mm].
+
+    A cylinder of a bar pulls by A (a (1 - e)^2 - b) [N] at a contraction e: A, a, b.
+    """
+    area = 0.25 * math.pi * diameter**2 * NEWTONS_PER_BAR
+    return area, 3.0 / math.tan(angle) ** 2, 1.0 / math.sin(angle) ** 2
+
+
+class ForceLaw(Block):
+    """A static force law: driven by length [mm], scheduled by pressure [bar], giving force [N]."""
+
+    ports: ClassVar[Ports] = ("input",), ("pressure",), ("output",)
+    no_inverse: ClassVar[str] = (
+        "has no inverse by length, since more than one may give a force. Remedy: for the pressure that "
+        "gives a force at a length, use ForceFeedforward(law)."
+    )
+
+    input: Channel
+    pressure: Channel
+    output: Channel
+
+    terms_kernel: ClassVar[Callable[[float, Array], tuple[float, float]]]
+    """Force per pressure [N/bar], and force without any [N], from a length and `coefficients`."""
+
+    def terms(self, length: Array) -> tuple[Array, Array]:
+        """Return force per pressure [N/bar], and force without any [N], each of the shape given.
+
+        Raises
+        ------
+        ModelError
+            If the law is not linear in pressure.
+        """
+        self.check_linear()
+        numbers, terms = self.coefficients(None), type(self).terms_kernel
+        found = np.array([terms(each, numbers) for each in np.ravel(length).tolist()])
+        per_bar, rest = found.reshape(-1, 2).T
+        return per_bar.reshape(np.shape(length)), rest.reshape(np.shape(length))
+
+    def check_linear(self) -> None:
+        """Refuse a law that is not linear in pressure; by default it is."""
+
+
+# -- polynomials in length -------------------------------------------------------------------
+
+
+@kernel
+def polynomial_force_terms(length: float, c: Array) -> tuple[float, float]:
+    """Return force per pressure, and force without any; ``c`` is [centre, scale, number of g, g, h]."""
+    n = int(c[2])
+    x = (length - c[0]) / c[1]
+    return polynomial_at(x, c, 3, n), polynomial_at(x, c, 3 + n, c.size - 3 - n)
+
+
+@step
+def polynomial_force_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Give the force at a length and a pressure."""
+    per_bar, rest = polynomial_force_terms(inputs[0], coefficients)
+    outputs[0] = inputs[1] * per_bar + rest
+
+
+@dataclass(frozen=True, config=STRICT)
+class PolynomialForce(ForceLaw):
+    """Force linear in pressure, polynomial in length.
+
+    By the orders with and without pressure this is the bilinear-quadratic law (1, 2), Eq. (3) of "A
+    Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the Mechanical
+    Response of Pneumatic Artificial Muscles"; Petrovic's (2, 2); Minh's cubic (3, 3); and Schindele
+    and Aschemann's (3, 4).
+
+    Parameters
+    ----------
+    per_bar : sequence of float
+        g, ascending, [N/bar]; at least one.
+    elastic : sequence of float
+        h, ascending, [N]; at least one.
+    centre, scale : float
+        Of the length [mm]; scale positive.
+    input, pressure, output : Channel
+        Length, pressure and force.
+    """
+
+    kind: ClassVar[str] = "polynomial-force"
+    kernel: ClassVar[Kernel] = polynomial_force_step
+    terms_kernel = polynomial_force_terms
+    parameters: ClassVar[tuple[str, ...]] = ("per_bar", "elastic")
+    notation: ClassVar[Notation] = Notation(
+        r"f = p \sum_i g_i x^i + \sum_j h_j x^j,\quad x = \frac{l - m}{s}",
+        per_bar="g_i from 0 [N/bar]",
+        elastic="h_j from 0 [N]",
+        centre="m [mm]",
+        scale="s [mm]",
+        input="l",
+        pressure="p",
+        output="f",
+    )
+
+    per_bar: Vector
+    elastic: Vector
+    centre: FiniteFloat = 0.0
+    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
+    input: ChannelField = LENGTH
+    pressure: ChannelField = PRESSURE
+    output: ChannelField = FORCE
+
+    def __post_init__(self) -> None:
+        if not self.per_bar or not self.elastic:
+            raise ModelError(
+                f"{self.kind!r} has an empty polynomial. Remedy: give one coefficient or more to each."
+            )
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        return np.array([self.centre, self.scale, len(self.per_bar), *self.per_bar, *self.elastic])
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a bilinear-quadratic law around 3 mm."""
+        return cls((50.0, 20.0), (-10.0, 5.0, 8.0), 3.0, 2.0)
+
+
+# -- an inextensible braid -------------------------------------------------------------------
+
+
+@step
+def chou_hannaford_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Evaluate; coefficients are [force per bar and square length, square of b / 3, constant]."""
+    pull = inputs[0] * inputs[0] - coefficients[1]
+    outputs[0] = inputs[1] * coefficients[0] * pull + coefficients[2]
+
+
+@kernel
+def chou_hannaford_terms(length: float, c: Array) -> tuple[float, float]:
+    """Return force per pressure, and force without any."""
+    return c[0] * (length * length - c[1]), c[2]
+
+
+@dataclass(frozen=True, config=STRICT)
+class ChouHannaford(ForceLaw):
+    """Force of an inextensible braid, with friction or elasticity as a constant.
+
+    Source: Chou and Hannaford, "Measurement and modeling of McKibben pneumatic artificial muscles",
+    1996.
+
+    Parameters
+    ----------
+    thread_length : float
+        b [mm], positive.
+    turns : float
+        n, positive.
+    constant : float
+        Added [N].
+    input, pressure, output : Channel
+        Length, pressure and force.
+    """
+
+    kind: ClassVar[str] = "chou-hannaford"
+    kernel: ClassVar[Kernel] = chou_hannaford_step
+    terms_kernel = chou_hannaford_terms
+    parameters: ClassVar[tuple[str, ...]] = ("thread_length", "turns", "constant")
+    notation: ClassVar[Notation] = Notation(
+        r"f = p\, \frac{3 l^2 - b^2}{4 \pi n^2} + c",
+        thread_length="b [mm]",
+        turns="n",
+        constant="c [N]",
+        input="l",
+        pressure="p",
+        output="f",
+    )
+
+    thread_length: Annotated[FiniteFloat, Gt(0)]
+    turns: Annotated[FiniteFloat, Gt(0)]
+    constant: FiniteFloat = 0.0
+    input: ChannelField = LENGTH
+    pressure: ChannelField = PRESSURE
+    output: ChannelField = FORCE
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        per_bar = 3 * NEWTONS_PER_BAR / (4 * math.pi * self.turns**2)
+        return np.array([per_bar, self.thread_length**2 / 3, self.constant])
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a law for lengths of a few millimetres."""
+        return cls(6.0, 0.5, -1.0)
+
+
+# -- a braided cylinder with corrections -----------------------------------------------------
+
+MU_DECAY = 40.0
+"""Per contraction."""
+
+
+@step
+def tondu_lopez_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Evaluate; coefficients are [rest length, A, a, b, mu_1, mu_0, kappa_1, kappa_0, constant]."""
+    c = coefficients
+    e, p = 1.0 - inputs[0] / c[0], inputs[1]
+    mu = c[4] * math.exp(-MU_DECAY * e) + c[5]
+    short = 1.0 - (c[6] * math.exp(-p) + c[7]) * e
+    outputs[0] = mu * c[1] * p * (c[2] * short * short - c[3]) + c[8]
+
+
+@kernel
+def tondu_lopez_terms(length: float, c: Array) -> tuple[float, float]:
+    """Return force per pressure, and force without any, where kappa_1 = 0."""
+    e = 1.0 - length / c[0]
+    mu = c[4] * math.exp(-MU_DECAY * e) + c[5]
+    short = 1.0 - c[7] * e
+    return mu * c[1] * (c[2] * short * short - c[3]), c[8]
+
+
+@dataclass(frozen=True, config=STRICT)
+class TonduLopez(ForceLaw):
+    """Force of a braided cylinder, with corrections for end caps and low pressure.
+
+    mu = kappa = 1 is the ideal cylinder. Sources: Tondu and Lopez 2000; Kerscher, Albert, Zentner and
+    Witte, "Dynamic modelling of fluidic muscles using quasi-static approach", 2006, whose two
+    exponentials these are.
+
+    Parameters
+    ----------
+    rest_length, diameter : float
+        Of the muscle at rest [mm]; positive. Structure, not parameters.
+    braid_angle : float
+        Between braid and axis at rest [rad], 0.1 to 0.95.
+    mu : (float, float)
+        mu_1 and mu_0.
+    kappa : (float, float)
+        kappa_1 and kappa_0.
+    constant : float
+        Added [N].
+    input, pressure, output : Channel
+        Length, pressure and force.
+    """
+
+    kind: ClassVar[str] = "tondu-lopez"
+    kernel: ClassVar[Kernel] = tondu_lopez_step
+    terms_kernel = tondu_lopez_terms
+    parameters: ClassVar[tuple[str, ...]] = ("braid_angle", "mu", "kappa", "constant")
+    notation: ClassVar[Notation] = Notation(
+        r"f = \mu(\epsilon)\, A\, p \left(a (1 - \kappa(p) \epsilon)^2 - b\right) + "
+        r"c,\quad \epsilon = 1 - \frac{l}{l_0},\quad A = \frac{\pi d^2}{4}",
+        r"a = \frac{3}{\tan^2 \alpha},\quad b = \frac{1}{\sin^2 \alpha},\quad "
+        r"\mu(\epsilon) = \mu_1 e^{-40 \epsilon} + \mu_2,\quad \kappa(p) = \kappa_1 "
+        r"e^{-p} + \kappa_2",
+        braid_angle=r"\alpha [rad]",
+        mu=r"\mu_i",
+        kappa=r"\kappa_i",
+        constant="c [N]",
+        rest_length="l_0 [mm]",
+        diameter="d [mm]",
+        input="l",
+        pressure="p",
+        output="f",
+    )
+
+    rest_length: Annotated[FiniteFloat, Gt(0)]
+    diameter: Annotated[FiniteFloat, Gt(0)]
+    braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95)]
+    mu: tuple[FiniteFloat, FiniteFloat] = (0.0, 1.0)
+    kappa: tuple[FiniteFloat, FiniteFloat] = (0.0, 1.0)
+    constant: FiniteFloat = 0.0
+    input: ChannelField = LENGTH
+    pressure: ChannelField = PRESSURE
+    output: ChannelField = FORCE
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        cylinder = braid(self.braid_angle, self.diameter)
+        return np.array([self.rest_length, *cylinder, *self.mu, *self.kappa, self.constant])
+
+    def check_linear(self) -> None:
+        if self.kappa[0] != 0:
+            raise ModelError(
+                f"{self.kind!r} with kappa_1 = {self.kappa[0]:g} is not linear in pressure. Remedy: use "
+                "a polynomial force law for feedforward."
+            )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a law for lengths of a few millimetres."""
+        return cls(5.0, 3.0, 0.45, (0.05, 0.9), (0.2, 1.1), -2.0)

@@ -1,0 +1,417 @@
+"""The contract of a block as laws, to which the author of a new one can put it.
+
+Every law is tried on random inputs that wander with minor loops and holds.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.arrays import Array
+from mckibben.blocks import saving
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Initial
+from mckibben.blocks.inverse import Invertible
+from mckibben.errors import ContractError, DataError, ModelError, ModelWarning
+from mckibben.recording import Recording, standard_unit
+from mckibben.registry import load, names
+
+DEFAULT_LIMITS = (0.0, 5.0)
+"""Inputs to try where a block names no input range of its own."""
+
+MARGIN = 0.02
+"""Share of a range left out at both ends, so that rounding does not decide what is reachable."""
+
+EXACT = 1e-9
+"""Largest error of an inverse, relative to the range of the output."""
+
+
+def check_block(block: Block, *, sample_time: float = 0.01, seed: int = 0) -> None:
+    """Put a block to the laws that every block must obey.
+
+    Sizes agree with what is declared; simulating is repeatable and leaves its arguments alone; a
+    stream, `Block.simulate_many` and a saved copy agree with `Block.simulate` to the last bit; a
+    recording gives what an array gives; bad input is refused by name; a rate-independent block sees
+    neither the sample time nor the pace of its input; and the inverse, where there is one, is exact
+    through minor loops, from a carried-over state, and again after references it could not reach.
+
+    Parameters
+    ----------
+    block : Block
+        What to check; its class must be registered, since saved models are.
+    sample_time : float, default 0.01
+        Time between samples [s], positive.
+    seed : int, default 0
+        Of the random inputs.
+
+    Raises
+    ------
+    ContractError
+        Naming the first law that is broken.
+
+    Examples
+    --------
+    >>> import mckibben
+    >>> mckibben.check_block(mckibben.PI.example())
+    """
+    trial = Trial.of(block, sample_time, seed)
+    for law in LAWS:
+        law(trial)
+
+
+def examples() -> dict[str, Block]:
+    """Return the examples of all registered blocks and their inverses, by title, in its order."""
+    blocks: list[Block] = [load("blocks", kind).example() for kind in names("blocks")]
+    blocks += [block.inverse() for block in blocks if isinstance(block, Invertible)]
+    found = {block.title: block for block in blocks}
+    return {title: found[title] for title in sorted(found)}
+
+
+# -- trials ----------------------------------------------------------------------------------
+
+
+@dataclass
+class Trial:
+    """A block, inputs to try it on, and what it makes of them.
+
+    Parameters
+    ----------
+    block : Block
+        What is tried.
+    sample_time : float
+        Time between samples [s].
+    inputs : array, shape (n, n_inputs)
+        A path with minor loops and holds.
+    rng : Generator
+        Where chance comes from.
+    pace : int
+        Samples from one turning point to the next, on average.
+    """
+
+    block: Block
+    sample_time: float
+    inputs: Array
+    rng: np.random.Generator
+    pace: int
+
+    def __post_init__(self) -> None:
+        self.outputs = self.run(self.inputs)
+        # where outputs hardly move, rounding of their size is all there is to see
+        least = 1e-4 * np.abs(self.outputs).max(axis=0) + np.finfo(float).tiny
+        self.span = np.maximum(np.ptp(self.outputs, axis=0), least)
+        self.n_driven = len(self.block.inputs) - len(self.block.scheduling)
+
+    @classmethod
+    def of(cls, block: Block, sample_time: float, seed: int, n_turns: int = 24) -> Trial:
+        """Return a trial on random inputs, slower where the rate matters."""
+        rng = np.random.default_rng(seed)
+        pace = 200 if block.rate_dependent else 12
+        inputs = wander(*input_limits(block), rng, pace, n_turns)
+        return cls(block, sample_time, inputs, rng, pace)
+
+    def run(
+        self, inputs: Array, initial: Initial | None = None, block: Block | None = None
+    ) -> Array:
+        """Simulate the block, or another, over other inputs, shape (n, n_inputs)."""
+        return (block or self.block).simulate(inputs, initial=initial, sample_time=self.sample_time)
+
+    def demand(self, holds: bool, law: str) -> None:
+        """Raise a `ContractError` that names the law, unless it holds."""
+        if not holds:
+            raise ContractError(
+                f"{self.block.kind!r} breaks the contract of blocks: {law}. "
+                "Remedy: mend the block; mckibben.check_block lists the laws."
+            )
+
+    def same(self, outputs: Array, references: Array, law: str) -> None:
+        """Demand outputs that are equal to the last bit."""
+        self.demand(np.array_equal(outputs, references), f"{law} to the last bit")
+
+    def agree(self, outputs: Array, references: Array, tolerance: float, law: str) -> None:
+        """Demand outputs near references, relative to the range of the block's outputs."""
+        error = np.abs(outputs - references)
+        holds = bool((error <= tolerance * self.span).all())
+        self.demand(holds, f"{law} (the error is {error.max():.3g})")
+
+    def refused(
+        self, kind: type[Exception], about: str, attempt: Callable[..., object], *given: object
+    ) -> None:
+        """Demand that an attempt raises an error of a kind whose text names what it is about."""
+        try:
+            attempt(*given)
+        except kind as error:
+            named = about in str(error) and "Remedy:" in str(error)
+            self.demand(named, f"{str(error)!r} names {about!r} and ends with a remedy")
+        else:
+            self.demand(False, f"bad input raises a {kind.__name__} ({about})")
+
+
+def input_limits(block: Block) -> tuple[Array, Array]:
+    """Return the lowest and highest of every input to try a block on, each of shape (n_inputs,)."""
+    lowest, highest = (np.full(len(block.inputs), end) for end in DEFAULT_LIMITS)
+    driven = slice(0, len(block.inputs) - len(block.scheduling))
+    if hasattr(block, "input_range"):
+        low, high = (np.array([end]) for end in block.input_limits)
+    else:
+        try:
+            low, high = block.inverse().reachable()
+        except ModelError:
+            return lowest, highest
+    with np.errstate(over="ignore", invalid="ignore"):
+        known = np.isfinite(high - low)
+    lowest[driven] = np.where(known, low, lowest[driven])
+    highest[driven] = np.where(known, high, highest[driven])
+    return narrowed(lowest, highest)
+
+
+def narrowed(lowest: Array, highest: Array) -> tuple[Array, Array]:
+    """Return a range without its margins."""
+    margin = MARGIN * (highest - lowest)
+    return lowest + margin, highest - margin
+
+
+def wander(
+    lowest: Array, highest: Array, rng: np.random.Generator, pace: int, n_turns: int = 24
+) -> Array:
+    """Return a path between random turning points, shape (n, n_channels), with a hold at each.
+
+    Parameters
+    ----------
+    lowest, highest : array, shape (n_channels,)
+        Range of the turning points.
+    rng : Generator
+        Where chance comes from.
+    pace : int
+        Samples from one turning point to the next, on average.
+    n_turns : int
+        Number of turning points.
+    """
+    turns = rng.uniform(lowest, highest, (n_turns, lowest.size))
+    return through(turns, rng.integers(pace // 2, pace * 3 // 2 + 1, n_turns - 1))
+
+
+def through(turns: Array, samples: NDArray[np.int64]) -> Array:
+    """Return straight lines through turning points, so many samples each, with a hold at each."""
+    corners = np.concatenate([[0], np.cumsum(samples + 1)])
+    places = np.sort(np.concatenate([corners, corners[1:-1] + 1]))
+    values = np.insert(turns, np.arange(1, len(turns) - 1), turns[1:-1], axis=0)
+    grid = np.arange(places[-1] + 1)
+    return np.column_stack([np.interp(grid, places, column) for column in values.T])
+
+
+# -- laws ------------------------------------------------------------------------------------
+
+
+def _sizes_agree(trial: Trial) -> None:
+    block, packed = trial.block, trial.block.pack()
+    state = block.initial_state(trial.inputs[0])
+    sized = packed.shape == (block.n_parameters,)
+    trial.demand(sized, "pack gives n_parameters numbers in one vector")
+    trial.demand(state.shape == (block.n_states,), "initial_state gives n_states numbers")
+    trial.demand(block.unpack(packed) == block, "unpack(pack()) equals the block")
+    trial.refused(ModelError, "", block.unpack, np.append(packed, 0.0))
+    if block.n_states:
+        trial.refused(ModelError, "", trial.run, trial.inputs, [*state.tolist(), 0.0])
+    for channel in (*block.inputs, *block.outputs):
+        unit = standard_unit(channel.name)
+        trial.demand(unit in (None, channel.unit), f"{channel.name!r} is in {unit!r} everywhere")
+
+
+def _simulates(trial: Trial) -> None:
+    given = trial.inputs.copy()
+    state = trial.block.initial_state(given[0]).tolist()
+    kept = list(state)
+    outputs = trial.run(given, state)
+    shape = (len(given), len(trial.block.outputs))
+    trial.demand(trial.outputs.shape == shape, "simulate gives one column to every output")
+    trial.demand(bool(np.isfinite(trial.outputs).all()), "outputs are finite")
+    trial.demand(np.array_equal(given, trial.inputs), "simulate leaves its inputs alone")
+    trial.demand(state == kept, "simulate leaves the state it is given alone")
+    law = "simulating again, from the state that initial_state gives, gives the same"
+    trial.same(outputs, trial.outputs, law)
+
+
+def _streams(trial: Trial) -> None:
+    stream, half = trial.block.stream(trial.sample_time), len(trial.inputs) // 2
+    for attempt in ("", " after reset"):
+        stepped = np.array([stream.step(row).copy() for row in trial.inputs])
+        trial.same(stepped, trial.outputs, f"a stream{attempt} equals simulate")
+        stream.reset()
+    for row in trial.inputs[:half]:
+        stream.step(row)
+    carried = stream.state.tolist()
+    resumed = trial.run(trial.inputs[half:], carried)
+    law = "simulating on from a stream's state equals simulating in one go"
+    trial.same(resumed, trial.outputs[half:], law)
+    stream = trial.block.stream(trial.sample_time, initial=carried)
+    stepped = np.array([stream.step(row).copy() for row in trial.inputs[half:]])
+    trial.same(stepped, resumed, "a stream from an explicit state equals simulate from there")
+
+
+def _simulates_many(trial: Trial) -> None:
+    block = trial.block
+    sets = np.array([scale * block.pack() for scale in (1.0, 1.001, 0.999)])
+    many = block.simulate_many(sets, trial.inputs, sample_time=trial.sample_time)
+    alone = np.array([trial.run(trial.inputs, block=block.unpack(row)) for row in sets])
+    law = "simulate_many equals simulate of every parameter set"
+    trial.same(many.reshape(len(sets), *trial.outputs.shape), alone, law)
+
+
+def _saves(trial: Trial) -> None:
+    content = json.loads(json.dumps(trial.block.to_dict(), allow_nan=False))
+    copy = saving.from_dict(content)
+    trial.demand(copy == trial.block, "a saved and loaded copy equals the block")
+    trial.demand(copy.to_dict() == trial.block.to_dict(), "a copy saves as the block does")
+    trial.same(trial.run(trial.inputs, block=copy), trial.outputs, "a copy gives the same")
+    trial.refused(ModelError, "surplus", saving.from_dict, {**content, "surplus": 1})
+
+
+def _takes_recordings(trial: Trial) -> None:
+    block = trial.block
+    units = {channel.name: channel.unit for channel in block.inputs}
+    columns = dict(zip(units, trial.inputs.T, strict=True))
+    modelled = block.simulate(Recording(columns, trial.sample_time, units))
+    for index, channel in enumerate(block.outputs):
+        law = "a recording gives the outputs that an array gives"
+        trial.same(modelled[channel.name], trial.outputs[:, index], law)
+        trial.demand(modelled.units[channel.name] == channel.unit, "outputs carry their units")
+    for name in columns:
+        others = {**columns, "unrelated": columns[name]}
+        del others[name]
+        trial.refused(DataError, name, block.simulate, Recording(others, trial.sample_time))
+        if standard_unit(name) is None:
+            wrong = Recording(columns, trial.sample_time, {**units, name: "furlong"})
+            trial.refused(DataError, name, block.simulate, wrong)
+
+
+def _refuses_bad_arrays(trial: Trial) -> None:
+    needed = len(trial.block.inputs) - trial.block.n_missable
+    for column, channel in enumerate(trial.block.inputs[:needed]):
+        for bad in (np.nan, np.inf):
+            inputs = trial.inputs.copy()
+            inputs[3, column] = bad
+            trial.refused(DataError, channel.name, trial.run, inputs)
+    wide = np.column_stack([trial.inputs, trial.inputs[:, 0]])
+    trial.refused(DataError, "shape", trial.run, wide)
+    trial.refused(DataError, "shape", trial.run, trial.inputs[:0])
+
+
+def _knows_its_time(trial: Trial) -> None:
+    block = trial.block
+    if block.rate_dependent:
+        trial.refused(ModelError, "sample time", block.simulate, trial.inputs)
+        return
+    for sample_time in (None, 7.0):
+        outputs = block.simulate(trial.inputs, sample_time=sample_time)
+        law = "a rate-independent block at any sample time gives the same"
+        trial.same(outputs, trial.outputs, law)
+    for moving in range(trial.inputs.shape[1]):
+        path = np.tile(trial.inputs[0], (len(trial.inputs), 1))
+        path[:, moving] = trial.inputs[:, moving]
+        outputs = trial.run(path)
+        repeats = trial.rng.integers(1, 4, len(path))
+        slow = trial.run(np.repeat(path, repeats, axis=0))[np.cumsum(repeats) - 1]
+        law = "holding the input of a rate-independent block changes nothing"
+        trial.agree(slow, outputs, EXACT, law)
+        turns = np.flatnonzero(np.diff(np.sign(np.diff(path[:, moving])))) + 1
+        kept = np.array([0, *turns, len(path) - 1])
+        fast = trial.run(path[kept])
+        if not block.path_dependent:
+            law = "only the turning points of its input matter to a rate-independent block"
+            trial.agree(fast, outputs[kept], EXACT, law)
+
+
+def _inverts(trial: Trial) -> None:
+    """Demand an inverse that is exact, or an error that ends with a remedy."""
+    block = trial.block
+    try:
+        inverse = block.inverse()
+    except ModelError as error:
+        trial.demand("Remedy:" in str(error), "an error of inverse() ends with a remedy")
+        return
+    swapped = (*block.outputs, *block.inputs[trial.n_driven :])
+    driven = block.inputs[: trial.n_driven]
+    trial.demand(inverse.inputs == swapped, "an inverse takes the outputs, then what schedules")
+    trial.demand(inverse.outputs == driven, "an inverse gives the driven inputs")
+    again = trial.run(trial.inputs, block=inverse.inverse())
+    trial.agree(again, trial.outputs, 1e-12, "the inverse of the inverse is the block")
+    _tracks(trial, inverse, trial.outputs)
+    low, high = block.reachable()
+    if np.isfinite([*low, *high]).all() and not block.undoing:
+        _tracks(trial, inverse, wander(*narrowed(low, high), trial.rng, trial.pace))
+        _recovers(trial, inverse, low, high)
+
+
+def _tracks(trial: Trial, inverse: Block, references: Array) -> None:
+    """Demand exact tracking from the first sample, and from states carried over at half-time.
+
+    What a dead time makes late is compared with what was due then.
+    """
+    n = min(len(references), len(trial.inputs))
+    references, scheduling = references[:n], trial.inputs[:n, trial.n_driven :]
+    wanted = np.column_stack([references, scheduling])
+    given = np.column_stack([trial.run(wanted, block=inverse), scheduling])
+    late = _late(trial, inverse)
+    due = references[: n - late]
+    law = (
+        "forward of inverse gives the reference, after the dead time, to 1e-9 of the output's range"
+    )
+    trial.agree(trial.run(given)[late:], due, EXACT, law)
+    half = n // 2
+    forward_state = _state_after(trial.block, given[:half], trial.sample_time)
+    starts = [_state_after(inverse, wanted[:half], trial.sample_time)]
+    starts += [forward_state] if hasattr(trial.block, "input_range") else []
+    for start in starts:
+        resumed = trial.run(wanted[half:], start, inverse)
+        outputs = trial.run(np.column_stack([resumed, scheduling[half:]]), forward_state)
+        trial.agree(outputs[late:], due[half:], EXACT, f"from a carried-over state, {law}")
+
+
+def _recovers(trial: Trial, inverse: Block, low: Array, high: Array) -> None:
+    """Demand that references out of reach are clipped with a warning, and harm nothing after."""
+    middle, span = (low + high) / 2, high - low
+    turns = trial.rng.uniform(low, high, (19, low.size))
+    turns[6], turns[12] = high + span / 2, low - span / 2
+    references = through(turns, np.full(len(turns) - 1, trial.pace))
+    scheduling = np.tile(trial.inputs[0, trial.n_driven :], (len(references), 1))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        given = trial.run(np.column_stack([references, scheduling]), block=inverse)
+    warned = any(issubclass(warning.category, ModelWarning) for warning in caught)
+    trial.demand(warned, "an inverse warns of references out of reach with a ModelWarning")
+    outputs = trial.run(np.column_stack([given, scheduling]))[_late(trial, inverse) :]
+    references = references[: len(outputs)]
+    inside = (np.abs(references - middle) <= (0.5 - MARGIN) * span).all(axis=1)
+    law = "after a reference out of reach, the inverse is exact again"
+    trial.agree(outputs[inside], references[inside], EXACT, law)
+
+
+def _late(trial: Trial, inverse: Block) -> int:
+    """Return by how many samples outputs follow references late."""
+    return round((trial.block.dead_time + inverse.dead_time) / trial.sample_time)
+
+
+def _state_after(block: Block, inputs: Array, sample_time: float) -> list[float]:
+    state = block.initial_state(inputs[0])
+    block.bind(sample_time, state, inputs, np.empty((len(inputs), len(block.outputs))))()
+    return list(map(float, state))
+
+
+LAWS: tuple[Callable[[Trial], None], ...] = (
+    _sizes_agree,
+    _simulates,
+    _streams,
+    _simulates_many,
+    _saves,
+    _takes_recordings,
+    _refuses_bad_arrays,
+    _knows_its_time,
+    _inverts,
+)
+"""Each raises a `ContractError` where it is broken."""

@@ -1,0 +1,515 @@
+"""Blocks without memory: lines, polynomials, straight pieces, logarithms and the dead zone of contact.
+
+Each rises or falls with its input, so each has an exact inverse, most of the same form.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge, Gt
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Coefficients,
+    Vector,
+)
+from mckibben.blocks.inverse import Invertible, check_input_range, nothing_clipped
+from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
+from mckibben.blocks.linear import LinearSystem
+from mckibben.blocks.notation import Notation, summed
+from mckibben.blocks.solving import newton
+from mckibben.errors import ModelError
+
+# -- lines -----------------------------------------------------------------------------------
+
+
+@step
+def affine_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Scale and shift; coefficients are [gain, offset]."""
+    outputs[0] = coefficients[0] * inputs[0] + coefficients[1]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Affine(Block):
+    """Gain and offset, y = gain u + offset.
+
+    It scales a unit-free model to a muscle in "Analysis and modeling of a pneumatic artificial muscle
+    system", Eq. (1).
+
+    Parameters
+    ----------
+    gain : float
+        Output per input; not zero where an inverse is wanted.
+    offset : float
+        Output at zero input.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "affine"
+    kernel: ClassVar[Kernel] = affine_step
+    parameters: ClassVar[tuple[str, ...]] = ("gain", "offset")
+    notation: ClassVar[Notation] = Notation("y = K u + y_0", gain="K [{y}/{u}]", offset="y_0 [{y}]")
+
+    gain: FiniteFloat
+    offset: FiniteFloat = 0.0
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def inverse(self) -> Affine:
+        if self.gain == 0:
+            raise ModelError(
+                "'affine' of gain 0 has no inverse. Remedy: give a gain that is not 0."
+            )
+        return Affine(1 / self.gain, -self.offset / self.gain, self.output, self.input)
+
+    def worked(self) -> tuple[str, ...]:
+        return (f"y = {summed([(self.gain, 'u'), (self.offset, '')])}",)
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        return LinearSystem.gain(self.gain, self.offset)
+
+    @classmethod
+    def example(cls) -> Self:
+        return cls(6.8, -1.5)
+
+
+@step
+def negative_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Change the sign; there are no coefficients."""
+    outputs[0] = -inputs[0]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Negative(Block):
+    """y = -u, for outputs that fall while the input rises, such as a muscle's length.
+
+    Parameters
+    ----------
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "negative"
+    kernel: ClassVar[Kernel] = negative_step
+    notation: ClassVar[Notation] = Notation("y = -u")
+
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def inverse(self) -> Negative:
+        return Negative(self.output, self.input)
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        return LinearSystem.gain(-1.0)
+
+    @classmethod
+    def example(cls) -> Self:
+        return cls()
+
+
+# -- straight pieces -------------------------------------------------------------------------
+
+
+@kernel
+def interpolate(x: float, knots: Array, values: Array) -> float:
+    """Return the piecewise-linear function at ``x``; the end pieces continue beyond the knots."""
+    low = 0
+    high = knots.size - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x < knots[middle]:
+            high = middle
+        else:
+            low = middle
+    slope = (values[high] - values[low]) / (knots[high] - knots[low])
+    if x - knots[low] < knots[high] - x:
+        return values[low] + slope * (x - knots[low])
+    return values[high] - slope * (knots[high] - x)
+
+
+def check_increasing(what: str, knots: Sequence[float], values: Sequence[float]) -> None:
+    """Refuse fewer than two knots, and knots or values that do not increase."""
+    if len(knots) < 2 or len(knots) != len(values):
+        raise ModelError(
+            f"a {what} has {len(knots)} knots and {len(values)} values. "
+            "Remedy: give at least two knots and one value to each."
+        )
+    for name, numbers in (("knots", knots), ("values", values)):
+        if np.any(np.diff(numbers) <= 0):
+            raise ModelError(
+                f"the {name} of a {what} do not increase. Remedy: give increasing {name}."
+            )
+
+
+@step
+def piecewise_linear_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Interpolate; coefficients are [knots, values]."""
+    n = coefficients.size // 2
+    outputs[0] = interpolate(inputs[0], coefficients[:n], coefficients[n:])
+
+
+@dataclass(frozen=True, config=STRICT)
+class PiecewiseLinear(Block):
+    """Straight lines between knots, continued beyond the first and the last.
+
+    A superposition of dead zones: after a Prandtl-Ishlinskii model it makes the modified one (MPI), with
+    an inverse of the same form.
+
+    Parameters
+    ----------
+    knots : sequence of float, length K >= 2
+        Inputs where lines meet, increasing.
+    values : sequence of float, length K
+        Outputs there, increasing.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "piecewise-linear"
+    kernel: ClassVar[Kernel] = piecewise_linear_step
+    increasing = ("knots", "values")
+    parameters: ClassVar[tuple[str, ...]] = ("values",)
+    notation: ClassVar[Notation] = Notation(
+        r"y = v_k + (v_{k+1} - v_k) \frac{u - \xi_k}{\xi_{k+1} - \xi_k},\quad \xi_k \le u "
+        r"\le \xi_{k+1}",
+        knots=r"\xi_k [{u}]",
+        values="v_k [{y}]",
+    )
+
+    knots: Vector
+    values: Vector
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_increasing(f"{self.kind} block", self.knots, self.values)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        return np.array([*self.knots, *self.values])
+
+    def inverse(self) -> PiecewiseLinear:
+        return PiecewiseLinear(self.values, self.knots, self.output, self.input)
+
+    @classmethod
+    def example(cls) -> Self:
+        return cls((0.0, 5.0, 15.0, 25.0), (0.0, 8.0, 20.0, 24.0))
+
+
+# -- polynomials -----------------------------------------------------------------------------
+
+
+@kernel
+def polynomial_at(x: float, coefficients: Array, first: int, size: int) -> float:
+    """Return the polynomial whose ascending coefficients start at ``first``."""
+    y = 0.0
+    for k in range(first + size - 1, first - 1, -1):
+        y = y * x + coefficients[k]
+    return y
+
+
+def least_slope(
+    polynomial: Sequence[float], centre: float, scale: float, limits: tuple[float, float]
+) -> float:
+    """Return the least derivative by the input over a range of inputs."""
+    slope = np.polynomial.Polynomial(polynomial).deriv()
+    low, high = ((end - centre) / scale for end in limits)
+    turns = np.asarray(slope.deriv().roots(), dtype=np.complex128)
+    at = np.array([low, high, *turns.real[np.abs(turns.imag) < 1e-9].clip(low, high)])
+    return float(np.min(slope(at))) / scale
+
+
+@step
+def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Evaluate; coefficients are [centre, scale, ascending polynomial coefficients]."""
+    x = (inputs[0] - coefficients[0]) / coefficients[1]
+    outputs[0] = polynomial_at(x, coefficients, 2, coefficients.size - 2)
+
+
+@kernel
+def value_at(x: float, c: Array) -> float:
+    """Return the polynomial of the inverse's coefficients."""
+    return polynomial_at(x, c, 4, c.size - 4)
+
+
+@kernel
+def slope_at(x: float, value: float, c: Array) -> float:
+    """Return its derivative."""
+    slope = 0.0
+    for k in range(c.size - 5, 0, -1):
+        slope = slope * x + k * c[4 + k]
+    return slope
+
+
+@step
+def polynomial_inverse_step(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Invert an increasing polynomial by Newton's method kept inside a shrinking bracket.
+
+    Coefficients are [centre, scale, lowest, highest argument, ascending coefficients]; the state is
+    the count of samples clipped. Ends when the bracket or the step cannot shrink any further.
+    """
+    c = coefficients
+    y, low, high = inputs[0], c[2], c[3]
+    bottom, top = value_at(low, c), value_at(high, c)
+    slack = SLACK * (top - bottom)
+    if y < bottom - slack or y > top + slack:
+        state[0] += 1.0
+    x = low if y <= bottom else high
+    if bottom < y < top:
+        x = newton(value_at, slope_at, y, low, high, 0.5 * (low + high), 0.0, c)
+        if DERIVED:
+            x = improved(value_at, y, x, c)
+    outputs[0] = c[0] + c[1] * x
+
+
+@dataclass(frozen=True, config=STRICT)
+class Polynomial(Invertible):
+    """Polynomial of a centred and scaled input.
+
+    After a Prandtl-Ishlinskii model it makes the modified one (MPI) of "High-Precision Displacement and
+    Force Hybrid Modeling of Pneumatic Artificial Muscle Using 3D PI-NARMAX Model", Eq. (5), where centre
+    is 0 and scale is 1.
+
+    Parameters
+    ----------
+    polynomial : sequence of float
+        Coefficients in ascending powers, at least one.
+    centre : float
+        Input that becomes argument 0.
+    scale : float
+        Input per argument; positive.
+    input_range : (float, float), optional
+        Where the polynomial holds; its inverse wants it to increase there, and clips there.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "polynomial"
+    kernel: ClassVar[Kernel] = polynomial_step
+    inverse_kernel: ClassVar[Kernel] = polynomial_inverse_step
+    inverse_start_kernel: ClassVar[Start] = nothing_clipped
+    parameters: ClassVar[tuple[str, ...]] = ("polynomial",)
+    notation: ClassVar[Notation] = Notation(
+        r"y = \sum_{k} c_k x^k,\quad x = \frac{u - m}{s}",
+        polynomial="c_k from 0 [{y}]",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
+
+    polynomial: Coefficients
+    centre: FiniteFloat = 0.0
+    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_input_range(self.kind, self.input_range)
+        if not self.polynomial:
+            raise ModelError("a polynomial without coefficients. Remedy: give at least one.")
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        return np.array([self.centre, self.scale, *self.polynomial])
+
+    def check_invertible(self) -> None:
+        if self.input_range is None:
+            raise ModelError(
+                "'polynomial' has no inverse without an input range. Remedy: give input_range."
+            )
+        low, high = self._arguments()
+        slope = np.polynomial.Polynomial(self.polynomial).deriv()
+        turns = np.asarray(slope.deriv().roots(), dtype=np.complex128)
+        slopes = slope(np.array([low, high, *turns.real[turns.imag == 0].clip(low, high)]))
+        if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:
+            raise ModelError(
+                "'polynomial' has no inverse: it does not increase over its whole input range. Remedy: "
+                "identify it with --set output_map=piecewise-linear or monotone=true."
+            )
+
+    def inverse_numbers(self, own: Array) -> Array:
+        """Return [centre, scale, lowest, highest argument, polynomial]."""
+        return np.array([*own[:2], *self._arguments(), *own[2:]])
+
+    def _arguments(self) -> tuple[float, float]:
+        low, high = self.input_limits
+        return (low - self.centre) / self.scale, (high - self.centre) / self.scale
+
+    def worked(self) -> tuple[str, ...]:
+        powers = ["", "x", *(f"x^{{{k}}}" for k in range(2, len(self.polynomial)))]
+        return (f"y = {summed(list(zip(self.polynomial, powers, strict=False)))}",)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a cubic that increases over 0 to 10."""
+        return cls((12.0, 20.0, 3.0, -4.0), 5.0, 5.0, (0.0, 10.0))
+
+
+# -- logarithm and exponential ---------------------------------------------------------------
+
+FLOOR = 0.05
+"""Of u + offset, where the logarithm turns into its tangent, so that every input has an output."""
+
+
+@step
+def logarithm_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Evaluate; coefficients are [offset]."""
+    x = inputs[0] + coefficients[0]
+    outputs[0] = math.log(x) if x > FLOOR else math.log(FLOOR) + (x - FLOOR) / FLOOR
+
+
+@step
+def exponential_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Undo the logarithm; coefficients are [offset]."""
+    y = inputs[0]
+    bend = math.log(FLOOR)
+    x = math.exp(y) if y > bend else FLOOR + (y - bend) * FLOOR
+    outputs[0] = x - coefficients[0]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Logarithm(Block):
+    """Logarithm of a raised input.
+
+    Friction in a muscle grows in proportion to pressure, so play operators of constant threshold belong
+    on the logarithm of pressure: a large offset makes the thresholds constant in the pressure itself,
+    offset 0 makes them proportional to it.
+
+    Parameters
+    ----------
+    offset : float
+        Added to the input, in its unit; not negative.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "logarithm"
+    kernel: ClassVar[Kernel] = logarithm_step
+    parameters: ClassVar[tuple[str, ...]] = ("offset",)
+    notation: ClassVar[Notation] = Notation(r"y = \ln(u + c)", offset="c [{u}]")
+
+    offset: Annotated[FiniteFloat, Ge(0)] = 0.0
+    input: ChannelField = PRESSURE
+    output: ChannelField = PRESSURE
+
+    def inverse(self) -> Block:
+        return Exponential(self.offset, self.output, self.input)
+
+    @classmethod
+    def example(cls) -> Self:
+        return cls(0.5)
+
+
+@dataclass(frozen=True, config=STRICT)
+class Exponential(Block):
+    """What undoes a `Logarithm`.
+
+    Parameters
+    ----------
+    offset : float
+        Taken off the exponential; not negative.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "exponential"
+    kernel: ClassVar[Kernel] = exponential_step
+    parameters: ClassVar[tuple[str, ...]] = ("offset",)
+    notation: ClassVar[Notation] = Notation("y = e^{u} - c", offset="c [{y}]")
+
+    offset: Annotated[FiniteFloat, Ge(0)] = 0.0
+    input: ChannelField = PRESSURE
+    output: ChannelField = PRESSURE
+
+    def inverse(self) -> Block:
+        return Logarithm(self.offset, self.output, self.input)
+
+    @classmethod
+    def example(cls) -> Self:
+        return cls(0.5)
+
+
+# -- contact ---------------------------------------------------------------------------------
+
+LOST = 0.95
+"""Share of the smallest pressures that does not act; with the rest, every output has one input."""
+
+MOST_STEPS = 60
+"""Of Newton's method, which comes from above and needs four to eight."""
+
+SETTLED = 1e-16
+"""Relative step below which it has come."""
+
+SINGLE = {"SETTLED": 1e-7}
+
+
+@step
+def contact_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Evaluate; coefficients are [pressure]."""
+    c = coefficients[0]
+    u = inputs[0]
+    lost = LOST * c * (1.0 - math.exp(-abs(u) / c))
+    outputs[0] = u - lost if u >= 0.0 else u + lost
+
+
+@step
+def contact_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Undo it: the root of a convex rising function."""
+    c = coefficients[0]
+    goal = abs(inputs[0])
+    u = goal + LOST * c
+    for _ in range(MOST_STEPS):
+        faded = LOST * math.exp(-u / c)
+        step = (u - c * (LOST - faded) - goal) / (1.0 - faded)
+        u -= step
+        if step <= SETTLED * u:
+            break
+    u = max(u, 0.0)
+    outputs[0] = u if inputs[0] >= 0.0 else -u
+
+
+@dataclass(frozen=True, config=STRICT)
+class Contact(Invertible):
+    """Dead zone of small pressures, which only fill the bladder towards the braid.
+
+    Large pressures act as if less by about c.
+
+    Parameters
+    ----------
+    pressure : float
+        c, over which it fades, in the unit of the input; positive.
+    input, output : Channel
+        Channel driven, and what of it acts.
+    """
+
+    kind: ClassVar[str] = "contact"
+    kernel: ClassVar[Kernel] = contact_step
+    inverse_kernel: ClassVar[Kernel] = contact_inverse_step
+    counts_clipped: ClassVar[bool] = False
+    parameters: ClassVar[tuple[str, ...]] = ("pressure",)
+    notation: ClassVar[Notation] = Notation(
+        r"y = u - \frac{19}{20}\, c \left(1 - e^{-|u| / c}\right) \operatorname{sgn} u",
+        pressure="c [{u}]",
+        output="y",
+        input="u",
+    )
+
+    pressure: Annotated[FiniteFloat, Gt(0)]
+    input: ChannelField = PRESSURE
+    output: ChannelField = PRESSURE
+
+    @classmethod
+    def example(cls) -> Self:
+        return cls(0.125)

@@ -1,1 +1,0 @@
-"""Blocks without memory: polynomials, straight pieces, scale and sign."""

@@ -22,7 +22,7 @@ from mckibben.blocks.dynamics.state_network import SETTLING, SETTLING_STEP, Stat
 from mckibben.blocks.fields import rows
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
 from mckibben.estimators.dynamics.linear_oscillator import (
     MOST_SUBSTEPS,
@@ -51,7 +51,7 @@ LEAST_GAIN = 1e-7
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class StateNetworkEstimator(SingleEstimator):
+class StateNetworkEstimator(SearchEstimator):
     """State-space network by Gauss-Newton on free runs, told nothing but how many states there are.
 
     Parameters
@@ -87,7 +87,6 @@ class StateNetworkEstimator(SingleEstimator):
     substeps: Annotated[int, Interval(ge=1, le=MOST_SUBSTEPS)] | None = None
 
     made_for: ClassVar[tuple[str, str] | None] = ("force", "displacement")
-    rises: ClassVar[bool] = False
     effort: ClassVar[float] = 100.0
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:

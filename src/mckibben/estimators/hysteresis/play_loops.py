@@ -74,17 +74,6 @@ class LoopEstimator(SeparableEstimator):
         polynomial[1] += float(slopes @ lagging)
         return self.assemble(theta, polynomial, leading - lagging, data)
 
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the block solved for, and bounds of which those of its shape are fixed."""
-        template, lower, upper = super().parameter_bounds(data)
-        low, high = self.shape_bounds(data)
-        lower[lower.size - low.size :], upper[upper.size - high.size :] = low, high
-        return template, lower, upper
-
-    @abstractmethod
-    def shape_bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the block's last parameters, those that are not linear."""
-
 
 def _short(run: Run) -> Run:
     """Return the first samples of a run, enough to ask for bounds of slopes."""

@@ -9,7 +9,7 @@ import numpy as np
 from mckibben import Recording
 from mckibben.blocks.force.multistate_friction import ELEVEN, MultistateFriction
 from mckibben.blocks.force.polynomial_force import PolynomialForce
-from mckibben.estimators.core.ranges import parameter_ranges
+from mckibben.papers.multistate_friction.ranges import parameter_ranges
 from mckibben.registry import load
 
 

@@ -12,12 +12,12 @@ from mckibben import Recording
 from mckibben.blocks.compose import Series
 from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.estimators.core.checking import training_data
+from mckibben.estimators.core.data import training_data
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.descent import Damping, Radius, Trust, descend
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.multi_start import multi_start
-from mckibben.estimators.optimisers.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.registry import load
 

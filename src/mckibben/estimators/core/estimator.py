@@ -16,8 +16,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.errors import ModelWarning
-from mckibben.estimators.core.checking import training_data
-from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.data import Mask, TrainingData, training_data
 from mckibben.estimators.core.settings import check_settings
 from mckibben.estimators.core.uncertainty import covariance_of, simulate_all, unknown
 from mckibben.estimators.optimisers.tracker import Progress, Tracker

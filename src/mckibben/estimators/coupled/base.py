@@ -12,8 +12,7 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.errors import DataError
-from mckibben.estimators.core.checking import training_data
-from mckibben.estimators.core.data import Mask, TrainingData, moves_alone
+from mckibben.estimators.core.data import Mask, TrainingData, moves_alone, training_data
 from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed

@@ -19,9 +19,9 @@ from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.memoryless.logarithm import Logarithm
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
-from mckibben.estimators.core.output_maps import PolynomialMap
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, counting
 from mckibben.estimators.hysteresis.creeping import CreepingEstimator, creep_moves, with_creep
+from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.hysteresis.thresholds import spread
 

@@ -14,8 +14,8 @@ from mckibben.blocks.hysteresis.eupi import EUPI, eupi_matrix
 from mckibben.blocks.hysteresis.play_operators import started
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
-from mckibben.estimators.core.output_maps import PolynomialMap
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 from mckibben.estimators.hysteresis.thresholds import spread
 
 CUBIC = PolynomialMap(3)

@@ -17,8 +17,8 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
-from mckibben.estimators.core.output_maps import OutputMap, output_map
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
+from mckibben.estimators.hysteresis.output_maps import OutputMap, output_map
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.hysteresis.thresholds import spread
 from mckibben.estimators.optimisers.linear import solve_linear

@@ -18,8 +18,8 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.output_maps import PolynomialMap
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 
 LEAST_SLOPE = 1e-4
 """Least share of the output's range that each piece of the polynomial gives."""

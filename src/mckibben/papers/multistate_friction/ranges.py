@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.estimators.core.checking import training_data
+from mckibben.estimators.core.data import training_data
 from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.optimisers.descent import Damping, damped, descend
 from mckibben.recording import Recording

@@ -21,7 +21,7 @@ from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.core.uncertainty import relative_sizes
 from mckibben.estimators.dynamics.narx_free_run import FreeRuns, Segment, free_run_errors, segments
 from mckibben.estimators.dynamics.narx_regressors import Lags
-from mckibben.estimators.optimisers.descent import Radius, descend
+from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 BOUND = 1.0
@@ -149,13 +149,13 @@ class NarxEstimator(SearchEstimator):
         if sum(int(piece.counts.sum()) for piece in pieces) < start.size:
             return []
         runs = FreeRuns(model, data.sample_time, pieces)
-        path = descend(
+        path = trust_region(
             partial(_errors, model, runs, tracker),
             partial(_slopes, model, runs),
             start,
-            Radius(start, relative_sizes(start)),
-            most_evaluations=self.max_evaluations,
+            scale=relative_sizes(start),
             least_gain=LEAST_GAIN,
+            max_evaluations=self.max_evaluations,
         )
         return [model.unpack(parameters) for parameters, _ in path]
 

@@ -258,7 +258,7 @@ def lifting() -> Iterator[Row]:
             train.append(recording)
         else:
             tests[float(run.labels["force"]), float(run.labels["frequency"])] = recording
-    theirs: Any = fit("activation-pressure", train, method="pso")
+    theirs: Any = fit("activation-pressure", train)
     memory: Any = fit("activation-memory", train)
     balance = fit(BALANCE, train).inverse()
     for force in FORCES:

@@ -72,14 +72,3 @@ class ElasticPlasticEstimator(SeparableEstimator):
             self.starting_rule,
             **self.channels(data),
         )
-
-    # --- Particle swarms go over all parameters of the block, in the order of its `pack`.
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return a model, and bounds of [gain, weight, threshold] around mean slopes of the data."""
-        width, slope = (
-            np.ptp(data.input_range),
-            np.ptp(data.output_range) / np.ptp(data.input_range),
-        )
-        template = self.build(np.array([0.1]), np.array([slope, slope]), 0.0, data)
-        lower = np.array([0.1 * slope, -0.09 * slope, 0.005 * width])
-        return template, lower, np.array([3 * slope, 3 * slope, 0.45 * width])

@@ -31,7 +31,7 @@ def wait(jobs: Jobs) -> None:
 def test_cancelled_at_once_and_restarted(tmp_path: Path) -> None:
     workspace = filled(tmp_path)
     jobs = Jobs(workspace, at_once=1)
-    slow = jobs.submit("fit", asked("gpi", "slow", method="pso"))
+    slow = jobs.submit("fit", asked("gpi", "slow", n_starts=5000))
     waiting = jobs.submit("fit", asked("pi", "quick"))
     while slow.state != "running":
         jobs.poll()

@@ -66,7 +66,6 @@ BAD = [
     # Models, settings and channels
     ("fit spline run.csv -o out.json", "'spline'"),
     (f"{FIT} --set n_operators=many", "n_operators is 'many'"),
-    (f"{FIT} --method luck", "method is 'luck'"),
     (f"{FIT} --output temperature", "temperature"),
     (f"{FIT} --output pressure", "pressure"),
     (f"{FIT} --unit pressure", "--unit 'pressure'"),

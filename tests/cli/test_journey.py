@@ -24,7 +24,7 @@ def columns(path: Path) -> dict[str, np.ndarray]:
 @pytest.fixture
 def model(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> Path:
     path = tmp_path / "model.json"
-    settings = ["--set", "n_operators=5", "--method", "ls", "--seed", 0]
+    settings = ["--set", "n_operators=5", "--seed", 0]
     channels = ["--input", "pressure", "--output", "displacement"]
     result = cli("fit", "gpi", files[0], *channels, "-o", path, *settings)
     assert result.code == 0, result.err

@@ -22,8 +22,6 @@ QUICK: dict[str, Any] = {
     "n_units": 2,
     "n_terms": 6,
     "max_evaluations": 6,
-    "pso_particles": 6,
-    "pso_iterations": 4,
     "n_play": 3,
     "n_stops": 3,
     "n_lags": 1,
@@ -108,7 +106,7 @@ def quick(name: str, kind: str | None = None, **settings: Any) -> Any:
     made = KINDS[kind or kinds_for(name)[0]]
     cheap = {key: value for key, value in QUICK.items() if key in known}
     cheap |= {key: min(known[key], 1) for key in ORDERS if key in known}
-    if known.get("method") == "pso" and "pso_particles" not in known:
+    if known.get("method") == "pso":
         cheap["method"] = "ls"
     channels = estimator_class.channel_settings(made.inputs, made.outputs)
     return estimator_class(**cheap | channels | settings)

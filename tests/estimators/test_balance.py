@@ -18,7 +18,7 @@ from mckibben.blocks.memoryless import Contact
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_loads import under
 from mckibben.estimators.coupled.balance_slopes import run
-from mckibben.estimators.optimisers.constrained import constrained_least_squares
+from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.signals.broadband import random_wave
 
 STEP = 0.05

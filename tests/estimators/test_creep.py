@@ -12,7 +12,7 @@ from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.dynamics.creep_start import begun_places, begun_state
 from mckibben.blocks.memoryless import Negative
 from mckibben.comparison.free_run import run_free
-from mckibben.estimators.core.checking import training_data
+from mckibben.estimators.core.data import training_data
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.creep_pi import CreepPIEstimator
 from mckibben.estimators.optimisers.linear import solve_linear

@@ -108,7 +108,7 @@ def sines(frequency: float, force: float) -> Recording:
 
 def test_activation_pressure_finds_the_published_profile_again() -> None:
     runs = [sines(w, f) for w in (0.5, 1.0, 2.0) for f in (0.0, 100.0, 200.0, 300.0)]
-    fit: Any = ActivationPressureEstimator(method="ls", rate_time_constant=0.0).fit(runs)
+    fit: Any = ActivationPressureEstimator(rate_time_constant=0.0).fit(runs)
     for run, frequency in ((runs[0], 0.5), (runs[-1], 2.0)):
         told = replace(fit.model_, frequency=frequency)
         error = told.simulate(run)["pressure"] - run["pressure"]

@@ -15,9 +15,9 @@ from mckibben import DataError, ModelError, Recording, identify
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.comparison.free_run import run_free
-from mckibben.estimators.core.affine_match import affine_match
-from mckibben.estimators.core.checking import training_data
+from mckibben.estimators.core.data import training_data
 from mckibben.estimators.dynamics.linear_polynomials import Orders, errors
+from mckibben.papers.field_models.affine_match import affine_match
 from mckibben.registry import load
 
 Array = NDArray[np.float64]

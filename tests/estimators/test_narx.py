@@ -11,7 +11,7 @@ import pytest
 from mckibben import Recording
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.comparison.memory_test import hold_test
-from mckibben.estimators.core.checking import training_data
+from mckibben.estimators.core.data import training_data
 from mckibben.estimators.dynamics.narx_free_run import FreeRuns, feed_back, segments
 from mckibben.estimators.dynamics.narx_polynomial import NarxPolynomialEstimator
 from mckibben.estimators.dynamics.narx_selection import select

@@ -12,12 +12,11 @@ from mckibben import Recording
 from mckibben.blocks.compose import Series
 from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.estimators.core.checking import training_data
+from mckibben.estimators.core.data import training_data
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.optimisers.descent import Damping, Radius, Trust, descend
+from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.linear import solve_linear
-from mckibben.estimators.optimisers.multi_start import multi_start
-from mckibben.estimators.optimisers.swarm import Swarm, particle_swarm
+from mckibben.estimators.optimisers.multi_start import multi_start, trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.registry import load
 
@@ -110,13 +109,30 @@ def test_a_swarm_finds_the_minimum_and_repeats() -> None:
     assert sphere(first[np.newaxis])[0] < 1e-2
 
 
-@pytest.mark.parametrize("trust", [Radius(np.array([-1.2, 1.0]), np.ones(2)), Damping(1e-3, 1e9)])
-def test_descent_falls_at_every_step_and_arrives(trust: Trust) -> None:
+@pytest.mark.parametrize("bounds", [(-np.inf, np.inf), (-2.0, 1.5)])
+def test_a_trust_region_falls_at_every_step_and_arrives(bounds: tuple[float, float]) -> None:
     def slopes(point: np.ndarray) -> np.ndarray:
         return np.array([[-20 * point[0], 10.0], [-1.0, 0.0]])
 
     start = np.array([-1.2, 1.0])
-    path = list(descend(valley, slopes, start, trust, most_evaluations=100, least_gain=1e-12))
+    path = trust_region(
+        valley, slopes, start, scale="jac", bounds=bounds, max_evaluations=100, least_gain=1e-12
+    )
+    np.testing.assert_array_equal(path[0][0], start)
     costs = [float(np.sum(valley(point) ** 2)) for point, _ in path]
+    assert costs == [cost for _, cost in path]
     assert np.all(np.diff(costs) < 0)
     np.testing.assert_allclose(path[-1][0], [1, 1], atol=1e-6)
+
+
+def test_a_trust_region_does_not_start_where_errors_are_zero_or_infinite() -> None:
+    for start, cost in ((np.ones(2), 0.0), (np.full(2, np.inf), np.inf)):
+        path = trust_region(
+            lambda point: np.abs(point - 1.0),
+            lambda point: np.eye(2),
+            start,
+            scale="jac",
+            least_gain=1e-9,
+            max_evaluations=9,
+        )
+        assert [found for _, found in path] == [cost]

@@ -46,9 +46,6 @@ def fit(
             "--output", metavar="CHANNEL", help="Output; repeatable; default the model's."
         ),
     ] = None,
-    method: Annotated[
-        str | None, typer.Option("--method", help="How to search: ls, pso-ls, pso.")
-    ] = None,
     prior: Annotated[
         str | None,
         typer.Option(
@@ -82,11 +79,11 @@ def fit(
     before = prior or given.get("prior")
     sheets = [Path(before)] if isinstance(before, str) else []
     claim_model(out, inputs=[*files, *(validation or []), *sheets], force=force)
-    named = {"input": _one(input), "output": _one(output), "method": method, "prior": prior}
+    named = {"input": _one(input), "output": _one(output), "prior": prior}
     given = {key: value for key, value in named.items() if value is not None} | given
     known = {field.name for field in fields(estimator_class)}
-    for name in given.keys() & {"method", "prior"} - known:
-        raise ModelError(f"{model!r} has no setting {name!r}. Remedy: leave --{name} out.")
+    if "prior" in given and "prior" not in known:
+        raise ModelError(f"{model!r} has no setting 'prior'. Remedy: leave --prior out.")
     estimator = estimator_class(**{"seed": seed} | given)
     if validation and not estimator.stops_early:
         raise DataError(f"{model!r} does not stop early", remedy="leave --validation out")

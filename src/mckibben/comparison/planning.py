@@ -265,7 +265,7 @@ def _checked(
     recordings: Sequence[Recording], others: Sequence[Recording], channels: Channels
 ) -> str:
     """Refuse recordings that no model could use; return the unit of the outputs."""
-    from mckibben.estimators.core.checking import training_data
+    from mckibben.estimators.core.data import training_data
 
     names = channels.inputs, channels.outputs
     training_data(recordings, *names, one_rate=channels.single)

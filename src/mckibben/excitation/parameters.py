@@ -14,8 +14,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.equations import quantities
 from mckibben.blocks.running import run_many
 from mckibben.errors import MckibbenError
-from mckibben.estimators.core.checking import training_data
-from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.data import TrainingData, training_data
 from mckibben.estimators.core.uncertainty import (
     LARGEST,
     relative_sizes,

@@ -27,19 +27,11 @@ def ask(model: str, kept: Written) -> None:
     """Show the settings of a model; what differs from the defaults is kept."""
     found = settings_with_defaults(registry.load("estimators", model))
     found = [one for one in found if one.name not in CHANNELS]
-    swarm = [one for one in found if one.name.startswith("pso_")]
     given = dict(kept.get(model, {}))
     with ui.dialog() as dialog, named(ui.card().classes("w-full max-w-3xl gap-2"), "settings"):
         ui.label(f"Settings of {full_name(model)}").classes("text-lg")
         for one in found:
-            if one not in swarm:
-                _field(one, given)
-        if swarm:
-            with ui.expansion("Search by particle swarm, where the method is that").classes(
-                "w-full"
-            ):
-                for one in swarm:
-                    _field(one, given)
+            _field(one, given)
 
         def done() -> None:
             try:

@@ -6,7 +6,7 @@ import time
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -14,9 +14,9 @@ from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
 from mckibben.errors import ModelWarning
-from mckibben.estimators.core.data import Mask, TrainingData
-from mckibben.estimators.core.parameters import Parametrised
+from mckibben.estimators.core.data import Mask, TrainingData, training_data
 from mckibben.estimators.core.settings import check_settings
 from mckibben.estimators.core.uncertainty import covariance_of, simulate_all, unknown
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
@@ -41,6 +41,17 @@ Grid = Mapping[str, tuple[Any, ...]]
 DefaultFor = Literal["load", "plan of displacement", "plan of force"]
 """Where one model is used without being named: fitted to each load, beside models that are given the
 load; or fitted before a plan of recordings."""
+
+Initial = Literal["first_sample", "virgin", "fitted"]
+"""Memory before the first sample of every recording."""
+
+MADE_OF_DISPLACEMENT = {
+    "length": ", and a length is the rest length less the displacement: read that column as length, "
+    "with gain -1 and the rest length as offset",
+    "contraction": ", and a contraction is the displacement over the rest length: read that column as "
+    "contraction, with a gain of 1 over the rest length",
+}
+"""How to get a channel from a displacement."""
 
 
 @dataclass(frozen=True)
@@ -96,16 +107,22 @@ class Diagnostics:
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class Estimator(Parametrised, ABC):
-    """What all estimators share; see scikit-learn for ``get_params``, ``clone`` and the like.
+class Estimator(ABC):
+    """Base of all estimators: of one input and one output, unless a class overrides that.
+
+    Settings are the fields of the class, to be read, changed, cloned and searched over by scikit-learn.
 
     Parameters
     ----------
+    input, output : str or sequence of str
+        Channels to learn from.
     seed : int
         Of everything random.
     """
 
     seed: Annotated[int, Interval(ge=0, le=LARGEST_SEED)] = 0
+    input: str | tuple[str, ...] | None = "pressure"
+    output: str | tuple[str, ...] | None = "displacement"
 
     title: ClassVar[str] = ""
     """Full name of the model; its short name if empty."""
@@ -143,8 +160,52 @@ class Estimator(Parametrised, ABC):
     needs_time: ClassVar[bool] = False
     """Whether it cannot learn from recordings without time."""
 
+    made_for: ClassVar[tuple[str, str] | None] = None
+    """Kinds of channel, input and output, that the model is about; None for any."""
+
+    told: ClassVar[tuple[str, ...]] = ()
+    """Settings that name channels which the model is given beside the input; of the block, too."""
+
+    errors_known: ClassVar[bool] = True
+    """Whether standard errors of the parameters are computed."""
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Return the settings by name; ``deep`` changes nothing, as none has settings of its own."""
+        return {name: getattr(self, name) for name in self._names()}
+
+    def set_params(self, **settings: Any) -> Self:
+        """Change settings.
+
+        Raises
+        ------
+        ValueError
+            On a name that is none of them.
+        """
+        unknown = settings.keys() - set(self._names())
+        if unknown:
+            raise ValueError(
+                f"{sorted(unknown)[0]!r} is no setting of {type(self).__name__}. "
+                f"Remedy: choose among {', '.join(self._names())}."
+            )
+        for name, value in settings.items():
+            setattr(self, name, value)
+        return self
+
+    def __repr__(self) -> str:
+        values = ((field.name, repr(getattr(self, field.name)), field) for field in fields(self))
+        changed = [f"{name}={text}" for name, text, field in values if text != repr(field.default)]
+        return f"{type(self).__name__}({', '.join(changed)})"
+
+    def __sklearn_tags__(self) -> Any:
+        from sklearn.base import BaseEstimator  # scikit-learn alone asks, so it is there already
+
+        return BaseEstimator().__sklearn_tags__()
+
     @classmethod
-    @abstractmethod
+    def _names(cls) -> list[str]:
+        return sorted(field.name for field in fields(cls))
+
+    @classmethod
     def objection(
         cls,
         recordings: Sequence[Recording],
@@ -153,9 +214,23 @@ class Estimator(Parametrised, ABC):
         scheduling: Sequence[str] | None = None,
     ) -> str | None:
         """Return why the model has no place in a comparison on recordings, or None."""
+        if len(inputs) != 1 or len(outputs) != 1:
+            return "it is of one input and one output"
+        if scheduling is not None:
+            return "it is not told the load"
+        (given,), (wanted,) = inputs, outputs
+        kinds = (given.partition("_")[0], wanted.partition("_")[0])
+        if cls.made_for is not None and kinds != cls.made_for:
+            nearly = kinds == ("displacement", cls.made_for[1])
+            made = MADE_OF_DISPLACEMENT.get(cls.made_for[0], "") if nearly else ""
+            return f"it maps {cls.made_for[0]} to {cls.made_for[1]}{made}"
+        needed = cls(input=given, output=wanted)._told_channels()
+        absent = [name for name in needed if any(name not in r for r in recordings)]
+        if absent:
+            return f"it needs the channel {absent[0]!r} too"
+        return None if cls.told else resting(recordings, inputs)
 
     @classmethod
-    @abstractmethod
     def channel_settings(
         cls,
         inputs: Sequence[str],
@@ -163,17 +238,33 @@ class Estimator(Parametrised, ABC):
         scheduling: Sequence[str] | None = None,
     ) -> dict[str, Any]:
         """Return the settings that make it learn from some channels; None for its own choice."""
+        return {"input": inputs[0], "output": outputs[0]}
+
+    def channels(self, data: TrainingData) -> dict[str, Channel]:
+        """Return the channels of the block to build, as keyword arguments."""
+        beside = zip(self.told, data.scheduled, strict=True)
+        return {"input": data.inputs[0], "output": data.outputs[0], **dict(beside)}
+
+    def _told_channels(self) -> tuple[str, ...]:
+        return tuple(getattr(self, name) for name in self.told)
 
     @property
     def stops_early(self) -> bool:
         """Whether runs that nothing is fitted to can stop the search."""
         return False
 
-    @abstractmethod
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
         """Return what is learned from recordings, checked."""
+        # models of several muscles begin anew after rows left out, and so are fitted to bridges too
+        measured = [~one.bridged for one in listed(recordings)]
+        counted = measured if rows is None else map(np.logical_and, rows, measured)
+        assert self.input is not None
+        assert self.output is not None
+        return training_data(
+            recordings, self.input, self.output, list(counted), self._told_channels()
+        )
 
     @abstractmethod
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -334,6 +425,8 @@ class Estimator(Parametrised, ABC):
 
         By default, the parameters at no bound whose standard errors are not known.
         """
+        if not self.errors_known:
+            return ()
         found = self.diagnostics_
         unknown = np.flatnonzero(np.isnan(found.standard_errors)).tolist()
         return tuple(place for place in unknown if place not in found.at_bounds)
@@ -349,6 +442,8 @@ class Estimator(Parametrised, ABC):
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
         """Return the condition of the free parameters, and the covariance of all; see `Diagnostics`."""
+        if not self.errors_known:
+            return np.nan, unknown(block)
         return covariance_of(block, data, residual, at_bounds)
 
     def at_bounds(self, block: Block) -> tuple[int, ...]:
@@ -356,18 +451,34 @@ class Estimator(Parametrised, ABC):
         return tuple(np.flatnonzero(block.pack() == 0).tolist())
 
 
-class ErrorsUnknown:
-    """What an estimator inherits first whose fits do not tell how sure parameters are."""
+@dataclass(kw_only=True, repr=False, eq=False)
+class SearchEstimator(Estimator):
+    """An estimator of one input and one output with a search of its own.
 
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return that neither condition nor covariance is known."""
-        return np.nan, unknown(block)
+    Parameters
+    ----------
+    input, output : str
+        Channels to learn from.
+    initial : {"first_sample", "virgin", "fitted"}
+        Memory before the first sample of every recording: as if the input had only risen; as if nothing
+        had ever happened; or fitted with the rest.
+    """
 
-    def undetermined(self) -> tuple[int, ...]:
-        """Return none, since it is not known."""
-        return ()
+    input: str = "pressure"
+    output: str = "displacement"
+    initial: Initial = "first_sample"
+
+    @property
+    def starting_rule(self) -> Literal["first_sample", "virgin"]:
+        """The rule behind `initial` that blocks start by."""
+        return "virgin" if self.initial == "virgin" else "first_sample"
+
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        return self.identify(data, tracker)
+
+    @abstractmethod
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the block found, and the data with the memories at the start that belong to it."""
 
 
 def _rms(residual: Array) -> Array:

@@ -7,21 +7,21 @@ are the exact (non-negative) least-squares solution, so the search runs in a han
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.errors import ModelError
+from mckibben.blocks.compose import Series
+from mckibben.blocks.memoryless import Negative
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.searching import SearchingEstimator
+from mckibben.estimators.core.estimator import Estimator, Initial
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.multi_start import Choice, multi_start
-from mckibben.estimators.optimisers.swarm import particle_swarm
 from mckibben.estimators.optimisers.tracker import Tracker
 
 SEARCH_SAMPLES = 1500
@@ -41,11 +41,16 @@ WORST = 1e150
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class SeparableEstimator(SearchingEstimator):
+class SeparableEstimator(Estimator):
     """An estimator of a block that is linear in its weights and offset.
 
     Parameters
     ----------
+    input, output : str
+        Channels to learn from.
+    initial : {"first_sample", "virgin", "fitted"}
+        Memory before the first sample of every recording: as if the input had only risen; as if nothing
+        had ever happened; or fitted with the rest, one number a recording: the input from which it fell.
     nonnegative : bool
         Whether weights must be at least 0, which guarantees an exact inverse.
     n_starts : int
@@ -54,6 +59,9 @@ class SeparableEstimator(SearchingEstimator):
         How many of them, the most promising, are refined.
     """
 
+    input: str = "pressure"
+    output: str = "displacement"
+    initial: Initial = "first_sample"
     nonnegative: bool = True
     n_starts: Annotated[int, Ge(1)] = 48
     n_refined: Annotated[int, Ge(1)] = 4
@@ -68,12 +76,13 @@ class SeparableEstimator(SearchingEstimator):
     fits_peaks: ClassVar[bool] = True
     """Whether a fitted start is the input from which every run came down."""
 
-    typical: ClassVar[int] = 0
-    """Place of the guess about which a swarm over all parameters is bounded."""
+    rises: ClassVar[bool] = True
+    """Whether the block's output rises with its input, so that falling data are turned over."""
 
-    reach: ClassVar[tuple[float, float]] = (2.0, 0.1)
-    """How far those bounds are, relative to a parameter; and the least that counts as its size, relative
-    to the largest."""
+    @property
+    def starting_rule(self) -> Literal["first_sample", "virgin"]:
+        """The rule behind `initial` that blocks start by."""
+        return "virgin" if self.initial == "virgin" else "first_sample"
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return lowest and highest non-linear parameters, each of shape (m,); by default none."""
@@ -90,20 +99,6 @@ class SeparableEstimator(SearchingEstimator):
     @abstractmethod
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         """Return the block with these parameters."""
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return a block of the structure to identify, and bounds of its parameter vector.
-
-        For particle swarms over all parameters. By default the block solved for at the typical guess,
-        and bounds about its parameters, each as far as `reach` says.
-        """
-        guesses = self.guesses(data)
-        theta = guesses[self.typical] if guesses else np.empty(0)
-        template = self.build(theta, *self._solve(theta, data), data)
-        values = template.pack()
-        most, least = self.reach
-        span = most * np.maximum(np.abs(values), least * np.abs(values).max())
-        return template, values - span, values + span
 
     def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
         """Return how the output moves with the non-linear parameters, the linear ones held.
@@ -144,14 +139,20 @@ class SeparableEstimator(SearchingEstimator):
         """Return what groups of the non-linear parameters may be exchanged for; none as a rule."""
         return []
 
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the block found on data that rise, turned over where they fall."""
+        if not (self.rises and data.falls):
+            return self.identify(data, tracker)
+        rising, used = self.identify(data.negated(), tracker)
+        channel = self.channels(data)["output"]
+        block = Series((rising, Negative(channel, channel)))
+        return block, data.with_peaks([run.peak for run in used.runs])
+
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        if self.method == "pso":
-            if self.initial == "fitted" and self.fits_peaks:
-                raise ModelError(
-                    "a swarm over all parameters cannot fit the initial memory too. "
-                    "Remedy: use --set method=ls, or initial=first_sample."
-                )
-            return self._swarm_over_all(data, tracker), data
+        """Return the block found, and the data with the memories at the start that belong to it.
+
+        Where `rises`, the output of the data rises with the input.
+        """
         theta = self._search(data, tracker)
         if self.initial == "fitted" and self.fits_peaks:
             for _ in range(2):
@@ -167,25 +168,18 @@ class SeparableEstimator(SearchingEstimator):
         thin = data.thinned(SEARCH_SAMPLES)
         if self.searches_condensed:
             thin = thin.condensed()
-        if self.method == "pso-ls":
-
-            def costs(points: Array) -> Array:
-                return np.array([_rms(self._residuals(point, thin)) for point in points])
-
-            theta = particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed)
-        else:
-            tracker.budget = self.n_starts + self.n_refined * self.search_evaluations
-            theta = multi_start(
-                lambda point: self._residuals(point, thin),
-                self.guesses(data) + self._scattered(lower, upper),
-                lower,
-                upper,
-                tracker,
-                n_refined=self.n_refined,
-                max_evaluations=self.search_evaluations,
-                jacobian=lambda point: self.jacobian(point, thin),
-                choices=self.choices(data),
-            )
+        tracker.budget = self.n_starts + self.n_refined * self.search_evaluations
+        theta = multi_start(
+            lambda point: self._residuals(point, thin),
+            self.guesses(data) + self._scattered(lower, upper),
+            lower,
+            upper,
+            tracker,
+            n_refined=self.n_refined,
+            max_evaluations=self.search_evaluations,
+            jacobian=lambda point: self.jacobian(point, thin),
+            choices=self.choices(data),
+        )
         return theta if tracker.interrupted else self._polish(theta, data, tracker)
 
     def _scattered(self, lower: Array, upper: Array) -> list[Array]:
@@ -285,14 +279,21 @@ class SeparableEstimator(SearchingEstimator):
         linear, offset = self._solve_for(matrix, data)
         return np.asarray(matrix @ linear + offset - data.target)
 
-    def _swarm_over_all(self, data: TrainingData, tracker: Tracker) -> Block:
-        template, lower, upper = self.parameter_bounds(data)
-
-        def costs(points: Array) -> Array:
-            outputs = self.free_runs([template.unpack(point) for point in points], data)
-            return np.sqrt(np.mean((outputs - data.target) ** 2, axis=1))
-
-        return template.unpack(particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed))
+    def best_of(
+        self, setting: str, values: Sequence[float], data: TrainingData, tracker: Tracker
+    ) -> tuple[Block, TrainingData]:
+        """Return what is found with the value of a setting that fits best."""
+        found = []
+        for place, value in enumerate(values):
+            own = tracker.part(place / len(values), (place + 1) / len(values))
+            settings = self.get_params() | {setting: value}
+            found.append((*type(self)(**settings).identify(data, own), own))
+            tracker.saw_all(own)
+            if own.interrupted:
+                break
+        block, chosen, best = min(found, key=lambda item: item[2].best_cost)
+        tracker.best_cost, tracker.best = best.best_cost, best.best
+        return block, chosen
 
 
 def counting(data: TrainingData, over_history: Callable[[Run], Array]) -> Array:

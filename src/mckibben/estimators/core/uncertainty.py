@@ -12,6 +12,7 @@ practitioner's guide to robust covariance matrix estimation", 1997.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.running import run_many
-from mckibben.estimators.core.autoregression import Autoregression, autoregression
 from mckibben.estimators.core.data import Run, TrainingData
 
 LARGEST = 1e150
@@ -31,6 +31,9 @@ DIFFERENCE = 1e-6
 LEAST, DETERMINED = 1e-6, 0.99
 """Share of the largest singular value of sensitivities that tells anything; share of a parameter's own
 direction that must be told."""
+
+MOST_TERMS = 40
+"""Of an autoregression of residuals."""
 
 
 def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
@@ -206,3 +209,80 @@ def blanked(covariance: Array, told: NDArray[np.bool_]) -> Array:
     covariance = covariance.copy()
     covariance[~told] = covariance[:, ~told] = np.nan
     return covariance
+
+
+@dataclass(frozen=True, eq=False)
+class Autoregression:
+    """Residuals as an autoregression: e_t = a_1 e_{t-1} + ... + shock.
+
+    Parameters
+    ----------
+    coefficients : array, shape (k,)
+        a.
+    shock : float
+        Standard deviation of what is new in every sample.
+    variance : float
+        Of the residuals.
+    """
+
+    coefficients: Array
+    shock: float
+    variance: float
+
+    @property
+    def _whitener(self) -> Array:
+        return np.concatenate([[1.0], -self.coefficients])
+
+    def shocks(self, series: Array) -> Array:
+        """Return what is new in every sample of a series."""
+        from scipy.signal import lfilter
+
+        return np.asarray(lfilter(self._whitener, [1.0], series))
+
+    def tinted(self, slopes: Array) -> Array:
+        """Return L' J, shape (n, k), of which the product with itself is J' R J."""
+        from scipy.signal import lfilter
+
+        back = lfilter([1.0], self._whitener, slopes[::-1], axis=0)[::-1]
+        return np.asarray(self.shock * back)
+
+    def worth(self, n: int) -> float:
+        """Return how many independent samples tell as much of the mean as n of these."""
+        if self.variance <= 0:
+            return float(n)
+        memory = (self.shock / float(self._whitener.sum())) ** 2 / self.variance
+        return float(np.clip(n / max(memory, 1e-12), 1.0, n))
+
+
+def autoregression(series: Sequence[Array]) -> Autoregression:
+    """Return the autoregression of pieces of one series, of as many terms as BIC asks for.
+
+    By Burg's method, which is always stable.
+
+    Parameters
+    ----------
+    series : sequence of array, shape (n,)
+    """
+    n = sum(map(len, series))
+    variance = float(np.mean(np.concatenate(series) ** 2)) if n else 0.0
+    forward: list[NDArray[np.float64]] = [np.asarray(e, dtype=np.float64) for e in series]
+    backward = list(forward)
+    best, chosen, shock = n * np.log(max(variance, 1e-300)), np.zeros(0), variance
+    a, power = np.zeros(0), variance
+    for order in range(1, min(MOST_TERMS, n // 10) + 1):
+        ahead = [f[1:] for f in forward]
+        behind = [b[:-1] for b in backward]
+        below = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
+        if not below > 1e-300:
+            break
+        k = 2 * sum(float(f @ b) for f, b in zip(ahead, behind, strict=True)) / below
+        forward = [f - k * b for f, b in zip(ahead, behind, strict=True)]
+        backward = [b - k * f for f, b in zip(ahead, behind, strict=True)]
+        a = np.append(a - k * a[::-1], k)
+        power *= 1 - k * k
+        if not power > 1e-300:
+            break
+        cost = n * np.log(power) + order * np.log(n)
+        if cost < best:
+            best, chosen, shock = cost, a, power
+    return Autoregression(chosen, float(np.sqrt(max(shock, 0.0))), variance)

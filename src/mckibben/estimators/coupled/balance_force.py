@@ -18,8 +18,7 @@ from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless import Affine
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.estimator import ErrorsUnknown
-from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_prior import Told, told_by
 from mckibben.estimators.coupled.base import FEWEST_SAMPLES
@@ -28,7 +27,7 @@ from mckibben.recording import Recording
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class BalanceForceEstimator(ErrorsUnknown, SingleEstimator):
+class BalanceForceEstimator(SearchEstimator):
     """Force by length or displacement and pressure, from a balance of forces.
 
     Parameters
@@ -72,8 +71,8 @@ class BalanceForceEstimator(ErrorsUnknown, SingleEstimator):
     prior: Told = None
 
     effort: ClassVar[float] = 1.0
+    errors_known: ClassVar[bool] = False
     told: ClassVar[tuple[str, ...]] = ("pressure",)
-    rises: ClassVar[bool] = False
 
     @classmethod
     def objection(

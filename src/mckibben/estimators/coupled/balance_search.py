@@ -15,7 +15,7 @@ from mckibben.estimators.core.uncertainty import inverted
 from mckibben.estimators.coupled.balance_checks import at_rest, held
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
-from mckibben.estimators.optimisers.constrained import constrained_least_squares
+from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
 
 if TYPE_CHECKING:

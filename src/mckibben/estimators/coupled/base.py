@@ -12,9 +12,8 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.errors import DataError
-from mckibben.estimators.core.checking import training_data
-from mckibben.estimators.core.data import Mask, TrainingData, moves_alone
-from mckibben.estimators.core.estimator import ErrorsUnknown, Estimator, resting
+from mckibben.estimators.core.data import Mask, TrainingData, moves_alone, training_data
+from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
 
@@ -29,7 +28,7 @@ FEWEST_SAMPLES = 50
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class CoupledEstimator(ErrorsUnknown, Estimator):
+class CoupledEstimator(Estimator):
     """Settings common to all estimators of several inputs and outputs.
 
     Parameters
@@ -43,6 +42,7 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
     """
 
     purpose = "several"
+    errors_known: ClassVar[bool] = False
 
     input: str | tuple[str, ...] | None = None
     output: str | tuple[str, ...] | None = None

@@ -19,7 +19,7 @@ from mckibben.estimators.coupled.fuzzy import (
 )
 from mckibben.estimators.coupled.fuzzy_projection import project
 from mckibben.estimators.coupled.fuzzy_swarm import swarmed
-from mckibben.estimators.optimisers.swarm import Swarm
+from mckibben.estimators.coupled.swarm import Swarm
 from mckibben.estimators.optimisers.tracker import Tracker
 
 Method = Literal["ls", "pso"]

@@ -1,12 +1,9 @@
 """Antecedents of a fuzzy network by variable projection.
 
-Kaufman's form, with Levenberg-Marquardt steps from even sets.
+Kaufman's form, by a trust region from even sets.
 """
 
 from __future__ import annotations
-
-from collections.abc import Iterator
-from itertools import islice
 
 import numpy as np
 
@@ -19,7 +16,7 @@ from mckibben.estimators.coupled.fuzzy import (
     memberships,
     regressors,
 )
-from mckibben.estimators.optimisers.descent import Damping, damped, descend
+from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 NARROWEST, WIDEST = 0.15, 1.5
@@ -54,22 +51,25 @@ def project(
         return problem.errors(start.replaced(theta)).ravel()
 
     def slopes(theta: Array) -> Array:
-        return sensitivities(problem, start.replaced(theta))[0]
+        sets = start.replaced(theta)
+        by_theta, left = sensitivities(problem, sets)
+        held = float(np.sqrt(np.mean(left**2)))
+        if validation is not None:
+            held = _held(problem, sets, *validation)
+        tracker.saw(theta, held)
+        return by_theta
 
-    def within(theta: Array, by: Array, left: Array, damping: float) -> Iterator[Array]:
-        step = unit * damped(by * unit, left, damping, 1e-9)
-        yield np.clip(theta + step, lower, upper)
-
-    trust = Damping(1e-2, growth=5.0, speeding=1.0, easing=5.0, tries=6, steps=within)
-    path = descend(errors, slopes, start.vector, trust, least_gain=LEAST_GAIN)
     tracker.budget = MOST_STEPS + 1
     with tracker.searching():
-        for step, (theta, squares) in enumerate(islice(path, MOST_STEPS + 1)):
-            cost = float(np.sqrt(squares / problem.y.size))
-            if validation is not None:
-                cost = _held(problem, start.replaced(theta), *validation)
-            tracker.saw(theta, cost)
-            tracker.reached(step / MOST_STEPS)
+        trust_region(
+            errors,
+            slopes,
+            start.vector,
+            scale=unit,
+            bounds=(lower, upper),
+            least_gain=LEAST_GAIN,
+            max_evaluations=MOST_STEPS + 1,
+        )
     return start if tracker.best is None else start.replaced(tracker.best)
 
 

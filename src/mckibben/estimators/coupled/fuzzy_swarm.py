@@ -12,7 +12,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.estimators.coupled.fuzzy import Problem, Sets
-from mckibben.estimators.optimisers.swarm import Swarm, particle_swarm
+from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.tracker import Tracker
 
 ATTRACTION = 0.5

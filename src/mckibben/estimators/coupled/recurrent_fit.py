@@ -22,7 +22,7 @@ from mckibben.blocks.kernels import kernel
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
-from mckibben.estimators.optimisers.swarm import Swarm, particle_swarm
+from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.tracker import Tracker
 
 SWARM = Swarm(20, 30, (0.9, 0.4), 2.0, 2.0, fastest=0.5, stops=False)

@@ -258,17 +258,6 @@ class AirEstimator(SeparableEstimator):
             supply=self.supply,
         )
 
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the block solved for, and bounds that keep it valid."""
-        theta = self.guesses(data)[self.typical]
-        template = self.build(theta, *self._solve(theta, data), data)
-        low, high = data.input_range
-        quick, slow = np.exp([bound[0] for bound in self.bounds(data)])
-        gain, offset = template.gain, template.offset
-        lower = [0.2 * gain, offset - 0.5 * (high - low), 0.0, quick, quick]
-        upper = [5 * gain, offset + 0.5 * (high - low), WIDEST * (high - low), slow, slow]
-        return template, np.array(lower), np.array(upper)
-
 
 def delayed(data: TrainingData, late: int) -> TrainingData:
     """Return the same data with inputs late by so many samples, the first held until then."""

@@ -15,7 +15,7 @@ from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.estimator import Grid
+from mckibben.estimators.core.estimator import Grid, SearchEstimator
 from mckibben.estimators.core.uncertainty import inverted, told_by_runs
 from mckibben.estimators.dynamics.linear_polynomials import Orders, Polynomials
 from mckibben.estimators.dynamics.linear_starts import LinearEstimator
@@ -49,7 +49,7 @@ class Noise:
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class PredictionErrorEstimator(LinearEstimator):
+class PredictionErrorEstimator(LinearEstimator, SearchEstimator):
     """An estimator of a linear model by one-step prediction errors, run free ever after.
 
     After `fit`, ``noise_`` holds the noise model, the one-step error, and the covariance of all
@@ -94,7 +94,6 @@ class PredictionErrorEstimator(LinearEstimator):
     lags: Annotated[Sequence[Lag], Len(1)] | None = None
     n_starts: Annotated[int, Interval(ge=1, le=1000)] = 12
 
-    rises: ClassVar[bool] = False
     effort: ClassVar[float] = 0.02
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.linear_start import LinearStart
 from mckibben.estimators.core.data import Mask, Run, TrainingData
-from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.core.estimator import Estimator, Initial
 from mckibben.estimators.core.uncertainty import (
     relative_sizes,
     sensitivities,
@@ -25,7 +25,7 @@ from mckibben.recording import Recording
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class LinearEstimator(SingleEstimator):
+class LinearEstimator(Estimator):
     """An estimator of a linear dynamic model.
 
     Parameters
@@ -38,7 +38,9 @@ class LinearEstimator(SingleEstimator):
         it is then identified from rest, and its block says so.
     """
 
-    initial: Literal["first_sample", "virgin", "fitted"] = "fitted"
+    input: str = "pressure"
+    output: str = "displacement"
+    initial: Initial = "fitted"
 
     def _fit(
         self,

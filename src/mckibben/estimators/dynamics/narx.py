@@ -17,11 +17,11 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.narx import Narx
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.core.uncertainty import relative_sizes
 from mckibben.estimators.dynamics.narx_free_run import FreeRuns, Segment, free_run_errors, segments
 from mckibben.estimators.dynamics.narx_regressors import Lags
-from mckibben.estimators.optimisers.descent import Radius, descend
+from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 BOUND = 1.0
@@ -47,7 +47,7 @@ HOLD = 1000
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class NarxEstimator(SingleEstimator):
+class NarxEstimator(SearchEstimator):
     """An estimator of a NARX model.
 
     Parameters
@@ -75,8 +75,6 @@ class NarxEstimator(SingleEstimator):
     refine: bool = True
     max_evaluations: Annotated[int, Interval(ge=1, le=10_000)] = 20
     allow_unstable: bool = False
-
-    rises: ClassVar[bool] = False
 
     def fields(self, lags: Lags, data: TrainingData) -> dict[str, Any]:
         """Return the fields that all NARX blocks have."""
@@ -151,13 +149,13 @@ class NarxEstimator(SingleEstimator):
         if sum(int(piece.counts.sum()) for piece in pieces) < start.size:
             return []
         runs = FreeRuns(model, data.sample_time, pieces)
-        path = descend(
+        path = trust_region(
             partial(_errors, model, runs, tracker),
             partial(_slopes, model, runs),
             start,
-            Radius(start, relative_sizes(start)),
-            most_evaluations=self.max_evaluations,
+            scale=relative_sizes(start),
             least_gain=LEAST_GAIN,
+            max_evaluations=self.max_evaluations,
         )
         return [model.unpack(parameters) for parameters, _ in path]
 

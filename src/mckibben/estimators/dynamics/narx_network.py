@@ -16,7 +16,7 @@ from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.dynamics.narx import LEAST_GAIN, NarxEstimator
 from mckibben.estimators.dynamics.narx_regressors import Lags
-from mckibben.estimators.optimisers.descent import Radius, descend
+from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 ONE_STEP_SAMPLES = 3000
@@ -64,14 +64,14 @@ class NarxNetworkEstimator(NarxEstimator):
         models: list[Narx] = []
         for _ in range(self.n_starts):
             first = rng.normal(0.0, 1.0, units * (n + 1))
-            *_, (found, _) = descend(
+            found, _ = trust_region(
                 one_step.errors,
                 one_step.slopes,
                 first,
-                Radius(first, np.ones(first.size)),
-                most_evaluations=ONE_STEP_EVALUATIONS,
+                scale=np.ones(first.size),
                 least_gain=LEAST_GAIN,
-            )
+                max_evaluations=ONE_STEP_EVALUATIONS,
+            )[-1]
             weights = one_step.weights(found)
             layer = found.reshape(units, n + 1)
             hidden = np.column_stack([layer, weights[1 + n :]])

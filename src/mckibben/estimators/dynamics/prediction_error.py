@@ -9,10 +9,10 @@ ask for; the best of all is kept.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import combinations_with_replacement, islice
+from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -26,8 +26,7 @@ from mckibben.estimators.dynamics.linear_stability import (
     polynomial,
     spectral_radius,
 )
-from mckibben.estimators.optimisers.descent import Damping, damped, descend
-from mckibben.estimators.optimisers.multi_start import follow_best
+from mckibben.estimators.optimisers.multi_start import follow_best, trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 STABLE = 1.0 - 1e-7
@@ -38,9 +37,6 @@ INVERTIBLE = 1.0 - 1e-7
 
 FIRST_STEPS, FOLLOWED, STEPS = 8, 3, 60
 """Steps taken from every start; how many of the best, at different places, are followed; how far."""
-
-HEAVIEST = 1e9
-"""Damping at which no step is left."""
 
 ALTERNATIONS = 2
 """Times that noise model and B are solved for in turn, for a start."""
@@ -125,10 +121,16 @@ def minimise(
 
     def followed(theta: Array, steps: int) -> tuple[Array, float]:
         here = At(orders, runs, start, tracker)
-        trust = Damping(1e-4, HEAVIEST, steps=partial(_steps, orders))
-        path = descend(here.errors, here.slopes, theta, trust, least_gain=LEAST_GAIN)
-        *_, (found, squares) = islice(path, steps + 1)
-        return found, float(np.sqrt(squares))
+        search = partial(trust_region, scale="jac", least_gain=LEAST_GAIN, max_evaluations=steps)
+        # in the coefficients the valley of a root near the unit circle is straight; but they have
+        # bounds, at which the others would stop too, and these coordinates have none
+        found, _ = search(here.errors, here.slopes, theta)[-1]
+        loose, squares = search(
+            lambda free: here.errors(tightened(free, orders)[0]),
+            lambda free: here.slopes(free) @ tightened(free, orders)[1],
+            loosened(found, orders),
+        )[-1]
+        return tightened(loose, orders)[0], float(np.sqrt(squares))
 
     with tracker.searching():
         follow_best(
@@ -150,6 +152,8 @@ class At:
 
     def errors(self, theta: Array) -> Array:
         """Return the errors."""
+        if not admissible(theta, self.orders):
+            return np.full(sum(int(run.counts.sum()) for run in self.runs), np.inf)
         e, self._slopes, cost = evaluate(theta, self.orders, self.runs, self.start)
         self.tracker.saw(theta, cost)
         return e
@@ -157,24 +161,6 @@ class At:
     def slopes(self, theta: Array) -> Array:
         """Return the derivatives where errors were last asked for."""
         return self._slopes
-
-
-def _steps(
-    orders: Orders, theta: Array, jacobian: Array, e: Array, damping: float
-) -> Iterator[Array]:
-    """Yield where a damped step leads: in the coefficients, then in coordinates without bounds.
-
-    In the coefficients the valley of a root held near the unit circle is straight; they have bounds,
-    at which the others would stop too.
-    """
-    tried = theta + damped(jacobian, e, damping)
-    if admissible(tried, orders):
-        yield tried
-    here = loosened(theta, orders)
-    moved = here + damped(jacobian @ tightened(here, orders)[1], e, damping)
-    tried = tightened(moved, orders)[0]
-    if admissible(tried, orders):
-        yield tried
 
 
 def arx(runs: Sequence[Run], orders: Orders) -> Array:

@@ -52,7 +52,6 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
 
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
-    typical: ClassVar[int] = 1
     fits_peaks: ClassVar[bool] = False
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -153,19 +152,6 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         if "Z" in self.structure and zero is None:
             zero = 0.0
         return replace(self.unit(theta, data, gain), zero_time=zero, output_offset=offset)
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the model solved for, and bounds by factors of ten or more about its times."""
-        template, *_ = super().parameter_bounds(data)
-        values = template.pack()
-        span = 2 * np.maximum(np.abs(values), 1.0)
-        lower, upper = values - span, values + span
-        n = self.n_times + ("U" in self.structure)
-        lower[1 : 1 + n], upper[1 : 1 + n] = 0.05 * values[1 : 1 + n], 20 * values[1 : 1 + n]
-        if self.fit_delay:
-            place = 1 + n + ("Z" in self.structure)
-            lower[place], upper[place] = 1e-6, self.bounds(data)[1][-1]
-        return template, lower, upper
 
 
 P1 = preset(

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from itertools import islice
 from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
@@ -22,7 +20,7 @@ from mckibben.blocks.dynamics.state_network import SETTLING, SETTLING_STEP, Stat
 from mckibben.blocks.fields import rows
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
 from mckibben.estimators.dynamics.linear_oscillator import (
     MOST_SUBSTEPS,
@@ -31,7 +29,7 @@ from mckibben.estimators.dynamics.linear_oscillator import (
 )
 from mckibben.estimators.dynamics.paths import averaged, paths
 from mckibben.estimators.dynamics.state_network_slopes import follow_network
-from mckibben.estimators.optimisers.descent import Damping, descend, marquardt
+from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 ANGLE = 1 / 3
@@ -44,14 +42,12 @@ velocity, what damps, and how fast the first lag dies away."""
 UNIT, FORCED, READ = 0.7, 0.05, 0.01
 """Sizes of random weights: of units by states, by the input, and of what is read of them."""
 
-FIRST_DAMPING, HEAVIEST, EASING, FLOOR = 0.1, 1e9, 2.0, 1e-6
-
 LEAST_GAIN = 1e-7
 """Share of the squared error that a step gains, or the descent has arrived."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class StateNetworkEstimator(SingleEstimator):
+class StateNetworkEstimator(SearchEstimator):
     """State-space network by Gauss-Newton on free runs, told nothing but how many states there are.
 
     Parameters
@@ -87,7 +83,6 @@ class StateNetworkEstimator(SingleEstimator):
     substeps: Annotated[int, Interval(ge=1, le=MOST_SUBSTEPS)] | None = None
 
     made_for: ClassVar[tuple[str, str] | None] = ("force", "displacement")
-    rises: ClassVar[bool] = False
     effort: ClassVar[float] = 100.0
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -103,21 +98,21 @@ class StateNetworkEstimator(SingleEstimator):
         template = self.start(linear, merged, self.substeps or linear.substeps(step, ANGLE))
         search = self.search(template, merged, tracker)
         tracker.budget = self.n_steps
-        path = descend(
-            search.errors,
-            search.slopes,
-            template.pack(),
-            Damping(FIRST_DAMPING, HEAVIEST, easing=EASING, steps=partial(marquardt, floor=FLOOR)),
-            least_gain=LEAST_GAIN,
-        )
         with tracker.searching():
-            for _, squares in islice(path, self.n_steps + 1):
-                if not np.isfinite(squares):
-                    raise DataError(
-                        "no start runs stably under this force",
-                        channel=data.input,
-                        remedy="choose another seed, or record at a higher rate",
-                    )
+            (_, squares), *_ = trust_region(
+                search.errors,
+                search.slopes,
+                template.pack(),
+                scale=np.ones(template.n_parameters),
+                least_gain=LEAST_GAIN,
+                max_evaluations=self.n_steps,
+            )
+            if not np.isfinite(squares):
+                raise DataError(
+                    "no start runs stably under this force",
+                    channel=data.input,
+                    remedy="choose another seed, or record at a higher rate",
+                )
         assert tracker.best is not None
         return template.unpack(tracker.best), data
 

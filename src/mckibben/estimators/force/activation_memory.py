@@ -68,7 +68,6 @@ class ActivationMemoryEstimator(SeparableEstimator):
     told: ClassVar[tuple[str, ...]] = ("force",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
-    reach: ClassVar[tuple[float, float]] = (2.0, 0.05)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         data.timed()

@@ -2,7 +2,7 @@
 
 Source: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and
 Particle Swarm Optimization", Sections 4.2 to 4.4: `characteristic_points`, regressed on the force in
-two enrichment steps; and gamma and phi by particle swarm.
+two enrichment steps; and gamma and phi, by least squares where the paper has a particle swarm.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.force.activation import ActivationPressure
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.searching import SearchingEstimator
+from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.force.characteristic_points import characteristic_points
-from mckibben.estimators.optimisers.swarm import particle_swarm
 from mckibben.estimators.optimisers.tracker import Tracker
 
 STATIC_SHARE = 0.1
@@ -30,8 +29,8 @@ and tells nothing of the rate."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class ActivationPressureEstimator(SearchingEstimator):
-    """Activation pressure by characteristic points, and gamma and phi by particle swarm.
+class ActivationPressureEstimator(SearchEstimator):
+    """Activation pressure by characteristic points, and gamma and phi by least squares.
 
     Parameters
     ----------
@@ -57,16 +56,9 @@ class ActivationPressureEstimator(SearchingEstimator):
     force: str = "force"
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     frequency: Annotated[float, Ge(0)] | None = None
-    pso_particles: Annotated[int, Ge(2)] = 50
-    pso_iterations: Annotated[int, Ge(1)] = 100
-    pso_inertia_start: float = 0.4
-    pso_inertia_end: float = 0.4
-    pso_c1: Annotated[float, Ge(0)] = 1.5
-    pso_c2: Annotated[float, Ge(0)] = 1.5
 
     made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
     told: ClassVar[tuple[str, ...]] = ("force",)
-    rises: ClassVar[bool] = False
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the model found, set to the first moving run's frequency, and the data."""
@@ -98,7 +90,7 @@ class ActivationPressureEstimator(SearchingEstimator):
     def _rates(
         self, model: ActivationPressure, data: TrainingData, at: Array, tracker: Tracker
     ) -> tuple[Array, tuple[float, float]]:
-        """Return phi (a cubic of the force) and gamma, by swarm or by least squares.
+        """Return phi (a cubic of the force) and gamma.
 
         gamma phi is fixed up to a factor, which is chosen such that gamma is 1 at the mean
         frequency.
@@ -126,17 +118,10 @@ class ActivationPressureEstimator(SearchingEstimator):
         def errors(point: Array) -> Array:
             return (powers @ point[:4]) * (1 + point[4] * rise) * rate - rest
 
-        if self.method == "ls":
-            from scipy.optimize import least_squares
+        from scipy.optimize import least_squares
 
-            found = least_squares(errors, np.append(start, 0.0), bounds=(lower, upper)).x
-            tracker.saw(found, float(np.sqrt(np.mean(errors(found) ** 2))))
-        else:
-
-            def costs(points: Array) -> Array:
-                return np.array([float(np.sqrt(np.mean(errors(point) ** 2))) for point in points])
-
-            found = particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed)
+        found = least_squares(errors, np.append(start, 0.0), bounds=(lower, upper)).x
+        tracker.saw(found, float(np.sqrt(np.mean(errors(found) ** 2))))
         phi = found[:4] / largest ** np.array([3, 2, 1, 0])
         slope = float(found[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)

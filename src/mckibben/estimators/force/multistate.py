@@ -116,7 +116,6 @@ class MultistateEstimator(SeparableEstimator):
     told: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
-    reach: ClassVar[tuple[float, float]] = (1.0, 1e-3)
     # where elements begin to slip makes corners in the cost, which take many short steps
     search_evaluations: ClassVar[int] = 20
     polish_evaluations: ClassVar[int] = 20
@@ -325,19 +324,6 @@ class MultistateEstimator(SeparableEstimator):
         first = values.size - sum(SIZES[e] for e in self.directions) - self.fit_pressure_gain
         vague = first + np.flatnonzero(~(2 * errors[first:] < np.abs(values[first:])))
         return tuple(sorted({*super().undetermined(), *vague.tolist()}))
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the block solved for, and bounds that keep its friction valid."""
-        template, below, above = super().parameter_bounds(data)
-        n, values = sum(SIZES[element] for element in self.directions), template.pack()
-        start = values.size - n - self.fit_pressure_gain
-        friction = slice(start, start + n)
-        largest = np.abs(values[friction]).max()
-        below[friction] = 0.1 * np.maximum(np.abs(values[friction]), 1e-6 * largest)
-        above[friction] = 10 * np.maximum(np.abs(values[friction]), 1e-2 * largest)
-        if self.fit_pressure_gain:
-            below[-1], above[-1] = -0.5, 1.0
-        return template, below, above
 
 
 MULTISTATE = preset(

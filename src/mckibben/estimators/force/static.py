@@ -53,7 +53,6 @@ class ForceLawEstimator(SeparableEstimator):
     told: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
-    reach: ClassVar[tuple[float, float]] = (0.9, 1e-3)
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -192,12 +191,6 @@ class TonduLopezEstimator(ForceLawEstimator):
 
         mu = (float(linear[0]), float(linear[1]))
         return replace(self.unit(theta, data, mu), constant=offset)
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the law of the first guess, and bounds that keep the angle valid."""
-        template, lower, upper = super().parameter_bounds(data)
-        lower[0], upper[0] = 0.2, 0.9
-        return template, lower, upper
 
 
 FORCE_BILINEAR = preset(

@@ -13,16 +13,15 @@ import numpy as np
 from annotated_types import Ge, Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.memoryless import Logarithm
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
-from mckibben.estimators.core.output_maps import PolynomialMap
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, counting
 from mckibben.estimators.hysteresis.creeping import CreepingEstimator, creep_moves, with_creep
+from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.hysteresis.thresholds import spread
 
@@ -63,7 +62,6 @@ class CreepPIEstimator(CreepingEstimator):
     n_starts: Annotated[int, Ge(1)] = 8
     n_refined: Annotated[int, Ge(1)] = 3
 
-    reach: ClassVar[tuple[float, float]] = (0.3, 0.1)
     search_evaluations: ClassVar[int] = 30  # the valleys are flat
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
@@ -171,12 +169,3 @@ class CreepPIEstimator(CreepingEstimator):
             *self.creep_parts(theta, result),
         )
         return Series(parts)
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the series solved for, and bounds that keep it valid."""
-        template, lower, upper = super().parameter_bounds(data)
-        # weights, compliances and time constants must stay positive
-        n, k, values = self.n_operators, self.n_creep, template.pack()
-        positive = [0, *range(1, n + 1), *range(values.size - 2 * k, values.size)]
-        lower[positive] = np.maximum(lower[positive], 1e-3 * np.abs(values[positive]))
-        return template, lower, upper

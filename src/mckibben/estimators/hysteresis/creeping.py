@@ -76,7 +76,7 @@ class CreepingEstimator(SeparableEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         if self.n_creep > 0:
             data.timed("creep depends on it", ", or use n_creep=0")
-        if self.settled is not None or self.n_creep == 0 or self.method == "pso":
+        if self.settled is not None or self.n_creep == 0:
             return super().identify(data, tracker)
         first, second = tracker.part(0.0, 0.5), tracker.part(0.5, 0.9)
         settled = self._with(settled=True).identify(data, first)

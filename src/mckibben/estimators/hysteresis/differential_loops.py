@@ -12,7 +12,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.hysteresis.bouc_wen import BoucWen
 from mckibben.blocks.hysteresis.generalized_bouc_wen import GeneralizedBoucWen
-from mckibben.estimators.core.best_of import best_of_settings
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.hysteresis.play_loops import LoopEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -40,17 +39,11 @@ class DifferentialLoopEstimator(LoopEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         if self.exponent is not None:
             return super().identify(data, tracker)
-        return best_of_settings(self, "exponent", (1, 2), data, tracker)
+        return self.best_of("exponent", (1, 2), data, tracker)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [log rate by input range, shape]."""
         slow, fast = np.log([SLOWEST, FASTEST])
-        return np.array([slow, *self.lowest]), np.array([fast, *self.highest])
-
-    def shape_bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of [rate, shape]."""
-        low, high = data.input_range
-        slow, fast = SLOWEST / (high - low), FASTEST / (high - low)
         return np.array([slow, *self.lowest]), np.array([fast, *self.highest])
 
     def rate(self, theta: Array, data: TrainingData) -> float:

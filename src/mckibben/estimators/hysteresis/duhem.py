@@ -42,8 +42,6 @@ class DuhemEstimator(SeparableEstimator):
     degree: Annotated[int, Interval(ge=1, le=9)] = 4
     slope_degree: Annotated[int, Interval(ge=0, le=9)] = 3
 
-    typical: ClassVar[int] = 1
-
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [log alpha], alpha by half the input range."""
         return np.array([np.log(0.1)]), np.array([np.log(100.0)])
@@ -77,9 +75,3 @@ class DuhemEstimator(SeparableEstimator):
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         target = (offset, *linear[: self.degree].tolist())
         return replace(self.unit(theta, data), target=target, slope=vector(linear[self.degree :]))
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the model solved for, and bounds of which those of its rate are fixed."""
-        template, lower, upper = super().parameter_bounds(data)
-        lower[-1], upper[-1] = 0.1, 100.0
-        return template, lower, upper

@@ -9,14 +9,13 @@ import numpy as np
 from annotated_types import Ge
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.eupi import EUPI, eupi_matrix
 from mckibben.blocks.hysteresis.play_operators import started
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
-from mckibben.estimators.core.output_maps import PolynomialMap
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 from mckibben.estimators.hysteresis.thresholds import spread
 
 CUBIC = PolynomialMap(3)
@@ -93,20 +92,3 @@ class EUPIEstimator(SeparableEstimator):
             self.starting_rule,
             **self.channels(data),
         )
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return an EUPI model, with weights up to the mean slope of the data."""
-        radii = self.radii(data)
-        low, high = data.output_range
-        span, reach = high - low, data.input_range[1] - data.input_range[0]
-        linear = np.full(CUBIC.size + radii.size, span / radii.size)
-        template = self.build(np.ones(2), linear, low, data)
-        lower = [*np.zeros(radii.size), 0.3, 0.0, *(-span / reach ** np.arange(1, 4)), low - span]
-        upper = [
-            *np.full(radii.size, span / reach),
-            3.0,
-            3.0,
-            *(span / reach ** np.arange(1, 4)),
-            high,
-        ]
-        return template, np.array(lower), np.array(upper)

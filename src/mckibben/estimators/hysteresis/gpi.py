@@ -10,7 +10,6 @@ import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.envelopes.base import Envelope
 from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
@@ -157,21 +156,6 @@ class GPIEstimator(SeparableEstimator):
             **self.channels(data),
         )
 
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return a GPI model, with bounds wide enough for any loop that fills the data's ranges."""
-        guess = self.guesses(data)[0]
-        rising, falling = self.envelopes(guess, data)
-        radii = self.radii(rising, falling, data)
-        template = self.build(guess, np.ones(radii.size), 0.0, data)
-        low, high = self.shape.parameter_bounds(data.input_range)
-        span = data.output_range[1] - data.output_range[0]
-        heaviest = [0.5 * span] * radii.size
-        return (
-            template,
-            np.concatenate([np.zeros(radii.size), low, low]),
-            np.concatenate([heaviest, high, high]),
-        )
-
 
 def gpi_operators(u: Array, rising: Envelope, falling: Envelope, radii: Array, rule: str) -> Array:
     """Return generalised play operators side by side over an input, shape (n, N)."""
@@ -200,10 +184,6 @@ class EnvelopeShape(ABC):
     def envelopes(self, shape: Array, input_range: Range) -> tuple[Envelope, Envelope]:
         """Return both envelopes."""
 
-    @abstractmethod
-    def parameter_bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of one envelope's own parameters, as its ``pack`` orders them."""
-
 
 class TanhShape(EnvelopeShape):
     """Steepness (as a logarithm) and centre of each tangent."""
@@ -226,11 +206,6 @@ class TanhShape(EnvelopeShape):
         slopes, centres = np.exp(shape[[0, 2]]).tolist(), shape[[1, 3]].tolist()
         rising, falling = (Tanh(a, -a * c) for a, c in zip(slopes, centres, strict=True))
         return rising, falling
-
-    def parameter_bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of [slope, shift, offset]."""
-        span = input_range[1] - input_range[0]
-        return np.array([0.2 / span, -4.0, -1.0]), np.array([6.0 / span, 1.0, 1.0])
 
 
 class ExponentialShape(EnvelopeShape):
@@ -256,11 +231,6 @@ class ExponentialShape(EnvelopeShape):
             rise = abs(np.exp(-bent * low) - np.exp(-bent * high))
             envelopes.append(Exponential(bent, float(steepness - np.log(rise))))
         return envelopes[0], envelopes[1]
-
-    def parameter_bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of [rate, shift, offset], for concave envelopes."""
-        span = input_range[1] - input_range[0]
-        return np.array([1e-3 / span, -2.0, -2.0]), np.array([4 / span, 2.0, 2.0])
 
 
 class PiecewiseLinearShape(EnvelopeShape):
@@ -291,11 +261,6 @@ class PiecewiseLinearShape(EnvelopeShape):
             for rise in (rising, falling)
         )
         return first, second
-
-    def parameter_bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return disjoint bounds of the values at the knots, so that they increase."""
-        steps = np.arange(self.n_knots, dtype=float)
-        return steps - 0.45, steps + 0.45
 
 
 SHAPES: dict[str, type[EnvelopeShape]] = {

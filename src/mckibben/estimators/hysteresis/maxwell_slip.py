@@ -53,11 +53,6 @@ class MaxwellSlipEstimator(LoopEstimator):
             return []
         return [np.array([a, b]) for a in (0.0, 0.3, -0.3) for b in (0.0, 0.3, -0.3)]
 
-    def shape_bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of both ratios."""
-        lower, upper = self.bounds(data)
-        return (np.exp(lower), np.exp(upper)) if lower.size else (np.ones(2), np.ones(2))
-
     def springs(self, theta: Array, data: TrainingData) -> MaxwellSlip:
         """Return the springs, without weights."""
         low, high = data.input_range

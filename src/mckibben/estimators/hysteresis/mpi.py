@@ -17,8 +17,8 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
-from mckibben.estimators.core.output_maps import OutputMap, output_map
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
+from mckibben.estimators.hysteresis.output_maps import OutputMap, output_map
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.hysteresis.thresholds import spread
 from mckibben.estimators.optimisers.linear import solve_linear
@@ -155,22 +155,6 @@ class MappedPIEstimator(SeparableEstimator):
     @abstractmethod
     def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
         """Return the hysteresis part."""
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return a series, with a PI part within twice the output's range and a map of like size."""
-        theta = self.guesses(data)[1]
-        low, high = data.output_range
-        span = high - low
-        size = self.basis(theta, data.runs[0], data).shape[1]
-        template = self.build(theta, np.full(size, span / size), low, data)
-        n_first = template.parts[0].n_parameters
-        slope = span / (data.input_range[1] - data.input_range[0])
-        lower, upper = np.zeros(template.n_parameters), np.empty(template.n_parameters)
-        upper[:n_first] = slope
-        lower[n_first - 1], upper[n_first - 1] = low - span, high
-        values = template.pack()[n_first:]
-        lower[n_first:], upper[n_first:] = values - span / size, values + span / size
-        return template, lower, upper
 
 
 @dataclass(kw_only=True, repr=False, eq=False)

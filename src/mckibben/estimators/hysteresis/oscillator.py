@@ -21,7 +21,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.hysteresis.oscillator import Oscillator
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
 from mckibben.estimators.dynamics.linear_oscillator import MOST_SUBSTEPS, linear_oscillator
 from mckibben.estimators.dynamics.paths import averaged, paths
@@ -48,7 +48,7 @@ FIRST_GAIN, LEAST_GAIN = 1e-3, 1e-9
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class OscillatorEstimator(SingleEstimator):
+class OscillatorEstimator(SearchEstimator):
     """An estimator of a mass, a damper, a spring and an element that remembers.
 
     Parameters
@@ -74,7 +74,6 @@ class OscillatorEstimator(SingleEstimator):
     substeps: Annotated[int, Interval(ge=1, le=MOST_SUBSTEPS)] | None = None
 
     made_for: ClassVar[tuple[str, str] | None] = ("force", "displacement")
-    rises: ClassVar[bool] = False
     effort: ClassVar[float] = 3.0
 
     n_positive: ClassVar[int]

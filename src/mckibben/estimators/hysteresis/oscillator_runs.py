@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from itertools import islice
 
 import numpy as np
 
@@ -15,13 +13,8 @@ from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.dynamics.paths import Path
 from mckibben.estimators.hysteresis.oscillator_slopes import OWN
-from mckibben.estimators.optimisers.descent import Damping, descend, marquardt
+from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
-
-FIRST_DAMPING, HEAVIEST = 1e-3, 1e9
-
-FLOOR = 1e-10
-"""What is added to the square of every slope, relative to the sum of all."""
 
 LARGEST = 1e50
 """Error, or derivative of one, that still is one: sums of its squares are numbers."""
@@ -109,14 +102,18 @@ class FreeRuns:
 
     def descended(self, steps: int, least_gain: float) -> tuple[Oscillator, float]:
         """Return the model at the end of a descent, and its RMSE."""
-        trust = Damping(FIRST_DAMPING, HEAVIEST, steps=partial(marquardt, floor=FLOOR))
-        start = self.coordinates(self.template)
-        path = descend(self.errors, self.slopes, start, trust, least_gain=least_gain)
+        theta = self.coordinates(self.template)
         with self.tracker.searching():
-            for found, squares in islice(path, steps + 1):
-                theta = found
-                if not np.isfinite(squares):
-                    return self.template, np.inf
+            theta, squares = trust_region(
+                self.errors,
+                self.slopes,
+                theta,
+                scale="jac",
+                least_gain=least_gain,
+                max_evaluations=steps,
+            )[-1]
+            if not np.isfinite(squares):
+                return self.template, np.inf
         if self.tracker.interrupted and self.tracker.best is not None:
             theta = self.tracker.best
         errors = self.errors(theta)

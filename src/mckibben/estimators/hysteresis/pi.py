@@ -36,6 +36,8 @@ class PIEstimator(SeparableEstimator):
 
     Parameters
     ----------
+    method : {"ls", "slopes"}
+        Least squares, or the rule.
     n_operators : int
         Play operators, the one without dead zone included.
     spacing : {"even", "dense"}
@@ -54,7 +56,7 @@ class PIEstimator(SeparableEstimator):
     makes = ("pi",)
     effort: ClassVar[float] = 0.01
 
-    method: Literal["ls", "pso-ls", "pso", "slopes"] = "ls"  # type: ignore[assignment]
+    method: Literal["ls", "slopes"] = "ls"
     n_operators: Operators = 10
     spacing: Literal["even", "dense"] = "even"
     thresholds: Annotated[Sequence[float], Len(1)] | None = None
@@ -84,16 +86,6 @@ class PIEstimator(SeparableEstimator):
             self.starting_rule,
             **self.channels(data),
         )
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return a PI model, and weights up to twice the mean slope of the data."""
-        radii = self.radii(data)
-        template = self.build(np.empty(0), np.zeros(radii.size), 0.0, data)
-        low, high = data.output_range
-        span = high - low
-        slope = span / (data.input_range[1] - data.input_range[0])
-        lower = np.array([*([0.0] * radii.size), low - span])
-        return template, lower, np.array([*([slope] * radii.size), high])
 
     def _by_slopes(self, data: TrainingData) -> PI:
         """Cut the widest loop where its operators begin to move, and difference slopes.

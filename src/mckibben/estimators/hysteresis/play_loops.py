@@ -18,8 +18,8 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.output_maps import PolynomialMap
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.hysteresis.output_maps import PolynomialMap
 
 LEAST_SLOPE = 1e-4
 """Least share of the output's range that each piece of the polynomial gives."""
@@ -73,17 +73,6 @@ class LoopEstimator(SeparableEstimator):
         _, slopes = self.loops(theta, _short(data.runs[0]), data)
         polynomial[1] += float(slopes @ lagging)
         return self.assemble(theta, polynomial, leading - lagging, data)
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the block solved for, and bounds of which those of its shape are fixed."""
-        template, lower, upper = super().parameter_bounds(data)
-        low, high = self.shape_bounds(data)
-        lower[lower.size - low.size :], upper[upper.size - high.size :] = low, high
-        return template, lower, upper
-
-    @abstractmethod
-    def shape_bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the block's last parameters, those that are not linear."""
 
 
 def _short(run: Run) -> Run:

@@ -74,14 +74,6 @@ class GridEstimator(SeparableEstimator):
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         return self.grid(data).unpack([*linear, offset])
 
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the model without weights, and weights up to a share of the output's range."""
-        template = self.grid(data)
-        low, high = data.output_range
-        n = template.n_parameters - 1
-        most = 2 * (high - low) / n
-        return template, np.array([*np.zeros(n), low - most]), np.array([*np.full(n, most), high])
-
 
 KP = preset(
     GridEstimator,

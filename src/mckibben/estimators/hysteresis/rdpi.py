@@ -12,7 +12,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.rate_dependent_pi import RateDependentPI
-from mckibben.estimators.core.best_of import best_of_settings
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.hysteresis.mpi import MappedPIEstimator
 from mckibben.estimators.hysteresis.pi import play_operators
@@ -57,7 +56,7 @@ class RDPIEstimator(MappedPIEstimator):
         if self.rate_time_constant is not None:
             return super().identify(data, tracker)
         values = [samples * step for samples in (0, 5, 25)]
-        return best_of_settings(self, "rate_time_constant", values, data, tracker)
+        return self.best_of("rate_time_constant", values, data, tracker)
 
     def rate(self, run: Run) -> Array:
         """Return the filtered rate of the run's input, per second."""
@@ -115,13 +114,3 @@ class RDPIEstimator(MappedPIEstimator):
             self.starting_rule,
             **self.channels(data),
         )
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return a series, and bounds like those of the static model, with weights by rate inside."""
-        template, lower, upper = super().parameter_bounds(data)
-        n = self.n_operators
-        low, high = data.input_range
-        slope = (data.output_range[1] - data.output_range[0]) / (high - low)
-        by_rate = RATE_SHARE * slope / self.fastest(data)
-        lower[:n], upper[:n] = -by_rate, by_rate
-        return template, lower, upper

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,9 @@ from mckibben.estimators.optimisers.tracker import Tracker
 
 MARGIN = 1e-9
 """Least distance from the bounds at which a refinement begins, relative to theirs."""
+
+SHORTEST = 1e-9
+"""Step, relative to the parameters, that is none."""
 
 EXCHANGES = 3
 """How often groups of parameters are exchanged and what was found refined, at most."""
@@ -148,3 +152,68 @@ def follow_best(
         if len(costs) < most and all(abs(cost - other) > same * cost for other in costs):
             costs.append(cost)
             followed(place)
+
+
+def trust_region(
+    errors: Callable[[Array], Array],
+    slopes: Callable[[Array], Array],
+    start: Array,
+    *,
+    scale: Array | Literal["jac"],
+    least_gain: float,
+    max_evaluations: int,
+    bounds: tuple[Array | float, Array | float] = (-np.inf, np.inf),
+) -> list[tuple[Array, float]]:
+    """Return the start, then the points of ever smaller sums of squares that the search takes.
+
+    Parameters
+    ----------
+    errors : callable
+        Parameters, shape (p,), to errors, shape (n,); a step to errors that are not finite is refused.
+    slopes : callable
+        Parameters to the derivatives of the errors, shape (n, p); called where errors were last.
+    start : array, shape (p,)
+    scale : array, shape (p,), or "jac"
+        How far each parameter may move at first; or by the sizes of the slopes.
+    least_gain : float
+        Share of the sum of squares that a step has to gain for another to follow.
+    max_evaluations : int
+        Of the errors.
+    bounds : (array, array), shapes (p,)
+        Of the parameters.
+
+    Returns
+    -------
+    list of (array of shape (p,), float)
+        Parameters and their sums of squares; the start alone where its errors are zero or not finite.
+    """
+    from scipy.optimize import least_squares
+
+    last = errors(start)
+    first = float(last @ last)
+    if not 0.0 < first < np.inf:
+        return [(start, first)]
+    path: list[tuple[Array, float]] = []
+
+    def errors_at(point: Array) -> Array:
+        nonlocal last
+        if path or not np.array_equal(point, start):
+            last = errors(point)
+        return last
+
+    def slopes_at(point: Array) -> Array:  # called at the start and after every step that is taken
+        path.append((point.copy(), float(last @ last)))
+        return slopes(point)
+
+    least_squares(
+        errors_at,
+        start,
+        slopes_at,
+        bounds=bounds,
+        x_scale=scale,
+        ftol=least_gain,
+        xtol=SHORTEST,
+        gtol=None,
+        max_nfev=max_evaluations,
+    )
+    return path

@@ -84,9 +84,8 @@ def activation_pressure(
         stages[str(run.labels["stage"])][condition] = whole
     slow, sines, waves = stages.values()
     train = [*slow.values(), *sines.values()]
-    tell(0.82, "the paper's model, by particle swarm")
-    swarm = ActivationPressureEstimator(method="pso", seed=seed)
-    theirs = fitted(kept, THEIRS, swarm, train).block
+    tell(0.82, "the paper's model")
+    theirs = fitted(kept, THEIRS, ActivationPressureEstimator(seed=seed), train).block
     tell(0.9, "ours")
     ours = fitted(kept, OURS, ActivationMemoryEstimator(seed=seed), train).block
     assert isinstance(theirs, ActivationPressure)
@@ -130,6 +129,7 @@ def activation_pressure(
             "How inflection and tangent were moved to the boundaries of low and high pressure is not "
             "printed. Here the boundaries are at the printed shares of the range of pressure, and the "
             "contractions there by least squares, the cubic being held to the extremes of the loops.",
+            "Gamma and phi are found by least squares, where the paper has a particle swarm.",
             "Both models are fitted to slow cycles and sines; random waves are only tested on.",
             "The rig was made after the printed profile, rates included: gamma and phi near the printed "
             "ones speak for the identification, not for the muscle.",

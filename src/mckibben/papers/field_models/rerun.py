@@ -18,8 +18,8 @@ from mckibben.comparison.ranking import compare
 from mckibben.comparison.results import CHOICES, Leaderboard
 from mckibben.comparison.row import Row
 from mckibben.errors import MckibbenError, ModelError
-from mckibben.estimators.core.affine_match import affine_match
 from mckibben.metrics import score
+from mckibben.papers.field_models.affine_match import affine_match
 from mckibben.papers.field_models.methods import (
     LEAST_SQUARES,
     NOTHING,

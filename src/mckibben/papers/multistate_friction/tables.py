@@ -10,7 +10,6 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.force.laws import ForceLaw
 from mckibben.blocks.force.multistate_friction import MultistateFriction
-from mckibben.estimators.core.ranges import parameter_ranges
 from mckibben.metrics import score
 from mckibben.papers.keeping import Fitted
 from mckibben.papers.multistate_friction.models import (
@@ -25,6 +24,7 @@ from mckibben.papers.multistate_friction.models import (
 )
 from mckibben.papers.multistate_friction.published import multistate_friction as printed_friction
 from mckibben.papers.multistate_friction.published import static_force as printed_law
+from mckibben.papers.multistate_friction.ranges import parameter_ranges
 from mckibben.papers.reproduction import (
     Cell,
     Figure,

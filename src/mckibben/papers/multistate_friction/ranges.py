@@ -7,8 +7,7 @@ of the error asks for neither.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import islice
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,9 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.estimators.core.checking import training_data
+from mckibben.estimators.core.data import training_data
 from mckibben.estimators.core.uncertainty import simulate_all
-from mckibben.estimators.optimisers.descent import Damping, damped, descend
+from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.recording import Recording
 from mckibben.system.threads import one_blas_thread
 
@@ -126,11 +125,13 @@ def _refined(
         left, *moved = residuals(np.vstack([here, here + DIFFERENCE * np.eye(here.size)[free]]))
         return (np.array(moved) - left).T / DIFFERENCE
 
-    def short(some: Array, by: Array, left: Array, damping: float) -> Iterator[Array]:
-        step = damped(by, left, damping, 1e-12).clip(-1, 1)
-        yield (some + step).clip(start[free] - 12, start[free] + 12)
-
-    trust = Damping(1e-3, 1e4, growth=10.0, speeding=1.0, steps=short)
-    path = descend(errors, slopes, start[free], trust, least_gain=1e-4)
-    *_, (found, cost) = islice(path, steps + 1)
+    found, cost = trust_region(
+        errors,
+        slopes,
+        start[free],
+        scale="jac",
+        bounds=(start[free] - 12, start[free] + 12),
+        least_gain=1e-4,
+        max_evaluations=steps,
+    )[-1]
     return whole(found), cost

@@ -21,6 +21,7 @@ MULTISTATE = "mckibben.estimators.force.multistate:MultistateEstimator"
 GRID = "mckibben.estimators.preisach_type.preisach:GridEstimator"
 SLIP = "mckibben.estimators.play_type.maxwell_slip:MaxwellSlipEstimator"
 NARX = "mckibben.estimators.narx.polynomial:NarxPolynomialEstimator"
+PLAY_RIDGE = "mckibben.estimators.coupled.play_ridge:PlayRidgeEstimator"
 SDCHM = "mckibben.estimators.coupled.sdchm:SDCHMEstimator"
 
 PLUGINS: dict[str, dict[str, str | Preset]] = {
@@ -122,7 +123,14 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "bouc-wen-oscillator": (
             "mckibben.estimators.differential.bouc_wen_oscillator:BoucWenOscillatorEstimator"
         ),
-        "coupled-memory": "mckibben.estimators.coupled.memory:CoupledMemoryEstimator",
+        "coupled-memory": preset(
+            PLAY_RIDGE,
+            "Lags and play operators of several muscles, with one penalty that is given.",
+            alone=False,
+            needs_time=True,
+            lags=(0.3, 1.0, 8.0),
+            ridge=1e-4,
+        ),
         "coupled-pi": preset(
             SDCHM,
             "Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline.",
@@ -212,6 +220,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "p2z": preset(PROCESS, "Two lags and a zero.", structure="P2Z"),
         "p3": preset(PROCESS, "Three lags.", structure="P3"),
         "pi": "mckibben.estimators.play_type.pi:PIEstimator",
+        "play-ridge": PLAY_RIDGE,
         "preisach": preset(
             GRID, "Preisach model by (non-negative) least squares on its cells.", relays="sudden"
         ),

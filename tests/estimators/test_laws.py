@@ -31,7 +31,7 @@ SWARMS = tuple(name for name in ALL if isinstance(load("estimators", name)(), Se
 FREE_OF_UNITS = (
     *("activation-memory", "activation-pressure", "arx", "bj", "coupled-memory", "oe", "pi"),
     *("force-bilinear", "force-chou", "force-minh", "force-petrovic", "force-schindele"),
-    *("kp", "maxwell-slip", "narx", "narx-network", "narx-play", "preisach", "tsfnn"),
+    *("kp", "maxwell-slip", "narx", "narx-network", "narx-play", "play-ridge", "preisach", "tsfnn"),
 )
 UNIT_DEPENDENT = ("gpi", "mms", "mpi", "rdpi")
 """These, and others, have tolerances, bounds or starts in units of their own yet."""
@@ -87,7 +87,10 @@ def test_impossible_settings_are_refused(setting: str, value: object) -> None:
 # -- data ------------------------------------------------------------------------------------------
 
 
-OF_ANY_RATES = ("balance", "coupled-memory", "coupled-pi", "sdchm", "sdchm-published", "tsfnn")
+OF_ANY_RATES = (
+    *("balance", "coupled-memory", "coupled-pi", "play-ridge"),
+    *("sdchm", "sdchm-published", "tsfnn"),
+)
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -41,7 +41,7 @@ N_FOLDS = 4
 
 QUICK = (
     *("bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi"),
-    *("balance", "coupled-memory", "coupled-pi"),
+    *("balance", "coupled-memory", "coupled-pi", "play-ridge"),
     *("balance-force", "force-chou", "force-petrovic"),
 )
 """Models that are good or well known, and fitted in seconds."""

@@ -51,6 +51,7 @@ SINGLE: Mapping[str, Mapping[str, Any]] = {
     "p2z": {},
     "p3": {},
     "pi": {"n_operators": 4},
+    "play-ridge": ONE,
     "preisach": {"n_levels": 5},
     "rdpi": SMALL,
 }
@@ -70,6 +71,7 @@ OF_ARM: Mapping[str, Mapping[str, Any]] = {
     "balance": STOPS,
     "coupled-memory": {},
     "coupled-pi": {},
+    "play-ridge": {},
     "sdchm": MEMORY,
     "sdchm-published": SWARM,
     "tsfnn": {"n_sets": 2},

@@ -134,6 +134,7 @@ class BalanceEstimator(CoupledEstimator):
 
     effort: ClassVar[float] = 1.0
     alone: ClassVar[bool] = True
+    unmeasured: ClassVar[bool] = True
     fewer_outputs: ClassVar[bool] = True
     through: ClassVar[bool] = True
 

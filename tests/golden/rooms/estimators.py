@@ -169,7 +169,7 @@ def determined(case: str, model: str, settings: Mapping[str, Any], plant: str) -
 def _same(one: Any, other: Any) -> bool:
     if isinstance(one, float) and isinstance(other, float):
         return bool(abs(one - other) <= DETERMINED * abs(one))
-    return bool(one == other)
+    return np.array_equal(one, other)
 
 
 def run(case: str, model: str, settings: Mapping[str, Any], plant: str, folder: Path) -> Tree:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import cached_property, partial, reduce
+from functools import cached_property, reduce
 from itertools import pairwise
 from typing import ClassVar, Self
 
@@ -241,19 +241,24 @@ class Parallel(Composition):
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs every part and adds the outputs."""
-        runs: list[Run] = []
-        for part, state_of in zip(self.parts, self._states(state), strict=True):
+        runs = []
+        for part, share in zip(self.parts, self._states(state), strict=True):
             taken, given = self._places(part)
-            own, into = np.empty((len(inputs), len(taken))), np.empty((len(inputs), len(given)))
-            step = part.bind(sample_time, state_of, own, into)
-            runs.append(
-                partial(_added, step, inputs, own, _span(taken), outputs, into, _span(given))
-            )
+            whole = taken == [*range(inputs.shape[1])]
+            own = inputs if whole else np.empty((len(inputs), len(taken)))
+            into = np.empty((len(inputs), len(given)))
+            copies = [] if whole else [(own[:, k], inputs[:, at]) for k, at in enumerate(taken)]
+            sums = [(outputs[:, at], into[:, k]) for k, at in enumerate(given)]
+            runs.append((copies, part.bind(sample_time, share, own, into), sums))
 
         def run() -> None:
             outputs[:] = 0.0
-            for each in runs:
-                each()
+            for copies, step, sums in runs:
+                for own, given in copies:
+                    own[:] = given
+                step()
+                for total, result in sums:
+                    np.add(total, result, out=total)
 
         return run
 
@@ -286,30 +291,6 @@ class Parallel(Composition):
         from mckibben.blocks.play_type.play import Play
 
         return cls((PI.example(), Play.example()))
-
-
-Places = slice | list[int]
-
-
-def _span(places: list[int]) -> Places:
-    """Return places as a slice, which is read without a copy, where there is no gap in them."""
-    first, stop = places[0], places[-1] + 1
-    return slice(first, stop) if places == [*range(first, stop)] else places
-
-
-def _added(
-    step: Run,
-    inputs: Array,
-    own: Array,
-    taken: Places,
-    outputs: Array,
-    into: Array,
-    given: Places,
-) -> None:
-    """Run a part on its own of all inputs, and add what it gives to its own of all outputs."""
-    own[:] = inputs[:, taken]
-    step()
-    outputs[:, given] += into
 
 
 @dataclass(frozen=True, config=STRICT)

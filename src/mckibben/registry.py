@@ -107,7 +107,9 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
             "mckibben.estimators.force.activation_pressure:ActivationPressureEstimator"
         ),
         "air": "mckibben.estimators.dynamic.air:AirEstimator",
-        "armax": preset(LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0),
+        "armax": preset(
+            LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0, several=False
+        ),
         "arx": preset(LINEAR, "ARX model, A y = B u + e, by linear least squares."),
         "balance": "mckibben.estimators.coupled.balance:BalanceEstimator",
         "balance-force": "mckibben.estimators.coupled.balance_force:BalanceForceEstimator",
@@ -118,6 +120,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
             n_noise=2,
             n_noise_poles=2,
             effort=1.0,
+            several=False,
         ),
         "bouc-wen": "mckibben.estimators.differential.bouc_wen:BoucWenEstimator",
         "bouc-wen-oscillator": (

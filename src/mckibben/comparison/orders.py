@@ -25,7 +25,6 @@ from mckibben.comparison.trying import (
 from mckibben.errors import ModelError
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.single import SingleEstimator
-from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.recording import Recording, listed
 from mckibben.system.progress import Tell, telling
 from mckibben.system.workers import checked
@@ -139,14 +138,13 @@ def identify(
 
 def _channels(estimator: Estimator, recordings: Sequence[Recording]) -> Channels:
     """Return what an estimator takes of recordings."""
-    if isinstance(estimator, CoupledEstimator):
-        data = estimator.data(recordings)
-        names = (
-            [channel.name for channel in of] for of in (data.inputs, data.outputs, data.scheduled)
-        )
-        return Channels(*map(tuple, names))
-    assert isinstance(estimator, SingleEstimator)
-    return Channels((estimator.input,), (estimator.output,))
+    if isinstance(estimator, SingleEstimator):
+        known = estimator.input, estimator.output
+        if all(isinstance(name, str) for name in known):
+            return Channels(*((name,) for name in known))
+    data = estimator.data(recordings)
+    names = ([channel.name for channel in of] for of in (data.inputs, data.outputs, data.scheduled))
+    return Channels(*map(tuple, names))
 
 
 def _error(tried: Tried) -> tuple[float, str]:

@@ -40,7 +40,7 @@ N_FOLDS = 4
 """Parts of the cross-validation."""
 
 QUICK = (
-    *("bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi"),
+    *("arx", "bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi"),
     *("balance", "coupled-memory", "coupled-pi", "play-ridge"),
     *("balance-force", "force-chou", "force-petrovic"),
 )

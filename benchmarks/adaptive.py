@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from mckibben import Block, Recording
 from mckibben.blocks.adaptive.adaptive import Adaptive
 from mckibben.blocks.adaptive.adaptive_series import adaptive
-from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.control import track
 from mckibben.control.drifting import Drift, Drifting
 from mckibben.export.c.emulation import emulate

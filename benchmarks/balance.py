@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben import Recording, Series, compare, load_rig
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import track
 from mckibben.measured.sets import parted, sets_in

@@ -25,7 +25,7 @@ from mckibben.bands.finding import find_band
 from mckibben.bands.held import Held
 from mckibben.bands.scale import SHAPES
 from mckibben.blocks.bands.band import Band
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.calibrating import held_of
 from mckibben.measured.sets import sets_in
 from mckibben.registry import load

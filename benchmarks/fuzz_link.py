@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 from fuzz_c import SAMPLE_TIME, fuzzed
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.laws.examples import examples
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, source_files

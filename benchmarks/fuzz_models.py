@@ -24,10 +24,10 @@ import numpy as np
 import fuzzing
 from mckibben import Block, check_block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.running import run_many
-from mckibben.blocks.core.saving import load, part_to_dict
 from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.laws.trial import input_limits, wander
+from mckibben.blocks.running import run_many
+from mckibben.blocks.saving import load, part_to_dict
 from mckibben.errors import MckibbenError
 from mckibben.export.c.project import c_files
 from mckibben.export.fmu.unit import fmu_files

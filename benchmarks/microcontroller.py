@@ -17,8 +17,8 @@ from mckibben.blocks.compose import PerChannel
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.laws.examples import examples
-from mckibben.blocks.play_type.gpi import GPI
 from mckibben.export.c.emulation import Emulated, emulate
 
 SAMPLE_TIME = 0.01

@@ -23,8 +23,8 @@ import numpy as np
 from mckibben import Block
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.play_type.gpi import GPI
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.blocks.predictive.supply import allowed
 from mckibben.export.c.emulation import emulate, missing_tools

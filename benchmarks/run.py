@@ -29,8 +29,8 @@ from mckibben import (
     load_rig,
     registry,
 )
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.play_type.envelopes.tanh import Tanh
+from mckibben.blocks.base import Block
+from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
 from mckibben.rigs import record
 from mckibben.signals import decaying_triangle
 from mckibben.signals.protocol import protocol

@@ -21,7 +21,7 @@ SOURCE = Path(__file__).parent.parent / "src" / "mckibben"
 GROUND = "foundation"
 """The name under which the modules of the top folder that are no rooms of their own are drawn."""
 
-ABOVE = ("environments", "missing", "outputs")
+ABOVE = ("environments", "outputs")
 """Modules of the top folder that stand on rooms."""
 
 ROOMS = sorted({*(path.parent.name for path in SOURCE.glob("*/__init__.py")), *ABOVE})

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mckibben
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.simulators.mujoco import Muscle, with_muscles
 
 Loop = tuple[np.ndarray, np.ndarray]

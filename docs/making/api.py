@@ -36,9 +36,7 @@ def first_sentence(node: ast.AST) -> str:
 def offered() -> frozenset[str]:
     """Return the modules meant for others: those of plug-ins, and of names that packages hand on."""
     found = {
-        (value if isinstance(value, str) else value.location).partition(":")[0]
-        for group in registry.PLUGINS.values()
-        for value in group.values()
+        value.partition(":")[0] for group in registry.PLUGINS.values() for value in group.values()
     }
     for face in (*SOURCE.rglob("__init__.py"), SOURCE / "__init__.pyi"):
         package = ".".join(("mckibben", *face.parent.relative_to(SOURCE).parts))

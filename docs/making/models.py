@@ -15,22 +15,18 @@ import mckibben
 from making.pages import DOCS, MADE, equation, inline, plain, table, toctree, write
 from making.settings import settings_table
 from mckibben import registry
-from mckibben.blocks.core.notation import Written, unit_tex
-from mckibben.blocks.core.writing import quantities, written
-from mckibben.comparison.limits import limits
-from mckibben.comparison.needs import needs
+from mckibben.blocks.equations import quantities, written
+from mckibben.blocks.notation import Written, unit_tex
+from mckibben.comparison.offered import ability, declared, full_name, needs
 from mckibben.errors import MckibbenError
 
 
 def named() -> dict[str, tuple[str, str]]:
     """Return every model's full name, and the title of its group.
 
-    Exits where a model has no name, or no example.
+    Exits where a model has no example.
     """
-    found = {model: (name, need.title) for need in needs() for model, name in need.models.items()}
-    offered = set(registry.names("estimators"))
-    if offered != found.keys():
-        sys.exit(f"src/mckibben/comparison/needs.toml: mend {sorted(offered ^ found.keys())}")
+    found = {model: (full_name(model), need.title) for need in needs() for model in need.models}
     for model in found:
         if not example(model).is_file():
             sys.exit(f"{model} has no example: run python docs/models/fits.py {model}")
@@ -49,7 +45,7 @@ def pictured(model: str) -> Path:
 
 def caption(model: str) -> str:
     """Return what the model in the picture was fitted to (docs/models/fits.py)."""
-    if model in ("bouc-wen-oscillator", "duhem-oscillator", "state-network"):
+    if getattr(declared(model), "made_for", None) == ("force", "displacement"):
         return (
             "A model fitted to what the system of the Bouc-Wen benchmark "
             "(no muscle; Noël and Schoukens, 2016) does, computed from its printed numbers"
@@ -77,12 +73,11 @@ def summary(model: str) -> str:
 
 def write_models() -> None:
     """Write a page for every model, and an index by full name."""
-    cost, all_limits = costs(), limits()
-    names = named()
+    cost, names = costs(), named()
     for model, (name, group) in names.items():
         write(
             MADE / "models" / f"{model}.md",
-            "\n".join(page(model, name, group, all_limits[model], cost)),
+            "\n".join(page(model, name, group, cost)),
         )
     lines = [
         "# Models by name",
@@ -96,10 +91,10 @@ def write_models() -> None:
     for need in needs():
         lines += [f"## {need.title}", "", need.about, ""]
         rows = []
-        for model, name in need.models.items():
-            star = " \\*" if "caution" in all_limits[model] else ""
+        for model in need.models:
+            star = " \\*" if declared(model).caution else ""
             rows.append(
-                [f"[{name}]({model}.md){star}", f"`{model}`", plain(all_limits[model]["can"])]
+                [f"[{names[model][0]}]({model}.md){star}", f"`{model}`", plain(ability(model))]
             )
         lines += table(["model", "in commands", "what for"], rows)
     lines += ["## All, by the alphabet", ""]
@@ -108,11 +103,9 @@ def write_models() -> None:
     write(MADE / "models" / "index.md", "\n".join([*lines, *toctree(list(names), "hidden")]))
 
 
-def page(
-    model: str, name: str, group: str, known: Mapping[str, str], cost: Mapping[str, list[str]]
-) -> list[str]:
+def page(model: str, name: str, group: str, cost: Mapping[str, list[str]]) -> list[str]:
     """Return the lines of a model's page."""
-    estimator = registry.load("estimators", model)
+    estimator = declared(model)
     block = mckibben.load(example(model))
     lines = [f"# {name}", "", plain(summary(model)), ""]
     lines += table(
@@ -130,10 +123,10 @@ def page(
             *([["source", "; ".join(sources)]] if (sources := source(block)) else []),
         ],
     )
-    lines += [f"**Can**: {plain(known['can'])}", "", f"**Cannot**: {plain(known['cannot'])}", ""]
-    if "caution" in known:
+    lines += [f"**Can**: {plain(ability(model))}", "", f"**Cannot**: {plain(estimator.cannot)}", ""]
+    if estimator.caution:
         lines += [
-            f"**Good only near the motions it was trained on**: {plain(known['caution'])}.",
+            f"**Good only near the motions it was trained on**: {plain(estimator.caution)}.",
             "",
         ]
     if pictured(model).is_file():

@@ -7,7 +7,7 @@ from dataclasses import MISSING, fields
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from making.pages import plain, table
-from mckibben.blocks.core.notation import meanings
+from mckibben.blocks.notation import meanings
 
 WORDS = {
     int: "whole number",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben import Recording, Series, load_rig
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.control import track
 from mckibben.registry import load
 

@@ -21,8 +21,8 @@ import numpy as np
 
 import mckibben
 from mckibben import registry
-from mckibben.blocks.core.saving import load
-from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
+from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
+from mckibben.blocks.saving import load
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.report.figures import plot_model

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.estimators.play_type.gpi import GPIEstimator
-from mckibben.estimators.play_type.rdpi import RDPIEstimator
+from mckibben.estimators.hysteresis.gpi import GPIEstimator
+from mckibben.estimators.hysteresis.rdpi import RDPIEstimator
 from mckibben.metrics import err
 from mckibben.papers.field_models.published import prandtl_ishlinskii
 from mckibben.papers.mpi_narmax.protocol import HIGH, LOW

@@ -21,18 +21,12 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    StoredInitial,
-)
-from mckibben.blocks.core.kernels import SLACK, kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import Ranged, check_input_range
-from mckibben.blocks.core.solved_inverse import solved_start
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, StoredInitial
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import SLACK, kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import solved_start
 from mckibben.errors import ModelError
 
 
@@ -95,7 +89,7 @@ elastic_plastic_inverse_start = solved_start(_first_output, elastic_plastic_star
 # --- A block is a frozen dataclass of its parameters. STRICT refuses unknown fields, numbers that are
 # --- not finite, and silent conversions: that is what makes saved files safe to load.
 @dataclass(frozen=True, config=STRICT)
-class ElasticPlastic(Ranged):
+class ElasticPlastic(Invertible):
     """Elastic-plastic model.
 
     Parameters
@@ -132,7 +126,7 @@ class ElasticPlastic(Ranged):
         threshold="r [{u}]",
     )
     # --- Where time matters: rate_dependent: ClassVar[bool] = True, and coefficients() turns the
-    # --- sample time into what the kernel needs; see blocks/play_type/rate_dependent_pi.py.
+    # --- sample time into what the kernel needs; see blocks/hysteresis/rate_dependent_pi.py.
 
     gain: Annotated[FiniteFloat, Gt(0)]
     weight: FiniteFloat
@@ -156,11 +150,10 @@ class ElasticPlastic(Ranged):
 
     def peaks(self) -> Array:
         """Return the peak from which the operator just comes back to the lowest input."""
-        return np.array([self.limits[0] + 2 * self.threshold])
+        return np.array([self.input_limits[0] + 2 * self.threshold])
 
-    # --- Without an exact inverse, leave out its kernels and what follows, and derive from SingleChannel
-    # --- and Primitive in place of Ranged: Block.inverse then says what to use instead. One to be
-    # --- solved for in every sample derives from Solved; see blocks/play_type/eupi.py.
+    # --- Without an inverse, leave out its kernels and what follows, and derive from Block. One to be
+    # --- solved for in every sample declares `solved`; see blocks/hysteresis/eupi.py.
     # --- An error says which condition fails, and ends with the remedy.
     def check_invertible(self) -> None:
         """Demand that the output rises with the input."""
@@ -171,9 +164,8 @@ class ElasticPlastic(Ranged):
                 "would not rise with its input. Remedy: identify it with a weight above -gain."
             )
 
-    # --- Its numbers are this model's, then the limits; its state is this model's, then the count of
-    # --- clipped samples. What differs is said by inverse_numbers and inverse_remembers; see
-    # --- blocks/core/single_channel.py.
+    # --- The inverse's coefficients are this model's, then the limits; its state is this model's, then
+    # --- the count of clipped samples. What differs is declared; see blocks/inverse.py.
 
     # --- Contract tests run on the example: make it small and typical.
     @classmethod

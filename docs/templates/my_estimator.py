@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from my_block import ElasticPlastic
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, Array, SeparableEstimator
 
@@ -26,6 +26,14 @@ class ElasticPlasticEstimator(SeparableEstimator):
     y = (gain + weight) E_r[u] + gain F_r[u], and both slopes are kept positive, so that it has an
     inverse; data are taken to start from 0, for the model has no offset.
     """
+
+    # --- What is said of the model; the README lists all that may be declared.
+    title = "Elastic-plastic model"
+    purpose = "memory"
+    can = "One loop of straight branches, with nonlocal memory."
+    cannot = "No curved branches, no rate, no creep."
+    inverse_kind = "exact"
+    makes = ("elastic-plastic",)
 
     # --- A setting of its own is a field with a default, validated by its type:
     # --- n_terms: Annotated[int, Ge(1)] = 4

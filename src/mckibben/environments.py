@@ -31,7 +31,7 @@ demand("gymnasium", "gym", "environments")
 import gymnasium  # noqa: E402
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
     from mckibben.control import Twin
     from mckibben.recording import Recording
     from mckibben.rigs import Rig
@@ -336,8 +336,8 @@ def register() -> None:
 
 def _twin(plant: object) -> Twin:
     """Return a twin of what is given: itself, a model, or a model's file."""
-    from mckibben.blocks.core.block import Block
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.base import Block
+    from mckibben.blocks.saving import load
     from mckibben.control import Twin
 
     match plant:

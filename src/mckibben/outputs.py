@@ -40,7 +40,7 @@ def is_model(path: Path) -> bool:
 
     One that was edited by hand since still counts as that.
     """
-    from mckibben.blocks.core.saving import FORMAT
+    from mckibben.blocks.saving import FORMAT
 
     start = b"".join(_beginning(path).split())
     return start.startswith(f'{{"format":"{FORMAT}",'.encode())

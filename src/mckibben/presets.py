@@ -1,7 +1,7 @@
 """A class with some of its settings chosen, under a name of its own.
 
 A published variant, or a structure, is a choice of settings and no class: ``preset(...)`` stands for it
-in the registry, or in the module to which another package's entry point leads.
+beside the class, and a line of the registry, or an entry point of another package, leads there.
 """
 
 from __future__ import annotations
@@ -10,34 +10,33 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, fields
 from functools import update_wrapper
-from importlib import import_module
 from types import MethodType
 from typing import Any
 
 
 @dataclass(frozen=True)
 class Preset:
-    """Where a class is, what it is with these settings, and the settings; see `preset`."""
+    """A class, what it is with these settings, and the settings; see `preset`."""
 
-    location: str
+    of: type
     about: str
     chosen: Mapping[str, Any]
 
 
-def preset(location: str, about: str, **chosen: Any) -> Preset:
+def preset(of: type, about: str, **chosen: Any) -> Preset:
     """Return a class with some of its settings chosen.
 
     Parameters
     ----------
-    location : str
-        ``"module:class"``; it is imported when the preset is first loaded.
+    of : type
+        The class.
     about : str
         What it is, in one line.
     **chosen
         Settings, the fields of the class, that others may override; or attributes of the class, such
-        as the ``effort`` of a fit, that are different with them.
+        as its ``title``, that are different with them.
     """
-    return Preset(location, about, chosen)
+    return Preset(of, about, chosen)
 
 
 class Chosen:
@@ -53,8 +52,7 @@ class Chosen:
     """
 
     def __init__(self, name: str, given: Preset) -> None:
-        module, _, attribute = given.location.partition(":")
-        self.of = getattr(import_module(module), attribute)
+        self.of: Any = given.of
         update_wrapper(self, self.of, updated=())
         documented = (self.of.__doc__ or "").partition("\n")
         self.__doc__ = "".join((given.about, *documented[1:]))

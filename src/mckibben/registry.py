@@ -1,4 +1,4 @@
-"""Every plug-in of the package, one line each: group, name, and where it lives, or a preset of one.
+"""Every plug-in of the package, one line each: group, name, and where it lives.
 
 A plug-in is imported when it is first asked for, never before. Packages outside this one join by
 entry points in the groups ``mckibben.blocks``, ``mckibben.estimators`` and so on.
@@ -12,81 +12,69 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from mckibben.errors import ModelError
-from mckibben.presets import Chosen, Preset, preset
+from mckibben.presets import Chosen, Preset
 
-LINEAR = "mckibben.estimators.linear.models:PredictionErrorEstimator"
-PROCESS = "mckibben.estimators.linear.process:ProcessModelEstimator"
-FORCE_LAW = "mckibben.estimators.force.static:PolynomialForceEstimator"
-MULTISTATE = "mckibben.estimators.force.multistate:MultistateEstimator"
-GRID = "mckibben.estimators.preisach_type.preisach:GridEstimator"
-SLIP = "mckibben.estimators.play_type.maxwell_slip:MaxwellSlipEstimator"
-NARX = "mckibben.estimators.narx.polynomial:NarxPolynomialEstimator"
-PLAY_RIDGE = "mckibben.estimators.coupled.play_ridge:PlayRidgeEstimator"
-SDCHM = "mckibben.estimators.coupled.sdchm:SDCHMEstimator"
-
-PLUGINS: dict[str, dict[str, str | Preset]] = {
+PLUGINS: dict[str, dict[str, str]] = {
     "blocks": {
         "activation-memory": "mckibben.blocks.force.activation_memory:ActivationMemory",
         "activation-pressure": "mckibben.blocks.force.activation_pressure:ActivationPressure",
         "adaptive": "mckibben.blocks.adaptive.adaptive:Adaptive",
         "adaptive-series": "mckibben.blocks.adaptive.adaptive_series:AdaptiveSeries",
         "affine": "mckibben.blocks.memoryless.affine:Affine",
-        "air": "mckibben.blocks.dynamic.air:Air",
+        "air": "mckibben.blocks.dynamics.air:Air",
         "balance": "mckibben.blocks.coupled.balance:Balance",
         "band": "mckibben.blocks.bands.band:Band",
         "banded": "mckibben.blocks.bands.banded:Banded",
-        "bouc-wen": "mckibben.blocks.differential.bouc_wen:BoucWen",
-        "bouc-wen-oscillator": (
-            "mckibben.blocks.differential.bouc_wen_oscillator:BoucWenOscillator"
-        ),
+        "bouc-wen": "mckibben.blocks.hysteresis.bouc_wen:BoucWen",
+        "bouc-wen-oscillator": ("mckibben.blocks.hysteresis.bouc_wen_oscillator:BoucWenOscillator"),
         "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
         "contact": "mckibben.blocks.memoryless.contact:Contact",
         "coupled-memory": "mckibben.blocks.coupled.coupled_memory:CoupledMemory",
         "coupling": "mckibben.blocks.coupled.coupling:Coupling",
-        "creep": "mckibben.blocks.dynamic.creep:Creep",
-        "duhem": "mckibben.blocks.differential.duhem:Duhem",
-        "duhem-oscillator": "mckibben.blocks.differential.duhem_oscillator:DuhemOscillator",
-        "eupi": "mckibben.blocks.play_type.eupi:EUPI",
+        "creep": "mckibben.blocks.dynamics.creep:Creep",
+        "duhem": "mckibben.blocks.hysteresis.duhem:Duhem",
+        "duhem-oscillator": "mckibben.blocks.hysteresis.duhem_oscillator:DuhemOscillator",
+        "eupi": "mckibben.blocks.hysteresis.eupi:EUPI",
         "exponential": "mckibben.blocks.memoryless.logarithm:Exponential",
         "feedforward-feedback": "mckibben.blocks.feedback.feedforward_feedback:FeedforwardFeedback",
         "force-balance": "mckibben.blocks.coupled.force_balance:ForceBalance",
         "force-feedforward": "mckibben.blocks.force.feedforward:ForceFeedforward",
         "fuzzy-network": "mckibben.blocks.coupled.fuzzy_network:FuzzyNetwork",
         "generalized-bouc-wen": (
-            "mckibben.blocks.differential.generalized_bouc_wen:GeneralizedBoucWen"
+            "mckibben.blocks.hysteresis.generalized_bouc_wen:GeneralizedBoucWen"
         ),
-        "gpi": "mckibben.blocks.play_type.gpi:GPI",
-        "inverse": "mckibben.blocks.core.inverse:Inverse",
+        "gpi": "mckibben.blocks.hysteresis.gpi:GPI",
+        "inverse": "mckibben.blocks.inverse:Inverse",
         "krasnoselskii-pokrovskii": (
-            "mckibben.blocks.preisach_type.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskii"
+            "mckibben.blocks.hysteresis.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskii"
         ),
         "load-estimate": "mckibben.blocks.coupled.load_estimate:LoadEstimate",
         "logarithm": "mckibben.blocks.memoryless.logarithm:Logarithm",
-        "maxwell-slip": "mckibben.blocks.play_type.maxwell_slip:MaxwellSlip",
+        "maxwell-slip": "mckibben.blocks.hysteresis.maxwell_slip:MaxwellSlip",
         "multistate-friction": "mckibben.blocks.force.multistate_friction:MultistateFriction",
-        "narx-network": "mckibben.blocks.dynamic.narx_network:NarxNetwork",
-        "narx-polynomial": "mckibben.blocks.dynamic.narx_polynomial:NarxPolynomial",
+        "narx-network": "mckibben.blocks.dynamics.narx_network:NarxNetwork",
+        "narx-polynomial": "mckibben.blocks.dynamics.narx_polynomial:NarxPolynomial",
         "negative": "mckibben.blocks.memoryless.negative:Negative",
         "parallel": "mckibben.blocks.compose:Parallel",
         "per-channel": "mckibben.blocks.compose:PerChannel",
-        "pi": "mckibben.blocks.play_type.pi:PI",
+        "pi": "mckibben.blocks.hysteresis.pi:PI",
         "pid": "mckibben.blocks.feedback.pid:PIDFeedback",
         "piecewise-linear": "mckibben.blocks.memoryless.piecewise_linear:PiecewiseLinear",
-        "play": "mckibben.blocks.play_type.play:Play",
+        "play": "mckibben.blocks.hysteresis.play:Play",
         "polynomial": "mckibben.blocks.memoryless.polynomial:Polynomial",
         "polynomial-force": "mckibben.blocks.force.polynomial_force:PolynomialForce",
         "predictive": "mckibben.blocks.predictive.predictive:Predictive",
-        "preisach": "mckibben.blocks.preisach_type.preisach:Preisach",
-        "process-model": "mckibben.blocks.dynamic.process_model:ProcessModel",
-        "rate-dependent-pi": "mckibben.blocks.play_type.rate_dependent_pi:RateDependentPI",
+        "preisach": "mckibben.blocks.hysteresis.preisach:Preisach",
+        "process-model": "mckibben.blocks.dynamics.process_model:ProcessModel",
+        "rate-dependent-pi": "mckibben.blocks.hysteresis.rate_dependent_pi:RateDependentPI",
         "recurrent-fuzzy-network": (
             "mckibben.blocks.coupled.recurrent_fuzzy_network:RecurrentFuzzyNetwork"
         ),
         "series": "mckibben.blocks.compose:Series",
-        "state-network": "mckibben.blocks.dynamic.state_network:StateNetwork",
+        "state-network": "mckibben.blocks.dynamics.state_network:StateNetwork",
         "tondu-lopez": "mckibben.blocks.force.tondu_lopez:TonduLopez",
-        "transfer-function": "mckibben.blocks.dynamic.transfer_function:TransferFunction",
+        "transfer-function": "mckibben.blocks.dynamics.transfer_function:TransferFunction",
     },
     "controllers": {
         "feedforward": "mckibben.control.laws:feedforward",
@@ -95,9 +83,9 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "pid": "mckibben.control.laws:pid",
     },
     "envelopes": {
-        "exponential": "mckibben.blocks.play_type.envelopes.exponential:Exponential",
-        "piecewise-linear": "mckibben.blocks.play_type.envelopes.piecewise_linear:PiecewiseLinear",
-        "tanh": "mckibben.blocks.play_type.envelopes.tanh:Tanh",
+        "exponential": "mckibben.blocks.hysteresis.envelopes.exponential:Exponential",
+        "piecewise-linear": "mckibben.blocks.hysteresis.envelopes.piecewise_linear:PiecewiseLinear",
+        "tanh": "mckibben.blocks.hysteresis.envelopes.tanh:Tanh",
     },
     "estimators": {
         "activation-memory": (
@@ -106,141 +94,58 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "activation-pressure": (
             "mckibben.estimators.force.activation_pressure:ActivationPressureEstimator"
         ),
-        "air": "mckibben.estimators.dynamic.air:AirEstimator",
-        "armax": preset(
-            LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0, several=False
-        ),
-        "arx": preset(LINEAR, "ARX model, A y = B u + e, by linear least squares."),
+        "air": "mckibben.estimators.dynamics.air:AirEstimator",
+        "armax": "mckibben.estimators.dynamics.linear_models:ARMAX",
+        "arx": "mckibben.estimators.dynamics.linear_models:ARX",
         "balance": "mckibben.estimators.coupled.balance:BalanceEstimator",
         "balance-force": "mckibben.estimators.coupled.balance_force:BalanceForceEstimator",
-        "bj": preset(
-            LINEAR,
-            "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
-            shared_poles=False,
-            n_noise=2,
-            n_noise_poles=2,
-            effort=1.0,
-            several=False,
-        ),
-        "bouc-wen": "mckibben.estimators.differential.bouc_wen:BoucWenEstimator",
+        "bj": "mckibben.estimators.dynamics.linear_models:BJ",
+        "bouc-wen": "mckibben.estimators.hysteresis.bouc_wen:BoucWenEstimator",
         "bouc-wen-oscillator": (
-            "mckibben.estimators.differential.bouc_wen_oscillator:BoucWenOscillatorEstimator"
+            "mckibben.estimators.hysteresis.bouc_wen_oscillator:BoucWenOscillatorEstimator"
         ),
-        "coupled-memory": preset(
-            PLAY_RIDGE,
-            "Lags and play operators of several muscles, with one penalty that is given.",
-            alone=False,
-            needs_time=True,
-            lags=(0.3, 1.0, 8.0),
-            ridge=1e-4,
-        ),
-        "coupled-pi": preset(
-            SDCHM,
-            "Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline.",
-            memory="gpi",
-            n_sets=0,
-            n_friction=0,
-        ),
-        "cpi": "mckibben.estimators.play_type.creep_pi:CreepPIEstimator",
-        "duhem": "mckibben.estimators.differential.duhem:DuhemEstimator",
+        "coupled-memory": "mckibben.estimators.coupled.play_ridge:COUPLED_MEMORY",
+        "coupled-pi": "mckibben.estimators.coupled.sdchm:COUPLED_PI",
+        "cpi": "mckibben.estimators.hysteresis.creep_pi:CreepPIEstimator",
+        "duhem": "mckibben.estimators.hysteresis.duhem:DuhemEstimator",
         "duhem-oscillator": (
-            "mckibben.estimators.differential.duhem_oscillator:DuhemOscillatorEstimator"
+            "mckibben.estimators.hysteresis.duhem_oscillator:DuhemOscillatorEstimator"
         ),
-        "eupi": "mckibben.estimators.play_type.eupi:EUPIEstimator",
-        "force-bilinear": preset(FORCE_LAW, "The bilinear-quadratic law.", law="bilinear"),
+        "eupi": "mckibben.estimators.hysteresis.eupi:EUPIEstimator",
+        "force-bilinear": "mckibben.estimators.force.static:FORCE_BILINEAR",
         "force-chou": "mckibben.estimators.force.static:ChouHannafordEstimator",
-        "force-minh": preset(
-            FORCE_LAW,
-            "Minh's law: cubic in length, with coefficients linear in pressure.",
-            law="minh",
-        ),
-        "force-petrovic": preset(
-            FORCE_LAW,
-            "Petrovic's polynomial: quadratic in length with pressure, and without.",
-            law="petrovic",
-        ),
-        "force-schindele": preset(
-            FORCE_LAW,
-            "Schindele and Aschemann's polynomials: cubic with pressure, of fourth order without.",
-            law="schindele",
-        ),
+        "force-minh": "mckibben.estimators.force.static:FORCE_MINH",
+        "force-petrovic": "mckibben.estimators.force.static:FORCE_PETROVIC",
+        "force-schindele": "mckibben.estimators.force.static:FORCE_SCHINDELE",
         "force-tondu": "mckibben.estimators.force.static:TonduLopezEstimator",
-        "gbw": "mckibben.estimators.differential.generalized_bouc_wen:GeneralizedBoucWenEstimator",
-        "gpi": "mckibben.estimators.play_type.gpi:GPIEstimator",
-        "kp": preset(
-            GRID,
-            "Krasnosel'skii-Pokrovskii model by (non-negative) least squares on its operators.",
-            relays="gradual",
-        ),
-        "maxwell-slip": preset(SLIP, "Maxwell-slip model by least squares.", asymmetric=False),
-        "mms": preset(
-            SLIP,
-            "Modified Maxwell-slip model: the two ratios of its directions are searched.",
-            asymmetric=True,
-            effort=0.5,
-        ),
-        "mpi": "mckibben.estimators.play_type.mpi:MPIEstimator",
+        "gbw": "mckibben.estimators.hysteresis.generalized_bouc_wen:GeneralizedBoucWenEstimator",
+        "gpi": "mckibben.estimators.hysteresis.gpi:GPIEstimator",
+        "kp": "mckibben.estimators.hysteresis.preisach:KP",
+        "maxwell-slip": "mckibben.estimators.hysteresis.maxwell_slip:MAXWELL_SLIP",
+        "mms": "mckibben.estimators.hysteresis.maxwell_slip:MMS",
+        "mpi": "mckibben.estimators.hysteresis.mpi:MPIEstimator",
         "mpi-narmax": "mckibben.estimators.coupled.mpi_narmax:MPINarmaxEstimator",
-        "multistate": preset(
-            MULTISTATE,
-            "Multistate friction with one shared element and one for each direction: "
-            "eleven parameters.",
-            elements="each-way",
-            effort=3.0,
-        ),
-        "multistate-11": preset(
-            MULTISTATE,
-            "Multistate friction by bounded least squares from many starts, and exchange of elements.",
-            elements="eleven",
-        ),
-        "multistate-18": preset(
-            MULTISTATE,
-            "Multistate friction with three elements in both directions: eighteen parameters.",
-            elements="eighteen",
-        ),
-        "narx": NARX,
-        "narx-network": "mckibben.estimators.narx.network:NarxNetworkEstimator",
-        "narx-play": preset(
-            NARX,
-            "Polynomial NARX model with play operators among its regressors, so that it keeps its "
-            "branch.",
-            output_lags=1,
-            input_lags=1,
-            n_play=6,
-            effort=0.2,
-        ),
-        "oe": preset(
-            LINEAR,
-            "Output-error model, y = B / F u + e: the best free run of its orders.",
-            shared_poles=False,
-            effort=0.8,
-        ),
-        "p1": preset(PROCESS, "One lag.", structure="P1"),
-        "p1z": preset(PROCESS, "One lag and a zero.", structure="P1Z"),
-        "p2": preset(PROCESS, "Two lags.", structure="P2"),
-        "p2u": preset(PROCESS, "Two poles that may oscillate.", structure="P2U"),
-        "p2uz": preset(PROCESS, "Two poles that may oscillate, and a zero.", structure="P2UZ"),
-        "p2z": preset(PROCESS, "Two lags and a zero.", structure="P2Z"),
-        "p3": preset(PROCESS, "Three lags.", structure="P3"),
-        "pi": "mckibben.estimators.play_type.pi:PIEstimator",
-        "play-ridge": PLAY_RIDGE,
-        "preisach": preset(
-            GRID, "Preisach model by (non-negative) least squares on its cells.", relays="sudden"
-        ),
-        "rdpi": "mckibben.estimators.play_type.rdpi:RDPIEstimator",
-        "sdchm": SDCHM,
-        "sdchm-published": preset(
-            SDCHM,
-            "SDCHM as its paper identifies it: GPI, coupling, and a network trained by particle swarm.",
-            effort=25.0,
-            constants=False,
-            method="pso",
-            ridge=1e-9,
-            memory="gpi",
-            memory_settings={"threshold_rule": "paper", "initial": "virgin"},
-            n_friction=0,
-        ),
-        "state-network": "mckibben.estimators.dynamic.state_network:StateNetworkEstimator",
+        "multistate": "mckibben.estimators.force.multistate:MULTISTATE",
+        "multistate-11": "mckibben.estimators.force.multistate:MULTISTATE_11",
+        "multistate-18": "mckibben.estimators.force.multistate:MULTISTATE_18",
+        "narx": "mckibben.estimators.dynamics.narx_polynomial:NarxPolynomialEstimator",
+        "narx-network": "mckibben.estimators.dynamics.narx_network:NarxNetworkEstimator",
+        "narx-play": "mckibben.estimators.dynamics.narx_polynomial:NARX_PLAY",
+        "oe": "mckibben.estimators.dynamics.linear_models:OE",
+        "p1": "mckibben.estimators.dynamics.process_model:P1",
+        "p1z": "mckibben.estimators.dynamics.process_model:P1Z",
+        "p2": "mckibben.estimators.dynamics.process_model:P2",
+        "p2u": "mckibben.estimators.dynamics.process_model:P2U",
+        "p2uz": "mckibben.estimators.dynamics.process_model:P2UZ",
+        "p2z": "mckibben.estimators.dynamics.process_model:P2Z",
+        "p3": "mckibben.estimators.dynamics.process_model:P3",
+        "pi": "mckibben.estimators.hysteresis.pi:PIEstimator",
+        "play-ridge": "mckibben.estimators.coupled.play_ridge:PlayRidgeEstimator",
+        "preisach": "mckibben.estimators.hysteresis.preisach:PREISACH",
+        "rdpi": "mckibben.estimators.hysteresis.rdpi:RDPIEstimator",
+        "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",
+        "sdchm-published": "mckibben.estimators.coupled.sdchm:SDCHM_PUBLISHED",
+        "state-network": "mckibben.estimators.dynamics.state_network:StateNetworkEstimator",
         "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
     },
     "faces": {
@@ -303,7 +208,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "triangle": "mckibben.signals.excitations:triangle",
     },
 }
-"""Group -> name -> ``"module:attribute"``, or a preset. Adding a plug-in is one line here."""
+"""Group -> name -> ``"module:attribute"``. Adding a plug-in is one line here."""
 
 REPLACED: dict[str, dict[str, str]] = {
     "estimators": {"force-balance": "balance", "grey-box": "balance"},
@@ -338,22 +243,18 @@ def load(group: str, name: str) -> Any:
         raise ModelError(
             f"there is no {kind} named {name!r}. Remedy: use one of {', '.join(sorted(locations))}."
         )
-    found: Any = locations[name]
-    if isinstance(found, str):
-        module, _, attribute = found.partition(":")
-        try:
-            found = getattr(import_module(module), attribute)
-        except (ImportError, AttributeError, SyntaxError) as error:
-            raise ModelError(
-                f"{name!r} of the {group} cannot be imported: {error}. Remedy: mend "
-                f"{locations[name]}, or take it out of the registry."
-            ) from error
+    module, _, attribute = locations[name].partition(":")
+    try:
+        found: Any = getattr(import_module(module), attribute)
+    except (ImportError, AttributeError, SyntaxError) as error:
+        raise ModelError(
+            f"{name!r} of the {group} cannot be imported: {error}. Remedy: mend "
+            f"{locations[name]}, or take it out of the registry."
+        ) from error
     return Chosen(name, found) if isinstance(found, Preset) else found
 
 
 @cache
-def _locations(group: str) -> dict[str, str | Preset]:
-    outside: dict[str, str | Preset] = {
-        entry.name: entry.value for entry in entry_points(group=f"mckibben.{group}")
-    }
+def _locations(group: str) -> dict[str, str]:
+    outside = {entry.name: entry.value for entry in entry_points(group=f"mckibben.{group}")}
     return outside | PLUGINS[group]

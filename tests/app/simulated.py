@@ -18,7 +18,7 @@ from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.shell import build, load_the_rest
 from mckibben.app.workspace import Workspace
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.rigs import load_rig
 from mckibben.signals import decaying_triangle
 

@@ -13,7 +13,7 @@ from mckibben import GPI, Banded, DataError, ModelError, ModelWarning, Recording
 from mckibben.bands.finding import find_band
 from mckibben.bands.held import Held
 from mckibben.bands.scale import SHAPES
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
 from mckibben.signals import random_wave
 
 MODEL = GPI.example()

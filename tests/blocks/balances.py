@@ -9,9 +9,9 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, rows, vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.laws.trial import wander
 from tests.blocks.strategies import numbers
 

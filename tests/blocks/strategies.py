@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from mckibben import EUPI, GPI, PI, RateDependentPI, Series
 from mckibben import PiecewiseLinear as Curve
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.fields import vector
+from mckibben.blocks.hysteresis.envelopes.base import Envelope
+from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
+from mckibben.blocks.hysteresis.envelopes.piecewise_linear import PiecewiseLinear
+from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
+from mckibben.blocks.hysteresis.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
+from mckibben.blocks.hysteresis.preisach import Preisach
 from mckibben.blocks.laws.trial import through
-from mckibben.blocks.play_type.envelopes.base import Envelope
-from mckibben.blocks.play_type.envelopes.exponential import Exponential
-from mckibben.blocks.play_type.envelopes.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.play_type.envelopes.tanh import Tanh
-from mckibben.blocks.preisach_type.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
-from mckibben.blocks.preisach_type.preisach import Preisach
 
 Array = NDArray[np.float64]
 

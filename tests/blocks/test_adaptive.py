@@ -16,9 +16,9 @@ from mckibben import Block, ModelError, Series, load
 from mckibben.blocks.adaptive.adaptive import Adaptive, taught
 from mckibben.blocks.adaptive.adaptive_series import adaptive
 from mckibben.blocks.adaptive.drift import alarm_limit
-from mckibben.blocks.dynamic.creep import Creep
-from mckibben.blocks.play_type.gpi import GPI
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.dynamics.creep import Creep
+from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.blocks.hysteresis.pi import PI
 
 Array = NDArray[np.float64]
 

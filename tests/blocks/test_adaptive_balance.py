@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben.blocks.adaptive.adaptive import Adaptive
-from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_adapting import FRICTION, STIFFNESS
+from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws.trial import wander
 from tests.blocks.balances import ALONE, STEP, balances
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
 from mckibben import ModelWarning, Series
-from mckibben.blocks.dynamic.air import Air
+from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.export import export_c
 from tests.blocks.strategies import numbers, paths

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from mckibben import ModelWarning
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from tests.blocks.balances import (

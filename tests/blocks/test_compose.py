@@ -20,10 +20,10 @@ from mckibben import (
     Recording,
     Series,
 )
-from mckibben.blocks.core.fields import DISPLACEMENT
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
+from mckibben.blocks.fields import DISPLACEMENT
 from tests.blocks.strategies import paths, pi_models
 
 Array = NDArray[np.float64]

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.signal import dlsim, lsim
 
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel, Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import DISPLACEMENT
-from mckibben.blocks.dynamic.creep import Creep
-from mckibben.blocks.dynamic.process_model import ProcessModel
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.dynamics.creep import Creep
+from mckibben.blocks.dynamics.process_model import ProcessModel
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
+from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.negative import Negative
 from mckibben.papers.field_models.published import process_model

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from mckibben import Block, ModelError, Parallel, Series
-from mckibben.blocks.core import saving
-from mckibben.blocks.core.composition import DEEPEST, MOST_BLOCKS
-from mckibben.blocks.core.fields import MOST_COEFFICIENTS, MOST_NUMBERS
+from mckibben.blocks import saving
+from mckibben.blocks.compose import DEEPEST, MOST_BLOCKS
+from mckibben.blocks.fields import MOST_COEFFICIENTS, MOST_NUMBERS
 from mckibben.registry import load
 
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from mckibben.blocks.core.notation import Written
-from mckibben.blocks.core.writing import quantities, written
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.equations import quantities, written
 from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.notation import Written
 from mckibben.report.mathematics import mathml
 
 EXAMPLES = examples()

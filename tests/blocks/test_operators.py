@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import EUPI, GPI, PiecewiseLinear, Play
-from mckibben.blocks.play_type.eupi import eupi_matrix
-from mckibben.blocks.play_type.gpi import gpi_matrix
-from mckibben.blocks.play_type.maxwell_slip import slip_matrix
-from mckibben.blocks.play_type.play import play_matrix
-from mckibben.blocks.preisach_type.preisach import DEPTH, Preisach
+from mckibben.blocks.hysteresis.eupi import eupi_matrix
+from mckibben.blocks.hysteresis.gpi import gpi_matrix
+from mckibben.blocks.hysteresis.maxwell_slip import slip_matrix
+from mckibben.blocks.hysteresis.play import play_matrix
+from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach
 from tests.blocks.strategies import LOW, eupi_models, gpi_models, numbers, paths
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ def test_a_held_reference_holds_the_input() -> None:
 def test_preisachs_model_forgets_the_smallest_of_too_many_loops_and_no_other() -> None:
     """Ever smaller loops nest; when the input leaves them all, nothing of them is left."""
     block = Preisach.example()
-    low, high = block.limits
+    low, high = block.input_limits
     shrinking = 0.5 * (low + high) + 0.45 * (high - low) * (-0.95) ** np.arange(DEPTH + 12)
     around = np.array([low, high, *shrinking, high, low + 0.3 * (high - low)])
     directly = np.array([low, high, high, low + 0.3 * (high - low)])

@@ -12,8 +12,8 @@ from scipy.optimize import LinearConstraint, minimize
 from mckibben import Block
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.play_type.gpi import GPI
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.predictive.plan import MOST_STEPS, plan, plan_scratch
 from mckibben.blocks.predictive.plan_one import one_scratch, plan_one, turned
 from mckibben.blocks.predictive.predictive import Predictive

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from mckibben import GPI, PI, DataError, ModelError, load
-from mckibben.blocks.core import saving
+from mckibben.blocks import saving
 from mckibben.blocks.laws.examples import examples
 
 EXAMPLES = examples()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, PI, RateDependentPI, Recording, Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.dynamic.creep import Creep
+from mckibben.blocks.base import Block
+from mckibben.blocks.dynamics.creep import Creep
 from mckibben.comparison.free_run import PERIODIC, measured_start, run_free
 
 T = np.linspace(0, 1, 800)

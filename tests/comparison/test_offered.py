@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+import types
+from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,10 +15,20 @@ import mckibben
 from mckibben import ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.inverses import inverse_of
-from mckibben.comparison.needs import full_name, inverse_kind, needs
-from mckibben.comparison.offered import objections, settings_of, settings_of_all
+from mckibben.comparison.offered import (
+    declared,
+    default_model,
+    full_name,
+    needs,
+    objections,
+    settings_of,
+    settings_of_all,
+    summary,
+)
+from mckibben.comparison.row import inverse_of
 from mckibben.errors import MckibbenError
+from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
+from mckibben.estimators.hysteresis.pi import PIEstimator
 
 FITTED = Path(__file__).parents[2] / "docs" / "models" / "fitted"
 MODELS = registry.names("estimators")
@@ -24,8 +38,45 @@ def test_every_model_is_for_one_thing_and_has_a_name_of_its_own() -> None:
     assert sorted(model for need in needs() for model in need.models) == sorted(MODELS)
     assert len({full_name(model) for model in MODELS}) == len(MODELS)
     for need in needs():
-        assert need.start
-        assert set(need.start) <= set(need.models)
+        quick = [declared(model).quick for model in need.models]
+        assert quick[0]
+        assert quick == sorted(quick, reverse=True)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_model_declares_what_it_is(model: str) -> None:
+    estimator = declared(model)
+    assert estimator.purpose in get_args(Purpose)
+    assert estimator.cannot
+    assert estimator.param_grid.keys() <= estimator().get_params().keys()
+
+
+@pytest.mark.parametrize("use", get_args(DefaultFor))
+def test_one_model_is_the_default_of_a_use(use: DefaultFor) -> None:
+    found = [model for model in MODELS if declared(model).default_for == use]
+    assert found == [default_model(use)]
+
+
+def test_a_plug_in_that_declares_nothing_is_listed_under_its_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    silent = types.new_class("Silent", (PIEstimator,), {})
+    for name in ("title", "purpose", "can", "quick", "makes", "default_for"):
+        setattr(silent, name, getattr(Estimator, name))
+    silent.__doc__ = "A model of mine."
+    outside = types.ModuleType("outside")
+    outside.silent = silent  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "outside", outside)
+    entries = [
+        EntryPoint(name, f"outside:{name}", "mckibben.estimators") for name in ("silent", "no")
+    ]
+    monkeypatch.setattr(registry, "entry_points", lambda group: entries)
+    registry._locations.cache_clear()
+    try:
+        assert set(needs()[-1].models) == {"no", "silent"}
+        assert summary("silent") == "silent. A model of mine."
+    finally:
+        registry._locations.cache_clear()
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -34,7 +85,7 @@ def test_models_are_undone_as_said(model: str) -> None:
         found = inverse_of(compensator(mckibben.load(FITTED / f"{model}.json")))
     except MckibbenError:
         found = "none"
-    assert inverse_kind(model) == found
+    assert declared(model).inverse_kind.removesuffix(" where stable") == found
 
 
 def test_a_load_that_some_recordings_lack_is_an_objection_of_those_that_are_told_it() -> None:

@@ -20,14 +20,14 @@ from mckibben import (
     Series,
     check_block,
 )
-from mckibben.blocks.core.fields import vector
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
-from mckibben.blocks.dynamic.air import LONGEST_DEAD_TIME, Air
-from mckibben.blocks.dynamic.state_network import StateNetwork
+from mckibben.blocks.dynamics.air import LONGEST_DEAD_TIME, Air
+from mckibben.blocks.dynamics.state_network import StateNetwork
+from mckibben.blocks.fields import vector
+from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
+from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
+from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
 from mckibben.blocks.laws.examples import examples
-from mckibben.blocks.play_type.envelopes.exponential import Exponential
-from mckibben.blocks.play_type.envelopes.tanh import Tanh
 
 EXAMPLES = examples()
 

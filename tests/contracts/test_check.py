@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import PI, Block, RateDependentPI, check_block
-from mckibben.blocks.core.inverse import Inverse
-from mckibben.blocks.core.running import Stream
+from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws.check import LAWS
+from mckibben.blocks.running import Stream
 from mckibben.errors import ContractError
 
 Array = NDArray[np.float64]

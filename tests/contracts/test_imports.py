@@ -27,7 +27,7 @@ LAYERS = (
     {"comparison"},
     {"validation", "excitation"},
     {"studying"},
-    {"papers", "measured", "missing"},
+    {"papers", "measured"},
     {"report"},
     {"app"},
     {"cli"},

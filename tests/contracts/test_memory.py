@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import GPI, Affine, ModelError, ModelWarning, Play, Series
-from mckibben.blocks.core.fields import vector
-from mckibben.blocks.core.single_channel import Ranged
+from mckibben.blocks.fields import vector
 from mckibben.blocks.laws.examples import examples
 from mckibben.registry import load
 from tests.blocks.strategies import (
@@ -82,7 +81,7 @@ def test_a_model_undoes_its_inverse_from_any_state(family: str, data: st.DataObj
     before, after = (data.draw(paths(0.2, 4.8, pace)) for _ in range(2))
     starts: list[Any] = [None]
     # inverses of one model remember what that does, and a jump may be too fast for some
-    if isinstance(model, Ranged) and not model.rate_dependent:
+    if hasattr(model, "input_range") and not model.rate_dependent:
         stream = model.stream(STEP)
         for u in before:
             stream.step(u)
@@ -145,7 +144,7 @@ def test_references_out_of_reach_are_clipped_counted_and_forgotten(kind: str) ->
     outputs = block.simulate(inputs, sample_time=10.0)
     inside = (references > low + 0.02 * span) & (references < high - 0.02 * span)
     np.testing.assert_allclose(outputs[inside], references[inside], atol=1e-9 * span)
-    assert block.limits[0] <= inputs.min() <= inputs.max() <= block.limits[1]
+    assert block.input_limits[0] <= inputs.min() <= inputs.max() <= block.input_limits[1]
 
 
 @pytest.mark.parametrize("kind", CLIPPED)
@@ -153,7 +152,7 @@ def test_references_out_of_reach_are_clipped_counted_and_forgotten(kind: str) ->
 def test_touching_the_limits_is_not_being_clipped(kind: str, shares: tuple[float, ...]) -> None:
     """Rounding at the ends of the range is no reason to warn: warnings are errors here."""
     block: Any = EXAMPLES[kind]
-    low, high = block.limits
+    low, high = block.input_limits
     references = simulate(block, low + (high - low) * np.array(shares))
     outputs = simulate(block, simulate(block.inverse(), references))
     np.testing.assert_allclose(outputs, references, atol=tolerance(references, 1e-11))

@@ -11,12 +11,12 @@ import pytest
 
 from mckibben import PI, Channel, ModelError, PerChannel, Play, Series
 from mckibben.blocks.adaptive.adaptive_series import adaptive
-from mckibben.blocks.core.fields import DISPLACEMENT
 from mckibben.blocks.coupled.coupling import Coupling
-from mckibben.blocks.dynamic.process_model import ProcessModel
-from mckibben.blocks.play_type.envelopes.exponential import Exponential
-from mckibben.blocks.play_type.envelopes.piecewise_linear import PiecewiseLinear as Lines
-from mckibben.blocks.play_type.envelopes.tanh import Tanh
+from mckibben.blocks.dynamics.process_model import ProcessModel
+from mckibben.blocks.fields import DISPLACEMENT
+from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
+from mckibben.blocks.hysteresis.envelopes.piecewise_linear import PiecewiseLinear as Lines
+from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
 from mckibben.registry import load
 
 Make = Callable[[], object]
@@ -154,10 +154,6 @@ OTHERS: dict[str, tuple[Make, str]] = {
     "an unknown start": (
         lambda: Play(0.5).simulate(U, initial="fresh"),  # type: ignore[arg-type]
         "'fresh'",
-    ),
-    "no virgin": (
-        lambda: RATED.inverse().simulate(U, initial="virgin", sample_time=0.1),
-        "virgin",
     ),
     "no time in an array": (lambda: RATED.simulate(U), "sample time"),
     "no time for a part": (lambda: Series((RATED,)).simulate(U), "sample time"),

@@ -18,8 +18,9 @@ from sklearn.base import clone
 
 import mckibben
 from mckibben import Block, ModelError
-from mckibben.blocks.play_type.envelopes import Envelope
+from mckibben.blocks.hysteresis.envelopes import Envelope
 from mckibben.estimators.core.estimator import Estimator
+from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.presets import Chosen, preset
 from mckibben.registry import PLUGINS, REPLACED, load, names
 from mckibben.report.notebook.face import Face
@@ -51,7 +52,7 @@ def concrete(base: type, folder: str) -> set[Any]:
 
 ON_DISK: dict[str, Callable[[], set[Any]]] = {
     "blocks": lambda: concrete(Block, "blocks"),
-    "envelopes": lambda: concrete(Envelope, "blocks/play_type/envelopes"),
+    "envelopes": lambda: concrete(Envelope, "blocks/hysteresis/envelopes"),
     "estimators": lambda: concrete(Estimator, "estimators"),
     "faces": lambda: concrete(Face, "report/notebook"),
     "setups": lambda: concrete(Rig, "rigs"),
@@ -106,8 +107,7 @@ def test_settings_override_those_of_a_preset_and_others_are_refused_by_its_name(
 
 def test_another_package_gives_a_preset_by_an_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
     outside = types.ModuleType("outside")
-    location = "mckibben.estimators.play_type.pi:PIEstimator"
-    outside.few = preset(location, "A PI model of three operators.", n_operators=3)  # type: ignore[attr-defined]
+    outside.few = preset(PIEstimator, "A PI model of three operators.", n_operators=3)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "outside", outside)
     entry = EntryPoint("pi-of-three", "outside:few", "mckibben.estimators")
     monkeypatch.setattr(mckibben.registry, "entry_points", lambda group: [entry])

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Affine, DataError, ModelError, Recording, Series, load, load_rig
-from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.fields import Channel
 from mckibben.control import DisturbanceObserver, Twin, control_law, track, tune_pid
 from mckibben.control.pressure_loop import PressureLoop
 

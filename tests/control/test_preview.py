@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Recording, Series
-from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.dynamic.air import Air
+from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.control import DisturbanceObserver, EstimatedLoad, Twin, track
 from mckibben.control.controller import BlockController

@@ -22,9 +22,9 @@ from mckibben import (
     write,
 )
 from mckibben.blocks.bands.band import Band
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.base import Block
 from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.fields import Channel
 from mckibben.control import Twin, before, track, tune_pid
 from mckibben.control.suiting import doubts_of_feedback
 from mckibben.registry import load as registered

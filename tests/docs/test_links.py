@@ -10,9 +10,7 @@ from typing import Any
 import pytest
 import typer
 
-from mckibben import registry
 from mckibben.cli.main import app
-from mckibben.comparison.limits import limits
 
 ROOT = Path(__file__).parents[2]
 PAGES = [
@@ -69,8 +67,3 @@ def test_tutorials_are_in_the_index() -> None:
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     tutorials = (ROOT / "docs" / "tutorials").glob("*.md")
     assert [path for path in tutorials if f"tutorials/{path.stem}\n" not in index] == []
-
-
-def test_every_model_has_its_limits_and_nothing_else_has() -> None:
-    assert sorted(limits()) == sorted(registry.names("estimators"))
-    assert all({"can", "cannot"} <= set(one) for one in limits().values())

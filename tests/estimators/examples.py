@@ -123,5 +123,5 @@ def few_steps() -> Iterator[None]:
     """Let linear models take few steps: what is asked here does not depend on how far they go."""
     with pytest.MonkeyPatch.context() as patch:
         for steps in ("FIRST_STEPS", "STEPS"):
-            patch.setattr(f"mckibben.estimators.linear.prediction_error.{steps}", 2)
+            patch.setattr(f"mckibben.estimators.dynamics.prediction_error.{steps}", 2)
         yield

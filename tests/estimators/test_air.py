@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, ModelError, Recording
-from mckibben.blocks.dynamic.air import Air
-from mckibben.estimators.dynamic.air import AirEstimator
+from mckibben.blocks.dynamics.air import Air
+from mckibben.estimators.dynamics.air import AirEstimator
 
 STEP, NOISE = 0.01, 0.005
 REGULATOR = Air(0.6, 0.3, 0.08, 0.05, 0.09, 0.03)

@@ -11,9 +11,9 @@ import pytest
 from mckibben import DataError, ModelError, Recording
 from mckibben.arrays import Array
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, PRESSURE
-from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE
+from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.memoryless.contact import Contact
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_loads import under

@@ -10,7 +10,7 @@ import pytest
 
 from mckibben import Recording, muscles
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.load_estimate import load_of, parts_of
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.muscles import Prior, Sheet

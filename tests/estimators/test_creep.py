@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Recording
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.dynamic.creep import Creep
-from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
+from mckibben.blocks.dynamics.creep import Creep
+from mckibben.blocks.dynamics.creep_start import begun_places, begun_state
 from mckibben.blocks.memoryless.negative import Negative
 from mckibben.comparison.free_run import run_free
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.hysteresis.creep_pi import CreepPIEstimator
 from mckibben.estimators.optimisers.linear import solve_linear
-from mckibben.estimators.play_type.creep_pi import CreepPIEstimator
 
 CREEP = Creep((0.05, 0.2), (6.0, 300.0), "fitted")
 SLOW = Series((PI.example(), CREEP))

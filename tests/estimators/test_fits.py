@@ -13,7 +13,7 @@ from mckibben import (
     PIEstimator,
     Recording,
 )
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from tests.estimators.examples import quick
 
 TIME = np.linspace(0, 1, 1500)

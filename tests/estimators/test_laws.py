@@ -12,12 +12,12 @@ from sklearn.base import clone, is_classifier, is_regressor
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from mckibben import GPI, DataError, ModelError, RateDependentPI, Recording
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.offered import defaults
 from mckibben.estimators.core.searching import SearchingEstimator
 from mckibben.estimators.core.settings import Setting, settings_with_defaults
 from mckibben.registry import load, names
-from tests.estimators.examples import KINDS, example_for, kinds_for, quick
+from tests.estimators.examples import CASES, KINDS, example_for, kinds_for, quick, recorded
 from tests.estimators.examples import few_steps as few_steps  # a fixture
 
 ALL = names("estimators")
@@ -27,14 +27,6 @@ INVERTIBLE = (
 )
 RISING = tuple(name for name in INVERTIBLE if load("estimators", name).rises)
 SWARMS = tuple(name for name in ALL if isinstance(load("estimators", name)(), SearchingEstimator))
-
-FREE_OF_UNITS = (
-    *("activation-memory", "activation-pressure", "arx", "bj", "coupled-memory", "oe", "pi"),
-    *("force-bilinear", "force-chou", "force-minh", "force-petrovic", "force-schindele"),
-    *("kp", "maxwell-slip", "narx", "narx-network", "narx-play", "play-ridge", "preisach", "tsfnn"),
-)
-UNIT_DEPENDENT = ("gpi", "mms", "mpi", "rdpi")
-"""These, and others, have tolerances, bounds or starts in units of their own yet."""
 
 
 # -- settings --------------------------------------------------------------------------------------
@@ -106,18 +98,46 @@ def test_data_that_no_model_is_of_are_refused(name: str) -> None:
         quick(name).fit(still)
 
 
+def relative_errors(name: str, kind: str, **settings: Any) -> list[float]:
+    """Return RMSE by scale of the output, of fits to the same runs with outputs scaled."""
+    found = []
+    for scale in (1.0, 1e-3, 1e-6, 1e6):
+        runs = [
+            run.with_channels(**{one: scale * run[one] for one in KINDS[kind].outputs})
+            for run in recorded(kind)
+        ]
+        found.append(quick(name, kind, **settings).fit(runs).diagnostics_.rmse / scale)
+    return found
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_a_fit_does_not_depend_on_the_unit_of_the_output(name: str, kind: str) -> None:
+    found = relative_errors(name, kind)
+    assert found == pytest.approx([found[0]] * 4, rel=1e-6)
+
+
+UNIT_DEPENDENT_SWARMS = (
+    "sdchm-published",  # it starts from N(0, 1) in the inputs' own units, as its paper prints
+    # bounds relative to the largest parameter, whatever the units of both
+    *("bouc-wen", "cpi", "duhem", "force-chou", "force-tondu", "gbw", "maxwell-slip", "mms"),
+    *("p1", "p1z", "p2", "p2u", "p2uz", "p2z", "p3"),
+)
+
+
 @pytest.mark.parametrize(
-    "name",
+    ("name", "kind"),
     [
-        *FREE_OF_UNITS,
-        *(pytest.param(n, marks=pytest.mark.xfail(strict=True)) for n in UNIT_DEPENDENT),
+        pytest.param(
+            name,
+            kinds_for(name)[0],
+            marks=[pytest.mark.xfail(strict=True)] if name in UNIT_DEPENDENT_SWARMS else [],
+        )
+        for name in ("mpi-narmax", "sdchm-published", *SWARMS)
     ],
 )
-def test_a_fit_does_not_depend_on_the_unit_of_the_output(name: str) -> None:
-    runs, outputs = example_for(name), KINDS[kinds_for(name)[0]].outputs
-    tiny = [run.with_channels(**{one: 1e-6 * run[one] for one in outputs}) for run in runs]
-    errors = [quick(name).fit(given).diagnostics_.rmse for given in (runs, tiny)]
-    assert errors[1] == pytest.approx(1e-6 * errors[0], rel=1e-6)
+def test_nor_does_a_swarm(name: str, kind: str) -> None:
+    found = relative_errors(name, kind, method="pso")
+    assert found == pytest.approx([found[0]] * 4, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", SWARMS)

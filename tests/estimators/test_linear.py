@@ -12,12 +12,12 @@ from scipy.optimize import approx_fprime
 from scipy.signal import lfilter
 
 from mckibben import DataError, ModelError, Recording, identify
-from mckibben.blocks.dynamic.process_model import ProcessModel
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.dynamics.process_model import ProcessModel
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.comparison.free_run import run_free
 from mckibben.estimators.core.affine_match import affine_match
 from mckibben.estimators.core.checking import training_data
-from mckibben.estimators.linear.polynomials import Orders, errors
+from mckibben.estimators.dynamics.linear_polynomials import Orders, errors
 from mckibben.registry import load
 
 Array = NDArray[np.float64]

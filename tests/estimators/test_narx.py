@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from mckibben import Recording
-from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.comparison.memory_test import hold_test
 from mckibben.estimators.core.checking import training_data
-from mckibben.estimators.narx.free_run import FreeRuns, feed_back, segments
-from mckibben.estimators.narx.polynomial import NarxPolynomialEstimator
-from mckibben.estimators.narx.selection import select
+from mckibben.estimators.dynamics.narx_free_run import FreeRuns, feed_back, segments
+from mckibben.estimators.dynamics.narx_polynomial import NarxPolynomialEstimator
+from mckibben.estimators.dynamics.narx_selection import select
 from mckibben.registry import load
 from tests.twins import fed_back
 

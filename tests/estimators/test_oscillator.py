@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import DataError, ModelError, Recording
-from mckibben.blocks.core.fields import vector
-from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
-from mckibben.blocks.differential.duhem_oscillator import DuhemOscillator
-from mckibben.estimators.differential.bouc_wen_oscillator import BoucWenOscillatorEstimator
-from mckibben.estimators.differential.duhem_oscillator import DuhemOscillatorEstimator
-from mckibben.estimators.differential.oscillator_slopes import follow_bouc_wen, follow_duhem
+from mckibben.blocks.fields import vector
+from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
+from mckibben.blocks.hysteresis.duhem_oscillator import DuhemOscillator
+from mckibben.estimators.hysteresis.bouc_wen_oscillator import BoucWenOscillatorEstimator
+from mckibben.estimators.hysteresis.duhem_oscillator import DuhemOscillatorEstimator
+from mckibben.estimators.hysteresis.oscillator_slopes import follow_bouc_wen, follow_duhem
 from tests.recordings import MEASURED
 
 Array = NDArray[np.float64]

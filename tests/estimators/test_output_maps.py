@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mckibben.blocks.core.fields import DISPLACEMENT
+from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.estimators.core.output_maps import MAPS, output_map
 
 weights = arrays(float, 5, elements=st.floats(1e-3, 10))

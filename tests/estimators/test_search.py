@@ -10,8 +10,8 @@ from scipy.optimize import lsq_linear
 
 from mckibben import Recording
 from mckibben.blocks.compose import Series
-from mckibben.blocks.dynamic.creep import Creep
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.dynamics.creep import Creep
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.optimisers.descent import Damping, Radius, Trust, descend

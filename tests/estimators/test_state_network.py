@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mckibben.blocks.dynamic.state_network import StateNetwork
-from mckibben.estimators.dynamic.state_network_slopes import follow_network
+from mckibben.blocks.dynamics.state_network import StateNetwork
+from mckibben.estimators.dynamics.state_network_slopes import follow_network
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Recording
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import DataError, ModelError
 from mckibben.excitation.candidates import random_motion
 from mckibben.excitation.information import Slopes, standard_errors
@@ -97,7 +97,7 @@ def test_predicted_standard_errors_are_the_spread_of_estimates() -> None:
         LIMITS,
         STEP,
     )
-    own = Slopes(block, places, STEP, len(commands))
+    own = Slopes(block, places, STEP)
     base, slopes, _ = own.over(commands, own.start(commands[0]))
     noise, matrix = 0.05, slopes[:, 0, :]
     said = standard_errors(matrix.T @ matrix / noise**2)

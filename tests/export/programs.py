@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.kernels import inlined, kernel, step, summing_step
 
 COUNT, SHARE = 3, 0.25
 CLOSED = 1e-12

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, ModelError, muscles
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_ros2
 from mckibben.export.ros2.package import ros2_files

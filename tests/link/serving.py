@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from mckibben import PI
-from mckibben.blocks.core.block import Primitive
+from mckibben.blocks.base import Block
 from mckibben.export import Serving
 from mckibben.export.c.building import compile_c
 from mckibben.export.c.project import export_c
@@ -41,7 +41,7 @@ double server_output(void) { return (double)server.out[0]; }
 """
 
 
-def block() -> Primitive:
+def block() -> Block:
     """Return a model whose numbers are the same to the last bit in any order of operations."""
     return PI(thresholds=(0.7,), weights=(2.9,), initial="virgin")
 

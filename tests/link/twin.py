@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mckibben.blocks.core.block import Primitive
+from mckibben.blocks.base import Block
 from mckibben.export.c.serving import Serving, limits
 from mckibben.link.framing import ROOM, Frame, unpacked, unstuffed
 
@@ -18,7 +18,7 @@ HALF = 1 << 31
 class Twin:
     """Serves a primitive without scratch, in double precision, of which nothing can be adjusted."""
 
-    block: Primitive
+    block: Block
     serving: Serving
     sample_time: float
     fingerprint: bytes
@@ -41,7 +41,7 @@ class Twin:
         self.open = self.lock_step = self.tripped = False
         self.silence, self.quiet, self.steps = self.most_silence, 0, 0
         self.since = self.dropped = 0
-        self.numbers = [self.block.c_numbers(self.sample_time), np.zeros(self.block.n_states)]
+        self.numbers = [self.block.coefficients(self.sample_time), np.zeros(self.block.n_states)]
         self.started = False
         self.inputs = self.low[: self.n_in].copy()
         self.begun = b""

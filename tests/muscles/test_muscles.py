@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, muscles
-from mckibben.blocks.core.fields import rows
+from mckibben.blocks.fields import rows
 from mckibben.muscles import Sheet
 from mckibben.muscles.library import FOLDER, described, load
 from mckibben.muscles.prior import prior_of

@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from mckibben import GPI, PIEstimator, Recording, registry
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.comparison.kept import Kept
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.papers.keeping import fitted, recorded

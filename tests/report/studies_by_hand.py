@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.hysteresis.rate_dependent_pi import RateDependentPI
 from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.play_type.gpi import GPI
-from mckibben.blocks.play_type.pi import PI
-from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 from mckibben.characterization import characterize
 from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.row import Memory, Row

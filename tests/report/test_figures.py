@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.report import coupling_subjects, printed, subjects

@@ -18,9 +18,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mckibben import registry
-from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.play_type.gpi import GPI
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.outputs import Results
 from mckibben.papers.reproduction import Reproduction
 from mckibben.recording import Recording

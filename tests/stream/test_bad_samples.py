@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelWarning
-from mckibben.blocks.core.running import Stream
 from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.laws.trial import input_limits, wander
+from mckibben.blocks.running import Stream
 from mckibben.registry import load
 
 Array = NDArray[np.float64]

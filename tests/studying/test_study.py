@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, PI, DataError, Recording, study
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
 from mckibben.files import read, write
 from mckibben.rigs import load_rig
 from mckibben.signals import triangle

@@ -10,7 +10,7 @@ from scipy import stats
 from scipy.signal import lfilter
 
 from mckibben import PI, DataError, Recording
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.signals import staircase
 from mckibben.validation.check import check
 from tests.validation.runs import LINE, STEP, TRUE, Array, cycles, noise, recording, run

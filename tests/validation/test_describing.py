@@ -10,8 +10,8 @@ import pytest
 from scipy.signal import lfilter
 
 from mckibben import Recording
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.base import Block
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.laws.examples import examples
 from mckibben.validation.describing import describe
 

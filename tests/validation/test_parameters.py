@@ -11,8 +11,8 @@ from scipy.stats import binom
 
 from mckibben import PI, Recording
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.base import Block
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.validation.parameters import parameters, residuals, sureness
 from tests.validation.runs import noise
 

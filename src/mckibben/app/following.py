@@ -45,7 +45,7 @@ def too_fast(workspace: Workspace, model: str, reference: Recording) -> list[str
 
 def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Let a controller follow a reference on a model or a virtual rig, and keep the recording."""
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
     from mckibben.control import before, control_law, track, tune_pid
     from mckibben.control.roles import wished
     from mckibben.control.suiting import doubts_of_feedback

@@ -9,7 +9,7 @@ from mckibben.errors import MckibbenError, ModelError
 
 if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
     from mckibben.app.workspace import Workspace
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
 
 FORMS = {
     "model": "the model itself, as fitted",
@@ -46,10 +46,10 @@ def inverse_of(block: Block) -> Block:
     ModelError
         If it has none, or is one already.
     """
-    from mckibben.blocks.core.commanding import drives, undoes
     from mckibben.blocks.force.feedforward import compensator
+    from mckibben.blocks.inverse import drives
 
-    if drives(block.outputs[0]) or (undoes(block) and not drives(block.inputs[0])):
+    if drives(block.outputs[0]) or (block.undoing and not drives(block.inputs[0])):
         raise ModelError("it is a compensator already. Remedy: choose the model that it undoes.")
     return compensator(block)
 

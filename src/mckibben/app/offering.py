@@ -9,13 +9,11 @@ from mckibben import registry
 from mckibben.app.desk import Desk
 from mckibben.app.together import obstacle
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.inverses import Kind
-from mckibben.comparison.limits import limits
-from mckibben.comparison.needs import Need, full_name, inverse_kind, inverse_may_lack, needs
-from mckibben.comparison.offered import defaults, objections
+from mckibben.comparison.offered import Need, ability, declared, full_name, needs, objections
 from mckibben.comparison.recognising import DRIVING, FORCE, any_moves
 from mckibben.comparison.splits import held_out
 from mckibben.errors import DataError
+from mckibben.estimators.core.estimator import InverseKind
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording
 
@@ -36,12 +34,12 @@ class Offer:
         Short and full name.
     can : str
         What it represents.
-    caution : str
-        Why it is good only near its training; empty where nothing says so.
-    inverse : {"exact", "solved", "none"}
-        How it is undone.
-    inverse_may_lack : bool
-        Whether it depends on the fit that it can be.
+    usual : bool
+        Whether it is ticked at first.
+    caution : str or None
+        Why it is good only near its training.
+    inverse : {"exact", "exact where stable", "solved", "none"}
+        How it is inverted.
     needs_time : bool
     seconds : float
         About how long it takes to fit and cross-validate it to these recordings.
@@ -50,9 +48,9 @@ class Offer:
     model: str
     title: str
     can: str
-    caution: str
-    inverse: Kind
-    inverse_may_lack: bool
+    usual: bool
+    caution: str | None
+    inverse: InverseKind
     needs_time: bool
     seconds: float
 
@@ -67,22 +65,24 @@ class Offered:
         What the recordings are taken for, in a sentence.
     groups : list of (Need, list of Offer)
         What has a place, by what it is for.
-    start : list of str
-        The models to begin with.
     against : dict of str to str
         The others, by full name, and why not.
     """
 
     recognised: str
     groups: list[tuple[Need, list[Offer]]]
-    start: list[str]
     against: dict[str, str]
+
+    @property
+    def start(self) -> list[str]:
+        """The models that are ticked at first."""
+        return [offer.model for _, found in self.groups for offer in found if offer.usual]
 
 
 def offered(desk: Desk) -> Offered:
     """Return the models that have a place on the channels chosen, by need."""
     if hindered := obstacle(desk):
-        return Offered(hindered, [], [], {})
+        return Offered(hindered, [], {})
     used = desk.workspace.used()
     names, recordings = registry.names("estimators"), list(used.values())
     channels = desk.sides
@@ -100,17 +100,9 @@ def offered(desk: Desk) -> Offered:
         for need in needs()
     ]
     groups = [(need, offers) for need, offers in groups if offers]
-    timeless = any(run.sample_time is None for run in recordings)
-    start = [
-        offer.model
-        for need, found in groups
-        for offer in found
-        if offer.model in need.start and not (timeless and defaults(offer.model).get("n_creep"))
-    ]
     return Offered(
         _recognised(desk, len(names) - len(against)) if recordings else "",
         groups,
-        start,
         {full_name(model): reason for model, reason in against.items()},
     )
 
@@ -123,14 +115,14 @@ def _fitted(train: list[Recording], tested: bool, channels: Channels) -> list[Re
 
 
 def _offer(model: str, work: int) -> Offer:
-    estimator, said = registry.load("estimators", model), limits().get(model, {})
+    estimator = declared(model)
     return Offer(
         model,
         full_name(model),
-        said.get("can", ""),
-        said.get("caution", ""),
-        inverse_kind(model),
-        inverse_may_lack(model),
+        ability(model),
+        estimator.quick,
+        estimator.caution,
+        estimator.inverse_kind,
         estimator.needs_time,
         estimator.effort * work / 10_000 * FOLDS,
     )

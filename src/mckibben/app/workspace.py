@@ -18,7 +18,7 @@ from mckibben.numerals import numeral
 
 if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
     from mckibben.blocks.bands.band import Band
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
     from mckibben.control import Twin
 
 MOST_MODELS = 500
@@ -59,7 +59,7 @@ class Workspace(Changing):
         ModelError
             If it is missing or damaged.
         """
-        from mckibben.blocks.core.saving import load
+        from mckibben.blocks.saving import load
 
         path = self.path(folder, f"{name}.json")
 

@@ -18,8 +18,8 @@ from mckibben.bands.held import BLOCK, Held, memory_of, off_as_a_whole
 from mckibben.bands.scale import SHAPES, Scale, Shape, Terms, scale_of
 from mckibben.blocks.bands.band import Band
 from mckibben.blocks.bands.state_of_motion import look_along
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import rows, vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import rows, vector
 from mckibben.errors import DataError
 from mckibben.numerals import numeral
 from mckibben.system.threads import one_blas_thread

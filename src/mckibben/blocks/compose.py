@@ -6,23 +6,124 @@ series of the inverses.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property, reduce
 from itertools import pairwise
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
+from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Run
-from mckibben.blocks.core.composition import Composition, Parts
-from mckibben.blocks.core.exportable import Board
-from mckibben.blocks.core.fields import STRICT, Channel, Initial
-from mckibben.blocks.core.linear import LinearSystem
+from mckibben.blocks.base import Block, Board, Run, explicit_state
+from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.linear import LinearSystem
+from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 from mckibben.system.compiling import in_turn
+
+DEEPEST, MOST_BLOCKS = 32, 1000
+"""Compositions in compositions, and blocks in all."""
+
+
+def _parts(value: object) -> object:
+    return tuple(nested(part) for part in value) if isinstance(value, tuple | list) else value
+
+
+Parts = Annotated[tuple[InstanceOf[Block], ...], BeforeValidator(_parts)]
+
+
+class Composition(Block):
+    """What all compositions share: states and parameters are those of the parts, one after another."""
+
+    parameters: ClassVar[tuple[str, ...]] = ("parts",)
+    together: ClassVar[Callable[[Iterable[float]], float]] = max  # of dead times side by side
+
+    letter: ClassVar[str] = "P"  # of its parts in equations
+
+    parts: tuple[Block, ...]
+
+    def equations(self) -> tuple[str, ...]:
+        """Return how the parts come together: ``y`` of them all, ``u`` going into each."""
+        marks = [f"{self.letter}_{{{place + 1}}}" for place in range(len(self.parts))]
+        return (self.joined(marks),)
+
+    @abstractmethod
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return in LaTeX what the parts, of these names, make together."""
+
+    @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether any part is."""
+        return any(part.rate_dependent for part in self.parts)
+
+    @property
+    def of_local_rules(self) -> bool:  # type: ignore[override]
+        """Whether any part is."""
+        return any(part.of_local_rules for part in self.parts)
+
+    @property
+    def depth(self) -> int:
+        """How many compositions are in each other, this one included."""
+        return 1 + max(getattr(part, "depth", 0) for part in self.parts)
+
+    @property
+    def n_blocks(self) -> int:
+        """How many blocks it is made of, compositions included."""
+        return 1 + sum(getattr(part, "n_blocks", 1) for part in self.parts)
+
+    def check_parts(self) -> None:
+        """Refuse no parts at all, and more, or more deeply nested ones, than a model is made of."""
+        if not self.parts:
+            raise ModelError(f"{self.kind!r} has no parts. Remedy: give at least one block.")
+        if self.depth > DEEPEST or self.n_blocks > MOST_BLOCKS:
+            raise ModelError(
+                f"{self.kind!r} is nested {self.depth} deep and made of {self.n_blocks} blocks. "
+                f"Remedy: compose at most {MOST_BLOCKS} blocks, at most {DEEPEST} deep."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """The states of all parts."""
+        return sum(part.n_states for part in self.parts)
+
+    @property
+    def n_scratch(self) -> int:
+        """The scratch of all parts."""
+        return sum(part.n_scratch for part in self.parts)
+
+    @property
+    def dead_time(self) -> float:  # type: ignore[override]
+        """That of the parts together."""
+        return type(self).together(part.dead_time for part in self.parts)
+
+    def _states(self, state: Array) -> list[Array]:
+        return np.split(state, np.cumsum([part.n_states for part in self.parts])[:-1])
+
+    def report(self, state: Array) -> None:
+        """Pass on what the parts have to say."""
+        for part, share in zip(self.parts, self._states(state), strict=True):
+            part.report(share)
+
+    def n_clipped(self, state: Array) -> int:
+        """Return those of all parts."""
+        shares = zip(self.parts, self._states(state), strict=True)
+        return sum(part.n_clipped(share) for part, share in shares)
+
+    def _shared_initial(self, initial: Initial | None) -> Sequence[Initial | None]:
+        """Return every part's own share of an explicit initial state, or the rule for all."""
+        if initial is None or isinstance(initial, str):
+            return [initial] * len(self.parts)
+        return [share.tolist() for share in self._states(explicit_state(self, initial))]
+
+    @property
+    def undoing(self) -> bool:  # type: ignore[override]
+        """Whether any part is an inverse: it reaches only what the block undone wants."""
+        return any(part.undoing for part in self.parts)
+
 
 AT_REST = ("first_sample", "fitted")
 """Rules by which a block starts at rest at its first input, where no output is known."""
@@ -174,8 +275,8 @@ class Series(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return a modified Prandtl-Ishlinskii model: a PI model and a saturating curve."""
+        from mckibben.blocks.hysteresis.pi import PI
         from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
-        from mckibben.blocks.play_type.pi import PI
 
         return cls((PI.example(), PiecewiseLinear.example()))
 
@@ -287,8 +388,8 @@ class Parallel(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return the sum of a PI model and a play operator."""
-        from mckibben.blocks.play_type.pi import PI
-        from mckibben.blocks.play_type.play import Play
+        from mckibben.blocks.hysteresis.pi import PI
+        from mckibben.blocks.hysteresis.play import Play
 
         return cls((PI.example(), Play.example()))
 
@@ -374,8 +475,8 @@ class PerChannel(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return two muscles with models of their own."""
-        from mckibben.blocks.play_type.gpi import GPI
-        from mckibben.blocks.play_type.pi import PI
+        from mckibben.blocks.hysteresis.gpi import GPI
+        from mckibben.blocks.hysteresis.pi import PI
 
         pressures = [Channel(f"pressure_{number}", "bar") for number in (1, 2)]
         displacements = [Channel(f"displacement_{number}", "mm") for number in (1, 2)]

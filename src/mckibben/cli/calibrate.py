@@ -53,7 +53,7 @@ def calibrate(
     At a level of 0.9 they hold 90 % of the samples of a new run that is like these, on average.
     simulate model.json FILE --interval 0.9 writes lower and upper ends.
     """
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.saving import load
     from mckibben.comparison.calibrating import calibration
     from mckibben.outputs import claim_model
 

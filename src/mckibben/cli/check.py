@@ -27,7 +27,7 @@ def check(
     input, load, rate or branch (hysteresis that is left), no hold (creep), no time (drift).
     Recordings that the model was not fitted to tell most. A folder stands for all recordings in it.
     """
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.saving import load
     from mckibben.files.sources import expanded
     from mckibben.outputs import Results
     from mckibben.recording import notes_by_file

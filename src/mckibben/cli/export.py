@@ -13,7 +13,7 @@ from mckibben.cli.options import Json
 from mckibben.cli.output import print_json, say
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
     from mckibben.export.c.serving import Serving
 
 app = typer.Typer(
@@ -48,8 +48,8 @@ class Version(StrEnum):
 
 
 def _loaded(model: Path, inverse: bool) -> Block:
-    from mckibben.blocks.core.saving import load
     from mckibben.blocks.force.feedforward import compensator
+    from mckibben.blocks.saving import load
 
     block = load(model)
     return compensator(block) if inverse else block

@@ -23,7 +23,7 @@ from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
     from mckibben.recording import Recording
 
 STARTS_MATTER = 0.05
@@ -72,7 +72,7 @@ def fit(
     channels by name: pressure_1 ..., displacement_1 ..., and pressure_extensor where there is one.
     """
     from mckibben import registry
-    from mckibben.blocks.core.writing import quantities
+    from mckibben.blocks.equations import quantities
     from mckibben.comparison.offered import settings_of
     from mckibben.comparison.shared_rows import check_shared
     from mckibben.outputs import claim_model

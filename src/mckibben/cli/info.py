@@ -77,8 +77,8 @@ def _models(as_json: bool) -> None:
 
 
 def _model(file: Path, as_json: bool) -> None:
-    from mckibben.blocks.core.saving import load
     from mckibben.blocks.force.feedforward import compensator
+    from mckibben.blocks.saving import load
 
     block = load(file)
     try:
@@ -108,7 +108,7 @@ def _untold(
     model: Path | None,
 ) -> tuple[Gap, ...] | str:
     """Return what recordings cannot tell, or, if nothing was asked by name, why that cannot be said."""
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.saving import load
     from mckibben.excitation import untold
 
     try:

@@ -15,7 +15,7 @@ from mckibben.cli.output import print_json, say
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.fields import Channel
+    from mckibben.blocks.fields import Channel
 
 
 class Wanted(StrEnum):
@@ -85,9 +85,9 @@ def invert(
     import numpy as np
 
     from mckibben.blocks.adaptive.adaptive_series import adaptive as learning
-    from mckibben.blocks.core.saving import load
     from mckibben.blocks.coupled.load_estimate import load_of
     from mckibben.blocks.force.feedforward import ForceFeedforward
+    from mckibben.blocks.saving import load
     from mckibben.errors import ModelError
     from mckibben.outputs import claim_model
 

@@ -9,7 +9,7 @@ from mckibben.cli.output import print_json, say
 from mckibben.errors import ModelError
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
 
 
 def write_predictive(

@@ -19,7 +19,6 @@ from mckibben.cli.app import app as workbench
 from mckibben.cli.calibrate import calibrate
 from mckibben.cli.characterize import characterize
 from mckibben.cli.check import check
-from mckibben.cli.check_block import check_block
 from mckibben.cli.compare import compare
 from mckibben.cli.example import example
 from mckibben.cli.export import app as export_app
@@ -61,7 +60,6 @@ for command in (
     *(reproduce, measured, info, link, ros, example),
 ):
     app.command()(command)
-app.command("check-block")(check_block)
 app.command("app")(workbench)
 app.add_typer(export_app)
 app.add_typer(rig_app)

@@ -52,7 +52,7 @@ def show(
 ) -> None:
     """Show a muscle's data sheet, conditions, balance and its uncertainty, as the text of its file."""
     from mckibben import muscles
-    from mckibben.blocks.core.saving import to_dict
+    from mckibben.blocks.saving import to_dict
 
     muscle = muscles.load(name)
     if not as_json:

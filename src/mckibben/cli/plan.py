@@ -65,7 +65,7 @@ def plan(
 
     It starts and ends at rest. Record it, and plan again with all files: that goes for other things.
     """
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.saving import load
     from mckibben.excitation.limits import parsed
     from mckibben.excitation.planning import plan as planned
     from mckibben.files import write

@@ -48,7 +48,7 @@ def plot(
     if model is None:
         plot_recording(recordings, given, moved, kind or "loop", out)
     else:
-        from mckibben.blocks.core.saving import load
+        from mckibben.blocks.saving import load
 
         plot_model(load(model), recordings, kind or "fit", out)
     say(f"Written: {out}")

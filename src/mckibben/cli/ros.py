@@ -57,7 +57,7 @@ def ros(
 
     from mckibben.blocks.adaptive.adaptive import Adaptive
     from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.saving import load
     from mckibben.outputs import claim, claim_model, never
     from mckibben.ros.dds import Topics
     from mckibben.ros.kinds import kind_named

@@ -53,7 +53,7 @@ def simulate(
     from dataclasses import asdict
 
     from mckibben.bands.beyond import beyond_calibrated
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.saving import load
     from mckibben.control.beyond import beyond_known
     from mckibben.files import write
     from mckibben.metrics import score
@@ -166,7 +166,7 @@ def _parted(block: Any, interval: float | None) -> tuple[Any, Any]:
 
 
 def _predicted(block: Any, recording: Any, horizon: int) -> Any:
-    from mckibben.blocks.dynamic.transfer_function import TransferFunction
+    from mckibben.blocks.dynamics.transfer_function import TransferFunction
 
     if not isinstance(block, TransferFunction):
         raise ModelError(

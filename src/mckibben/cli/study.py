@@ -51,7 +51,7 @@ def study(
     are logs of a loop: what error was predicted, what was achieved, and what of it is due to model,
     actuator, delay, noise, drift and limits; and the same kind of model refitted to them (refit.json).
     """
-    from mckibben.blocks.core.saving import load as saved
+    from mckibben.blocks.saving import load as saved
     from mckibben.report.results_folder import study_files
 
     folder = make_folder(out)

@@ -14,7 +14,7 @@ from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
     from mckibben.control.loop import Tracked
     from mckibben.control.roles import Plant
     from mckibben.recording import Recording
@@ -86,9 +86,9 @@ def track(
 
     Beside it stands what no compensation does: pressures read off one slow rise of the same plant.
     """
-    from mckibben.blocks.core.block import Block
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.base import Block
     from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+    from mckibben.blocks.saving import load
     from mckibben.control import (
         UNCOMPENSATED,
         Twin,
@@ -236,7 +236,7 @@ def track(
 
 def _plant(rig: str | None, twin: Path | None, limits: list[str]) -> Plant:
     """Return what the loop is closed on."""
-    from mckibben.blocks.core.saving import load
+    from mckibben.blocks.saving import load
     from mckibben.control import Twin
     from mckibben.excitation.limits import parsed
     from mckibben.rigs import load_rig

@@ -14,7 +14,7 @@ from mckibben.bands.held import Held
 from mckibben.bands.scale import SHAPES
 from mckibben.blocks.bands.band import Band
 from mckibben.blocks.bands.banded import Banded
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import DataError
 from mckibben.numerals import numeral
 

@@ -10,8 +10,8 @@ import numpy as np
 from mckibben.bands.finding import Found, Unit, find_band
 from mckibben.bands.held import Held
 from mckibben.blocks.bands.banded import Banded, inside
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.commanding import commands
+from mckibben.blocks.base import Block
+from mckibben.blocks.inverse import commands
 from mckibben.comparison.free_run import refuse_runaway, run_free
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError, ModelError, ModelWarning

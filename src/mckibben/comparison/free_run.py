@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
-from mckibben.blocks.dynamic.linear_start import LinearStart
-from mckibben.blocks.dynamic.repeating import Repeating
+from mckibben.blocks.dynamics.creep_start import begun_places, begun_state
+from mckibben.blocks.dynamics.linear_start import LinearStart
+from mckibben.blocks.dynamics.repeating import Repeating
 from mckibben.comparison.splits import Mask, predecessor
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.recording import Recording

@@ -23,8 +23,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 import mckibben
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.saving import LARGEST_FILE, from_dict, to_dict
+from mckibben.blocks.base import Block
+from mckibben.blocks.saving import LARGEST_FILE, from_dict, to_dict
 from mckibben.errors import DataWarning, MckibbenError
 from mckibben.presets import Chosen
 from mckibben.recording import PROVENANCE, Recording

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.row import Memory
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording

@@ -3,29 +3,121 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
 from mckibben import registry
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.limits import limits
-from mckibben.comparison.needs import full_name
 from mckibben.errors import ModelError
-from mckibben.estimators.core.estimator import Estimator
+from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
 from mckibben.estimators.core.settings import check_settings, setting_value
 from mckibben.recording import Recording
 
 
+@dataclass(frozen=True)
+class Need:
+    """What some models are for.
+
+    Parameters
+    ----------
+    title : str
+        In a few words.
+    about : str
+        In a sentence.
+    models : tuple of str
+        Short names: those tried first, then the others, each by what a fit costs.
+    """
+
+    title: str
+    about: str
+    models: tuple[str, ...]
+
+
+NEEDS: dict[Purpose | None, tuple[str, str]] = {
+    "memory": (
+        "Memory: loops of one muscle",
+        "From where an input turned, whatever the speed: pressure to displacement.",
+    ),
+    "rate": (
+        "Rate: lags, creep and dynamics",
+        "What a muscle does depends on how fast, and goes on while pressure is held.",
+    ),
+    "several": (
+        "Several muscles, and loads",
+        "Muscles that move one another, or a muscle under a load that varies.",
+    ),
+    "force": (
+        "Force and activation pressure",
+        "Force from pressure and length, or pressure from a desired contraction under a force.",
+    ),
+    None: ("Others", "Models that other packages bring."),
+}
+"""Title and sentence of every purpose, as listed."""
+
+
+def needs() -> tuple[Need, ...]:
+    """Return all models by what they are for."""
+    models = {name: declared(name) for name in registry.names("estimators")}
+    usual = sorted(models, key=lambda name: (not models[name].quick, models[name].effort, name))
+    groups = {
+        purpose: tuple(name for name in usual if models[name].purpose == purpose)
+        for purpose in NEEDS
+    }
+    return tuple(Need(*NEEDS[purpose], names) for purpose, names in groups.items() if names)
+
+
+def declared(model: str) -> type[Estimator]:
+    """Return the estimator on which a model declares itself; the defaults if it cannot be loaded."""
+    try:
+        found: type[Estimator] = registry.load("estimators", model)
+    except ModelError:
+        return Estimator
+    return found
+
+
+def full_name(model: str) -> str:
+    """Return a model's full name, or its short one where no other is known.
+
+    >>> full_name("pi"), full_name("mine")
+    ('Prandtl–Ishlinskii model (PI)', 'mine')
+    """
+    return declared(model).title or model
+
+
+def caution(model: str) -> str | None:
+    """Return why a model is good only near what it was trained on, or None where nothing says so.
+
+    A model that interpolates well may lead every ranking on motions like those of its training, and be
+    far off elsewhere: that is told beside its errors.
+
+    >>> caution("gpi") is None, caution("narx")
+    (True, 'a polynomial of past values leaves all bounds beyond them')
+    """
+    return declared(model).caution
+
+
+def ability(model: str) -> str:
+    """Return what a model represents, in a sentence."""
+    known = declared(model)
+    return known.can or (known.__doc__ or "").strip().partition("\n")[0]
+
+
 def summary(model: str) -> str:
-    """Return a model's full name and what it can represent; of others' models, what they say.
+    """Return a model's full name and what it represents.
 
     >>> summary("arx")
     'ARX model, linear. Linear dynamics, in closed form.'
     """
-    if known := limits().get(model):
-        return f"{full_name(model)}. {known['can']}"
-    said: str = registry.load("estimators", model).__doc__.strip().splitlines()[0]
-    return said
+    return f"{full_name(model)}. {ability(model)}"
+
+
+def default_model(use: DefaultFor) -> str:
+    """Return the model that is used somewhere without being named.
+
+    >>> default_model("load")
+    'mpi'
+    """
+    return next(n for n in registry.names("estimators") if declared(n).default_for == use)
 
 
 def defaults(model: str) -> dict[str, Any]:

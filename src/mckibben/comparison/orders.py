@@ -29,23 +29,6 @@ from mckibben.recording import Recording, listed
 from mckibben.system.progress import Tell, telling
 from mckibben.system.workers import checked
 
-GRIDS: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
-    "arx": {"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
-    "armax": {"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3), "n_noise": (1, 2)},
-    "oe": {"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3)},
-    "bj": {"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3)},
-    "narx": {"output_lags": (1, 2), "input_lags": (1, 2), "n_terms": (8, 16)},
-    "narx-play": {"n_play": (3, 6), "n_terms": (8, 16)},
-    "narx-network": {"output_lags": (1, 2), "n_units": (3, 5)},
-    "pi": {"n_operators": (5, 10, 20)},
-    "gpi": {"n_operators": (5, 10, 15)},
-    "cpi": {"n_operators": (4, 6, 8), "n_creep": (1, 2, 3)},
-    "preisach": {"n_levels": (6, 10, 15)},
-    "kp": {"n_levels": (6, 10, 15)},
-    "balance": {"n_lags": (1, 2, 3), "n_stops": (4, 6, 8), "area": (2, 3)},
-}
-"""Orders tried by default."""
-
 
 @dataclass(frozen=True)
 class Choice:
@@ -106,7 +89,7 @@ def identify(
         combination fails.
     """
     estimator_class = registry.load("estimators", family)
-    grid = orders or GRIDS.get(family)
+    grid = orders or estimator_class.param_grid
     if not grid:
         raise ModelError(
             f"there are no usual orders of {family!r}. Remedy: give orders, for instance "

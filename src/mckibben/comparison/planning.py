@@ -16,7 +16,7 @@ from mckibben.comparison.channels import Channels, Names, channels_of, where_hel
 from mckibben.comparison.constant import constant_of
 from mckibben.comparison.coverage import Coverage, coverage_of
 from mckibben.comparison.kept import Kept, source
-from mckibben.comparison.offered import objections
+from mckibben.comparison.offered import declared, default_model, objections
 from mckibben.comparison.recognising import (
     FORCE,
     OF_FORCE,
@@ -38,17 +38,6 @@ Settings = Mapping[str, Mapping[str, Any]]
 
 N_FOLDS = 4
 """Parts of the cross-validation."""
-
-QUICK = (
-    *("arx", "bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi"),
-    *("balance", "coupled-memory", "coupled-pi", "play-ridge"),
-    *("balance-force", "force-chou", "force-petrovic"),
-)
-"""Models that are good or well known, and fitted in seconds."""
-
-PER_LOAD = "mpi"
-"""Model that stands for those which do not know the load."""
-
 
 BEYOND = 0.1
 """Share of the range in training by which a test may go beyond it unsaid."""
@@ -214,7 +203,9 @@ def plan_of(
     efforts = {model: registry.load("estimators", model).effort for model in chosen}
     given = settings or {}
     some = models not in ("all", "quick")
-    if lost := sorted(set(given) - {*(chosen if some else registry.names("estimators")), PER_LOAD}):
+    per_load = [] if load is None else [default_model("load")]
+    known = {*(chosen if some else registry.names("estimators")), *per_load}
+    if lost := sorted(set(given) - known):
         raise ModelError(
             f"settings are given for {', '.join(lost)}, and no such model is compared. "
             "Remedy: add it to the models, or leave its settings out."
@@ -223,9 +214,10 @@ def plan_of(
         model: Item(model, {"seed": seed} | dict(given.get(model, {})))
         for model in sorted(chosen, key=efforts.__getitem__)
     }
-    if load is not None and not objections([PER_LOAD], every, replace(channels, scheduling=None)):
-        own = {"seed": seed} | dict(given.get(PER_LOAD, {}))
-        items |= _one_for_each_load(split.train, load, own)
+    if load is not None and not objections(per_load, every, replace(channels, scheduling=None)):
+        for model in per_load:
+            own = {"seed": seed} | dict(given.get(model, {}))
+            items |= _one_for_each_load(split.train, load, model, own)
     different = (*_untold(every, channels), *_unlike(every, channels))
     return Plan(
         data=Data(split, parts, channels, tuple(checks)),
@@ -289,15 +281,15 @@ def _checked(
 
 
 def _one_for_each_load(
-    train: Sequence[Recording], load: str, settings: Mapping[str, Any]
+    train: Sequence[Recording], load: str, model: str, settings: Mapping[str, Any]
 ) -> dict[str, Item]:
-    """Return models that do not know the load, each fitted to one recording alone."""
+    """Return what a model that is not given the load is, fitted to each recording alone."""
     items: dict[str, Item] = {}
     for place, run in enumerate(train):
-        name = f"{PER_LOAD} at {run[load].mean():.3g} {run.units[load]} ({run.name})"
+        name = f"{model} at {run[load].mean():.3g} {run.units[load]} ({run.name})"
         if name in items:
             name += f", {place + 1}"
-        items[name] = Item(PER_LOAD, settings, place)
+        items[name] = Item(model, settings, place)
     return items
 
 
@@ -382,6 +374,7 @@ def _chosen(
                 f"models cannot be {models!r:.60}. Remedy: give 'all', 'quick', or a list of names."
             )
         return tuple(dict.fromkeys(name.strip() for name in named)), {}
-    names = registry.names("estimators") if models == "all" else QUICK
+    every = registry.names("estimators")
+    names = every if models == "all" else [name for name in every if declared(name).quick]
     left_out = objections(names, recordings, channels)
     return tuple(name for name in names if name not in left_out), left_out

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
-from mckibben.comparison.limits import caution
+from mckibben.comparison.offered import caution
 from mckibben.numerals import numeral
 
 NONE = "No model is recommended: "
@@ -109,7 +109,7 @@ def recommended(
                     if told
                     else "As far as these models can tell from so much data, the output does not depend "
                     "on the input; where it does, it may be by lags or dynamics that they lack, and "
-                    "models of rate have (oe, narx, bouc-wen-oscillator)"
+                    "models of rate have"
                 )
             )
         )

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
+from mckibben.blocks.inverse import Inverse
 from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.drift import Drift
-from mckibben.comparison.inverses import inverse_of
-from mckibben.comparison.limits import caution
+from mckibben.comparison.offered import caution
 from mckibben.comparison.recommending import CONSTANT, order
 from mckibben.comparison.starts import Start
 from mckibben.errors import MckibbenError
@@ -218,6 +218,27 @@ class Row:
             "inverse": inverse_of(self.inverse),
             "caution": self.caution,
         }
+
+
+def inverse_of(inverse: Block | None) -> Literal["exact", "solved", "none"]:
+    """Return how an inverse is found: by a formula, by solving in every step, or not at all.
+
+    Parameters
+    ----------
+    inverse : Block or None
+        Of a model; None where it has none.
+    """
+    if inverse is None:
+        return "none"
+    return "solved" if _solves(inverse) else "exact"
+
+
+def _solves(block: Block) -> bool:
+    if isinstance(block, Inverse):
+        return block.forward.solved
+    parts = [getattr(block, name, None) for name in block.parameters]
+    nested = [part for some in parts for part in (some if isinstance(some, tuple) else (some,))]
+    return any(_solves(part) for part in nested if isinstance(part, Block))
 
 
 def _finite(value: float | None) -> float | None:

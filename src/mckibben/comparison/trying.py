@@ -13,7 +13,7 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.bands.held import Held
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.cluster import outcomes_outside, outer_backend, processes_outside
 from mckibben.comparison.free_run import run_free

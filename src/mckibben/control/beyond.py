@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.commanding import undoes
-from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.core.running import run_many
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance_in import Placed, balance_in
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.running import run_many
 from mckibben.control.identified import known_ranges
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
@@ -29,7 +28,7 @@ def beyond_known(model: Block, recording: Recording) -> list[str]:
     placed = balance_in(model)
     if placed is not None:
         asked = _of_balance(placed, model, recording)
-    elif undoes(model):
+    elif model.undoing:
         asked = []
     else:
         known = known_ranges(model)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.running import Stream
+from mckibben.blocks.base import Block
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.running import Stream
 from mckibben.control.preview import dead_time_undone
 
 

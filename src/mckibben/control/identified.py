@@ -7,8 +7,8 @@ from contextlib import suppress
 import numpy as np
 
 from mckibben.blocks.bands.banded import Banded, inside
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
 from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.errors import ModelError
 

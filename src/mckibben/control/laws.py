@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from mckibben import registry
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control.controller import Controller

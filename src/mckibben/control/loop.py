@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 
@@ -25,7 +25,7 @@ def dead_time_undone(compensator: Block) -> float:
 
     Examples
     --------
-    >>> from mckibben.blocks.dynamic.air import Air
+    >>> from mckibben.blocks.dynamics.air import Air
     >>> dead_time_undone(Air.example().inverse())
     0.02
     """

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 
 ROUNDING = 1e-9
 """Share of what is reached by which a reference touches its end."""

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.commanding import COMMANDS
+from mckibben.blocks.base import Block
+from mckibben.blocks.inverse import COMMANDS
 from mckibben.control.twin import Twin, plain
 from mckibben.errors import DataError
 from mckibben.recording import Recording

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 
 from mckibben.blocks.bands.banded import inside
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.control.identified import known_ranges
 from mckibben.control.roles import Plant
 from mckibben.control.twin import Twin, plain

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.control.loop import Tracked, track
 from mckibben.control.roles import Plant, wished
 from mckibben.control.suiting import doubts

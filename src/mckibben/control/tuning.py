@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.commanding import COMMANDS
-from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.inverse import COMMANDS
 from mckibben.control.roles import MOVED, Plant, actuated, resting
 from mckibben.control.twin import Twin
 from mckibben.errors import ModelError

@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike
 from mckibben.arrays import Array
 from mckibben.blocks.bands.band import Band
 from mckibben.blocks.bands.banded import Banded, inside
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.commanding import commands, drives
-from mckibben.blocks.core.running import Stream
+from mckibben.blocks.base import Block
+from mckibben.blocks.inverse import commands, drives
+from mckibben.blocks.running import Stream
 from mckibben.control.identified import known_ranges
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording

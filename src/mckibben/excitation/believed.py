@@ -12,7 +12,8 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.bands.banded import inside
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
+from mckibben.comparison.offered import default_model
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError, ModelError
 from mckibben.excitation.candidates import random_plan
@@ -50,9 +51,6 @@ STEP = 1e-5
 
 NOTHING = 1e-10
 """Size of a parameter, over the largest, below which it is zero."""
-
-MODELS = {"displacement": "balance", "force": "multistate"}
-"""Model that is fitted, by what is measured."""
 
 
 @dataclass(frozen=True)
@@ -246,8 +244,8 @@ def _fitted(
     """Return a model fitted to recordings, of the rig's inputs if there is one."""
     several = {name for recording in recordings for name in recording.channels}
     moves = any(name.startswith("displacement") for name in several)
-    name = str(model or MODELS["displacement" if moves else "force"])
-    estimator = registry.load("estimators", name)(seed=seed)
+    usual = default_model("plan of displacement" if moves else "plan of force")
+    estimator = registry.load("estimators", str(model or usual))(seed=seed)
     if rig is not None and rig.inputs[0] == "voltage":
         told = estimator.input
         estimator.input = "voltage" if isinstance(told, str) else ("voltage",)

@@ -13,8 +13,9 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST
+from mckibben.blocks.base import Block
+from mckibben.blocks.jacobian import Complex, Tangents
+from mckibben.estimators.core.uncertainty import LARGEST
 from mckibben.excitation.unmodelled import Unmodelled
 
 ROUNDING = 1e-10
@@ -31,40 +32,24 @@ class Slopes:
         Of the parameters that are not fixed.
     step : float
         Sample time [s].
-    length : int
-        Samples of a stretch.
     """
 
-    def __init__(self, block: Block, places: Sequence[int], step: float, length: int) -> None:
-        values = block.pack()
-        blocks = [block]
-        for place in places:
-            moved = values.copy()
-            moved[place] += DIFFERENCE * values[place]
-            blocks.append(block.unpack(moved))
-        self._blocks = blocks
-        self._inputs = np.empty((length, len(block.inputs)))
-        self._outputs = np.empty((len(blocks), length, len(block.outputs)))
-        self._states = np.empty((len(blocks), block.n_states))
-        self._runs = [
-            one.bind(step, self._states[i], self._inputs, self._outputs[i])
-            for i, one in enumerate(blocks)
-        ]
+    def __init__(self, block: Block, places: Sequence[int], step: float) -> None:
+        self._tangents = Tangents(block, step, places)
+        self._sizes = block.pack()[places]
 
-    def start(self, first: Array) -> Array:
-        """Return the states before a first input, shape (parameters + 1, n_states)."""
-        return np.array([block.initial_state(first) for block in self._blocks])
+    def start(self, first: Array) -> Complex:
+        """Return the states before a first input, shape (parameters, n_states)."""
+        return self._tangents.start(first)
 
-    def over(self, inputs: Array, states: Array) -> tuple[Array, Array, Array]:
+    def over(self, inputs: Array, states: Complex) -> tuple[Array, Array, Complex]:
         """Return outputs (n, m) over a stretch, their slopes (n, m, parameters), and states after."""
-        self._inputs[:], self._states[:] = inputs, states
-        for run in self._runs:  # too short for threads to be worth their while
-            run()
-        base = self._outputs[0].copy()
+        after = states.copy()
+        outputs, slopes = self._tangents.over(inputs, after)
         with np.errstate(invalid="ignore", over="ignore"):
-            slopes = (self._outputs[1:] - base) / DIFFERENCE
+            slopes *= self._sizes
         slopes[~(np.abs(slopes) < LARGEST)] = 0.0
-        return base, np.moveaxis(slopes, 0, 2), self._states.copy()
+        return outputs, slopes, after
 
 
 @dataclass(frozen=True)
@@ -119,7 +104,7 @@ class Place:
     """Where motion has come to: the last command, states of all members, memory of the unmodelled."""
 
     command: Array
-    states: tuple[Array, ...]
+    states: tuple[Complex, ...]
     memory: Array
 
 
@@ -165,7 +150,7 @@ class Criterion:
         inputs = np.ascontiguousarray(commands[:, self.columns])
         sure = np.sqrt(self.step / self.noise.density)
         told: list[Array] = []
-        states: list[Array] = []
+        states: list[Complex] = []
         for member, before in zip(self.members, place.states, strict=False):
             _, slopes, after = member.over(inputs, before)
             if not told:

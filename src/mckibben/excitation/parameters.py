@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.running import run_many
-from mckibben.blocks.core.writing import quantities
+from mckibben.blocks.base import Block
+from mckibben.blocks.equations import quantities
+from mckibben.blocks.running import run_many
 from mckibben.errors import MckibbenError
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import TrainingData

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import DataError, ModelError
 from mckibben.excitation.believed import from_muscle, from_recordings, from_rig
 from mckibben.excitation.limits import Limits, beyond, limits_of_rig, narrowed, within_hardware

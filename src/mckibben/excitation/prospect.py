@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.writing import quantities
+from mckibben.blocks.base import Block
+from mckibben.blocks.equations import quantities
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.balance_prior import noise_of
 from mckibben.estimators.coupled.balance_starts import LARGER, opening
@@ -126,14 +126,12 @@ def prospect_of(
     reference = _reference(limits, length, step, rng)
     spans = _spans(block, reference, rest, columns, step)
     noise, recorded, pulls = _recorded(belief, places, limits, columns, unmodelled, spans)
-    first = Criterion(
-        (Slopes(block, places, step, length),), unmodelled, noise, step, spans, columns
-    )
+    first = Criterion((Slopes(block, places, step),), unmodelled, noise, step, spans, columns)
     first = first.weighed_by(reference, first.start(rest))
     told = recorded + belief.known_before(places)
     precision = told + _wide(first.weights[0])
     blocks = _likely(block, places, precision, reference, rest, columns, step, spans, rng)
-    members = tuple(Slopes(one, places, step, length) for one in blocks)
+    members = tuple(Slopes(one, places, step) for one in blocks)
     motion = replace(first, members=members)
     motion = motion.weighed_by(reference, motion.start(rest))
     known = Known(tuple(told + _wide(weight) for weight in motion.weights), pulls)
@@ -235,7 +233,7 @@ def _recorded(
             ]
         )[::every]
         inputs = np.ascontiguousarray(commands[:, columns])
-        slopes = Slopes(block, places, step, len(inputs))
+        slopes = Slopes(block, places, step)
         base, by, _ = slopes.over(inputs, slopes.start(inputs[0]))
         measured = recording.matrix(channel.name for channel in block.outputs)[::every]
         features, _ = unmodelled.features(commands, unmodelled.start(commands[0]), step)

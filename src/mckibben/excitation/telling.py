@@ -25,7 +25,7 @@ from mckibben.recording import Recording, listed
 from mckibben.system.threads import one_blas_thread
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.base import Block
     from mckibben.comparison.channels import Names
 
 FEWEST = 10

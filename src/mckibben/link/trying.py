@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.export.c.building import compile_c
 from mckibben.export.c.emulation import EMULATOR, built, refuse_without_tools
 from mckibben.export.c.project import c_files

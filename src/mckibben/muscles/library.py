@@ -13,8 +13,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.saving import from_dict, to_dict
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.saving import from_dict, to_dict
 from mckibben.errors import DataError, ModelError
 from mckibben.muscles.sheet import Sheet, refused
 from mckibben.muscles.traits import GROUPS, PLACES, traits

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mckibben.blocks.core.fields import rows, vector
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.fields import rows, vector
 from mckibben.muscles.sheet import Sheet
 
 

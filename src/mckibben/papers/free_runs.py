@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import ModelWarning
 from mckibben.recording import Recording
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.kept import Kept
 from mckibben.errors import MckibbenError
 from mckibben.estimators.optimisers.tracker import whole_searches

@@ -11,7 +11,7 @@ from mckibben.report import interactive
 from mckibben.report.drawing import N_AGES, Curve, Drawing, Panel, axis_label
 
 if TYPE_CHECKING:
-    from mckibben.blocks.core.fields import Channel
+    from mckibben.blocks.fields import Channel
     from mckibben.validation.describing import ModelDescription
     from mckibben.validation.responses import DescribingFunction, FrequencyResponse
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.play_type.eupi import EUPI
-from mckibben.blocks.play_type.gpi import GPI
-from mckibben.blocks.play_type.pi import PI
-from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
+from mckibben.blocks.base import Block
+from mckibben.blocks.equations import channel_units, unit_of
+from mckibben.blocks.hysteresis.eupi import EUPI
+from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.hysteresis.rate_dependent_pi import RateDependentPI
 from mckibben.errors import ModelError
 from mckibben.report.drawing import (
     N_COLOURS,
@@ -80,9 +81,8 @@ def weights(blocks: Mapping[str, Block]) -> Drawing:
     panels = []
     for place, (model, block) in enumerate(blocks.items()):
         for part in operator_sums(block):
-            unit = part.inputs[0].unit
-            threshold = "threshold on the envelopes" if part.kind == "gpi" else "threshold"
-            x_label = axis_label(threshold, "" if part.kind == "gpi" else unit)
+            unit = unit_of(part, "thresholds", (0,), channel_units(part)) or ""
+            x_label = axis_label("threshold", unit)
             r = np.array(part.thresholds)
             w = np.array(part.weights)
             title = model if part is block else f"{model}: {part.kind}"

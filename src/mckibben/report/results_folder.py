@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mckibben.blocks.core.saving import to_text
+from mckibben.blocks.saving import to_text
 from mckibben.outputs import Results
 from mckibben.report.commands import Typed
 from mckibben.report.page import page

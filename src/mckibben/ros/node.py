@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
 from mckibben.errors import DataError, ModelError
 from mckibben.ros.kinds import KINDS, Kind
 from mckibben.ros.messages import good, message, numbers, serialized

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.saving import to_text
+from mckibben.blocks.base import Block
+from mckibben.blocks.saving import to_text
 from mckibben.errors import DataError, ModelError
 from mckibben.simulators.compiled import CompiledMuscle, callback, install
 from mckibben.simulators.installed import mujoco

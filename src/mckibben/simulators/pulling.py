@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.composition import Composition
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Composition
 from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.blocks.coupled.load_estimate import LoadEstimate, load_of
 from mckibben.errors import ModelError

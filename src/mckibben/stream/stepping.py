@@ -7,8 +7,8 @@ from collections.abc import Callable
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.running import Stream
+from mckibben.blocks.base import Block
+from mckibben.blocks.running import Stream
 from mckibben.stream.fixed_rate import Deadlines, FixedRate
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.splits import Split
 from mckibben.errors import DataError
 from mckibben.validation.check import check_runs

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.recommending import acceptable
 from mckibben.comparison.results import Leaderboard

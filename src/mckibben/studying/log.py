@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands.banded import inside
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import MEASURED
 from mckibben.blocks.predictive.predictive import Predictive

@@ -12,33 +12,18 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.bands.held import memory_of
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.inverse import Inverse
 from mckibben.comparison.bootstrap import BlockBootstrap, interval
 from mckibben.comparison.free_run import run_free
+from mckibben.comparison.offered import declared
 from mckibben.comparison.splits import Fold, folds
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.recording import Recording
 
 N_FOLDS = 4
 """Parts of a log held back in turn."""
-
-ESTIMATORS = {
-    "pi": "pi",
-    "gpi": "gpi",
-    "pi polynomial": "mpi",
-    "rate-dependent-pi polynomial": "rdpi",
-    "eupi": "eupi",
-    "bouc-wen": "bouc-wen",
-    "generalized-bouc-wen": "gbw",
-    "duhem": "duhem",
-    "logarithm pi polynomial creep": "cpi",
-    "balance": "balance",
-    "contact inverse": "balance",
-    "inverse": "balance",
-    "coupled-memory": "coupled-memory",
-}
-"""Kinds of a model's parts -> what fits it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +91,10 @@ def refitted(
     older : sequence of Recording
         What is fitted beside; those without its channels are left out.
     """
-    name = ESTIMATORS.get(" ".join(_kinds(old)))
-    if name is None:
+    kinds = " ".join(_kinds(old))
+    known = map(declared, registry.names("estimators"))
+    estimator = next((one for one in known if kinds in one.makes), None)
+    if estimator is None:
         return f"No way is known to fit a model of kind {old.kind!r} again."
     inputs = [channel.name for channel in old.inputs]
     outputs = [channel.name for channel in old.outputs]
@@ -123,7 +110,7 @@ def refitted(
     def fitted(recordings: Sequence[Recording], rows: Sequence[Array]) -> Block:
         every = [*recordings, *beside]
         masks = [*rows, *(np.ones(len(one), dtype=bool) for one in beside)]
-        found: Block = _estimator(name, old, driving, outputs, seed).fit(every, rows=masks).model_
+        found: Block = _as(old, estimator, driving, outputs, seed).fit(every, rows=masks).model_
         return found
 
     try:
@@ -179,14 +166,11 @@ def _kinds(block: Block) -> list[str]:
     """Return the kinds of a model's parts in their order."""
     if isinstance(block, Series):
         return [kind for part in block.parts for kind in _kinds(part)]
-    return [block.kind]
+    return [f"{block.forward.kind}-inverse" if isinstance(block, Inverse) else block.kind]
 
 
-def _estimator(
-    name: str, old: Block, inputs: Sequence[str], outputs: Sequence[str], seed: int
-) -> Any:
-    """Return what fits a model with as many operators as the old one."""
-    made = registry.load("estimators", name)
+def _as(old: Block, made: Any, inputs: Sequence[str], outputs: Sequence[str], seed: int) -> Any:
+    """Return an estimator of models with as many operators as the old one."""
     settings = {"seed": seed} | made.channel_settings(inputs, outputs, old.scheduling)
     known = {one.name for one in fields(made)}
     for part in old.parts if isinstance(old, Series) else (old,):

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.recording import Recording, listed
 from mckibben.studying import review_words

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.characterization import Characterization, characterize
 from mckibben.comparison.channels import Names
 from mckibben.comparison.planning import Settings, plan_of

@@ -8,7 +8,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands.banded import inside
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.recording import Recording, listed
 from mckibben.signals.reversals import noise_level, reversals
 from mckibben.system.progress import Tell, one_by_one, telling

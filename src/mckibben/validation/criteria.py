@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.recording import Recording
 from mckibben.validation.k_step import linear, predicted
 from mckibben.validation.parameters import fixed

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.commanding import commands
-from mckibben.blocks.core.notation import Written
-from mckibben.blocks.core.writing import written
+from mckibben.blocks.base import Block
+from mckibben.blocks.equations import written
+from mckibben.blocks.inverse import commands
+from mckibben.blocks.notation import Written
 from mckibben.errors import DataError, ModelWarning
 from mckibben.recording import Recording
 from mckibben.validation.criteria import Criteria, criteria

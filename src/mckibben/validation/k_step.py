@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.memoryless.negative import Negative
 from mckibben.recording import Recording
 from mckibben.validation.residuals import Run

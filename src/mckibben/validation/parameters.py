@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.writing import quantities
+from mckibben.blocks.base import Block
+from mckibben.blocks.equations import quantities
 from mckibben.errors import ModelError
 from mckibben.estimators.core.uncertainty import (
     DIFFERENCE,

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
 from mckibben.errors import ModelError
 from mckibben.estimators.core.uncertainty import DIFFERENCE, relative_sizes
 from mckibben.recording import Recording

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.base import Block
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.signals.reversals import reversals
 from mckibben.validation.residuals import Run
 

@@ -13,10 +13,11 @@ from mckibben.app.fields import said
 from mckibben.app.offering import Offer, Offered, offered
 from mckibben.app.pages import apart
 from mckibben.app.pages.settings import ask
-from mckibben.comparison.needs import Need
+from mckibben.comparison.offered import Need
 
 INVERSES = {
     "exact": "exact inverse",
+    "exact where stable": "exact inverse, where that is stable",
     "solved": "inverse by solving",
     "none": "no inverse",
 }
@@ -58,7 +59,7 @@ class Choice:
         names = [offer.model for _, offers in found.groups for offer in offers]
         chosen = self.desk.workspace.ticked
         kept = [model for model in chosen or () if model in names]
-        self.shown, self.ticked = found, kept if kept or chosen == [] else list(found.start)
+        self.shown, self.ticked = found, kept if kept or chosen == [] else found.start
         self.said.set_text(said(found.recognised))
         self.possible = bool(found.groups)
         self.actions.set_visibility(True)
@@ -83,7 +84,7 @@ class Choice:
 
     def _group(self, need: Need, offers: list[Offer]) -> None:
         """Show the usual models, and those that are ticked; the others are one click away."""
-        first = [one for one in offers if one.model in (*need.start, *self.ticked)]
+        first = [one for one in offers if one.usual or one.model in self.ticked]
         ticked = any(one.model in self.ticked for one in offers)
         head = ui.expansion(need.title, value=ticked).classes("w-full min-w-0").props("dense")
         word = re.split(r"\W", need.title)[0].lower()
@@ -143,8 +144,7 @@ class Choice:
 
 
 def _about(offer: Offer) -> str:
-    words = [f"{INVERSES[offer.inverse]}{', where that is stable' * offer.inverse_may_lack}"]
-    words.append(_time(offer.seconds))
+    words = [INVERSES[offer.inverse], _time(offer.seconds)]
     if offer.needs_time:
         words.append("needs time")
     if offer.caution:

@@ -17,8 +17,8 @@ from mckibben.app.jobs import ENDED
 from mckibben.app.pages import closing, forces, leaderboard, logs, loops
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.app.recorded import at_rest, held_for, pace, reached
-from mckibben.blocks.core.commanding import COMMANDS
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.inverse import COMMANDS
 from mckibben.comparison.recognising import FORCE
 from mckibben.errors import MckibbenError
 from mckibben.files import read
@@ -64,9 +64,7 @@ def _none_yet(desk: Desk) -> str:
     if jobs:
         under_way = ", ".join(job.title for job in jobs)
         return f"Nothing that can be inverted is fitted yet. Under way: {under_way}."
-    several = len(desk.inputs) > 1
-    kinds = "balance, coupled-pi, sdchm" if several else "pi, gpi, mpi, cpi, preisach, balance"
-    return f"Fit a model that can be inverted first, under Models: {kinds}."
+    return "Fit a model that can be inverted first, under Models."
 
 
 def _reach(desk: Desk, model: str) -> dict[str, tuple[float, float]]:

@@ -15,7 +15,7 @@ from mckibben.app.dropping import drop_zone
 from mckibben.app.motions import Points
 from mckibben.app.pages.axes import HEIGHT, WIDTH, Axes
 from mckibben.app.reading import read_upload
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 

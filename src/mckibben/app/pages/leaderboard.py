@@ -29,12 +29,12 @@ from mckibben.app.pages.judging import (
     unvalidated,
 )
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.writing import quantities
-from mckibben.comparison import limits
+from mckibben.blocks.base import Block
+from mckibben.blocks.equations import quantities
 from mckibben.comparison.columns import Column, columns_of
 from mckibben.comparison.free_run import run_free
-from mckibben.comparison.needs import full_name
+from mckibben.comparison.offered import caution as model_caution
+from mckibben.comparison.offered import full_name
 from mckibben.comparison.results import CHOICES
 from mckibben.comparison.splits import Mask, Split, tested_from
 from mckibben.errors import MckibbenError, ModelError
@@ -107,7 +107,7 @@ def build(desk: Desk) -> None:
         _of_other_data(results)
         table = _table(results, desk.outputs)
         heading, by = CHOICES[results[0]["chosen_by"]]
-        careful = CAREFUL if any(limits.caution(result["model"]) for result in results) else ""
+        careful = CAREFUL if any(model_caution(result["model"]) for result in results) else ""
         if none := unvalidated(results):
             heading, by = CHOICES["fit"]
         about = none + ABOUT.format(heading=heading, by=by, careful=careful)
@@ -216,7 +216,7 @@ def _row(result: dict[str, Any], columns: Sequence[Column]) -> dict[str, Any]:
     shown |= {f"{column.key}_by": column.sorted_by(result) for column in columns}
     full = full_name(result["model"])
     title = result["name"] if full == result["name"] else f"{result['name']}: {full}"
-    title += "*" * bool(limits.caution(result["model"])) + of_other_data(result)
+    title += "*" * bool(model_caution(result["model"])) + of_other_data(result)
     title += " (not recommended)" * bool(result["not_recommended"])
     return {"name": result["name"], "title": title, "title_by": title} | shown
 

@@ -9,8 +9,7 @@ from nicegui import ui
 
 from mckibben import registry
 from mckibben.app.desk import labelled, named, tell
-from mckibben.comparison.needs import full_name
-from mckibben.comparison.offered import settings_of
+from mckibben.comparison.offered import full_name, settings_of
 from mckibben.errors import ModelError
 from mckibben.estimators.core.settings import Setting, settings_with_defaults
 

@@ -14,7 +14,7 @@ from mckibben.app import forms
 from mckibben.app.desk import Desk, caution, guarded, named, on_event
 from mckibben.app.recorded import pace
 from mckibben.app.workspace import Workspace
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.system.atomic import replacing
 from mckibben.system.ordinary import read_bytes
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.learning import SENSES
-from mckibben.blocks.core.block import Block, Kernel, Start
-from mckibben.blocks.core.inverse import Invertible
+from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.inverse import Invertible
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,8 @@ exactly what was asked for, what it predicts is known from the inverse's own mem
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt
@@ -32,17 +31,14 @@ from mckibben.blocks.adaptive.learning import (
     covariance_of,
     start_root,
 )
+from mckibben.blocks.base import Block, Cost, Kernel, Start, explicit_state, needs_sample_time
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block, Run, fill
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector, vector
-from mckibben.blocks.core.inverse import Inverse
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
-from mckibben.blocks.core.saving import nested
 from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.fields import STRICT, Channel, Initial, Vector, vector
+from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
-from mckibben.system.compiling import bound
 
 TRUSTED = 1 / 3
 """Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
@@ -257,10 +253,7 @@ class Adaptive(Block):
             own = self.fixed.initial_state(asked, self.forward.start)
             return np.concatenate([own, np.zeros(learner.n_more_states), learnt])
         if isinstance(start, str):
-            state = np.zeros(self.n_states)
-            kernel = learner.adaptive_start_kernel
-            fill(kernel, self.c_numbers(1.0), state, self.n_scratch, first, start)
-            return state
+            return super().initial_state(first, start)
         state = self.initial_state(first, "first_sample")
         state[: self.fixed.n_states] = self.fixed.initial_state(asked, start)
         return state
@@ -279,17 +272,17 @@ class Adaptive(Block):
         step = needs_sample_time(self.kind, sample_time)
         return np.array([min(step / self.time, 0.5), self.noise, 1.0 / len(self.measured)])
 
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that learns and inverts in place."""
-        numbers, scratch = self.c_numbers(sample_time), np.zeros(self.n_scratch)
-        return bound(self.learner.adaptive_kernel.batch, numbers, state, scratch, inputs, outputs)
+    @property
+    def kernel(self) -> Kernel:  # type: ignore[override]
+        """That of the family that learns."""
+        return self.learner.adaptive_kernel
 
     @property
-    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
-        """Those of the family that learns."""
-        return self.learner.adaptive_kernel, self.learner.adaptive_start_kernel
+    def start_kernel(self) -> Start:  # type: ignore[override]
+        """That of the family that learns."""
+        return self.learner.adaptive_start_kernel
 
-    def c_numbers(self, sample_time: float | None) -> Array:
+    def coefficients(self, sample_time: float | None) -> Array:
         """Return [number of parameters, settings, scales, widest, theta, root], then the family's."""
         learner = self.learner
         return np.concatenate(
@@ -359,7 +352,7 @@ class Adaptive(Block):
 
     @classmethod
     def example(cls) -> Self:
-        from mckibben.blocks.play_type.pi import PI
+        from mckibben.blocks.hysteresis.pi import PI
 
         return cls(PI.example(), 60.0, 0.05)
 

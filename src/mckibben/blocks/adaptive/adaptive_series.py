@@ -20,14 +20,12 @@ from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable
 from mckibben.blocks.adaptive.adaptive import Adaptive, check_settings, learner_of, told_width
 from mckibben.blocks.adaptive.drift import Drift
-from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block, Run
-from mckibben.blocks.core.composition import Composition
-from mckibben.blocks.core.exportable import Board
-from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector
-from mckibben.blocks.core.inverse import Inverse
-from mckibben.blocks.core.saving import nested
+from mckibben.blocks.base import Block, Board, Run
+from mckibben.blocks.compose import Composition, Series
 from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.inverse import Inverse
+from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 

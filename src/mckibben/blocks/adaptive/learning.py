@@ -32,7 +32,7 @@ import math
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.kernels import kernel
 
 SENSES = 12
 """How many numbers are remembered of a sensor: whether it was read, usual error, surprise, last

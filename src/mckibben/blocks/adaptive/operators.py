@@ -18,9 +18,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable, Group, relative_spread
 from mckibben.blocks.adaptive.learning import GATE, USUAL, family_at, learn, trusted
-from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.core.single_channel import Ranged
-from mckibben.blocks.play_type.memory import follow
+from mckibben.blocks.hysteresis.play_operators import follow
+from mckibben.blocks.kernels import kernel
 
 LEAST = 0.1
 """Share of a fitted partial sum of weights that is left, whatever is measured."""
@@ -124,7 +123,7 @@ def take_over(aim: Array, used: Array, s: Array, y: float, travel: float, band: 
         used[i] = aim[i] if share == 1.0 else used[i] + share * (aim[i] - used[i])
 
 
-class LearntOperators(Ranged, Adaptable):
+class LearntOperators(Adaptable):
     """A weighted sum of play operators whose weights, and an offset, are learnt."""
 
     groups: ClassVar[tuple[Group, ...]] = (
@@ -141,7 +140,7 @@ class LearntOperators(Ranged, Adaptable):
     @property
     def learnt_limits(self) -> tuple[float, float]:
         """Lowest and highest input of the operators."""
-        return self.limits
+        return self.input_limits
 
     @property
     def taught(self) -> Array:

@@ -18,11 +18,10 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands.state_of_motion import look
-from mckibben.blocks.core.block import Kernel, Primitive, Start
-from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, Vector
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import needs_sample_time
+from mckibben.blocks.base import Block, Kernel, Start, needs_sample_time
+from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 from mckibben.numerals import numeral
 
@@ -104,7 +103,7 @@ def band_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -
 
 
 @dataclass(frozen=True, config=STRICT)
-class Band(Primitive):
+class Band(Block):
     """From a model's inputs and outputs to its outputs with their lower and upper ends.
 
     Parameters

@@ -12,12 +12,10 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands.band import Band
-from mckibben.blocks.core.block import Block, Run
-from mckibben.blocks.core.exportable import Board
-from mckibben.blocks.core.fields import STRICT, Channel, Initial
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state
-from mckibben.blocks.core.saving import nested
+from mckibben.blocks.base import Block, Board, Run, explicit_state
+from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.registry import load

@@ -9,7 +9,7 @@ gives its level. All is known at the sample itself, so that a stream knows it, t
 from __future__ import annotations
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.kernels import kernel
 
 
 @kernel

@@ -26,20 +26,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import (
-    STRICT,
-    Channel,
-    Channels,
-    Rows,
-    Vector,
-)
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.linear_system import newton_cost
-from mckibben.blocks.core.many_channels import ManyChannels
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import needs_sample_time
+from mckibben.blocks.base import SEVERAL, Cost, Kernel, Ports, Start, needs_sample_time
 from mckibben.blocks.coupled.balance_adapting import balance_adaptive_start, balance_adaptive_step
 from mckibben.blocks.coupled.balance_equations import balance_of_forces
 from mckibben.blocks.coupled.balance_fields import check_fields, number_name, tell_clipped
@@ -54,6 +41,10 @@ from mckibben.blocks.coupled.balance_law import (
 )
 from mckibben.blocks.coupled.balance_learning import LearntBalance
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
+from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import newton_cost
 
 
 @step
@@ -104,7 +95,7 @@ def balance_inverse_start(
 
 
 @dataclass(frozen=True, config=STRICT)
-class Balance(ManyChannels, LearntBalance):
+class Balance(LearntBalance):
     """From displacements of n muscles, and what schedules and loads them, to their pressures.
 
     Forces are in N, or, of a model that knows no force, in bar on muscle 1's area at rest.
@@ -165,6 +156,7 @@ class Balance(ManyChannels, LearntBalance):
     """
 
     kind: ClassVar[str] = "balance"
+    ports: ClassVar[Ports] = SEVERAL
     kernel: ClassVar[Kernel] = balance_step
     start_kernel: ClassVar[Start] = start_balance
     inverse_kernel: ClassVar[Kernel] = balance_inverse_step
@@ -296,7 +288,12 @@ class Balance(ManyChannels, LearntBalance):
         """Return how many samples needed pressures out of range."""
         return int(state[-1]) if state[-1] > 0 else 0
 
-    inverse_counts: ClassVar[bool] = True
+    solved: ClassVar[bool] = True
+
+    @property
+    def n_inverse_states(self) -> int:
+        """As many as this block's, which count already."""
+        return self.n_states
 
     def inverse_complaint(self, state: Array) -> str:
         """Tell of pressures for which no equilibrium was found."""
@@ -307,12 +304,12 @@ class Balance(ManyChannels, LearntBalance):
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return about six operations a number, for friction is looked at again for its root."""
-        operations = 6 * self.c_numbers(sample_time).size
+        operations = 6 * self.coefficients(sample_time).size
         return Cost(operations, 20 * operations)
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
         """Return what steps of Newton's method cost."""
-        return newton_cost(4 * self.c_numbers(sample_time).size + len(self.driven) ** 3)
+        return newton_cost(4 * self.coefficients(sample_time).size + len(self.driven) ** 3)
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a number: forces are in N, or, of relative areas, in the input's."""

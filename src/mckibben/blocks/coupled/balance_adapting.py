@@ -25,8 +25,6 @@ from mckibben.blocks.adaptive.learning import (
     start_learning,
     trusted,
 )
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.linear_system import eliminate
 from mckibben.blocks.coupled.balance_law import press, start_balance
 from mckibben.blocks.coupled.balance_terms import (
     OWN,
@@ -36,6 +34,8 @@ from mckibben.blocks.coupled.balance_terms import (
     muscles,
     sprung,
 )
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.solving import eliminate
 
 KINDS = 5
 OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION = range(KINDS)

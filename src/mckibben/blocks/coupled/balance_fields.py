@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
 from mckibben.errors import ModelError, ModelWarning
 
 if TYPE_CHECKING:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.inverse import Inverse
 
 
 class Placed(NamedTuple):

@@ -13,8 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.core.linear_system import eliminate
 from mckibben.blocks.coupled.balance_terms import (
     AT_REST,
     FROM_REST,
@@ -29,6 +27,8 @@ from mckibben.blocks.coupled.balance_terms import (
     rubbed,
     sprung,
 )
+from mckibben.blocks.kernels import DERIVED, kernel
+from mckibben.blocks.solving import eliminate
 
 NEVER = 1e30
 """Force at which what never goes slack would."""
@@ -76,6 +76,8 @@ def shortened(
             high = u
         else:
             low = u
+    if DERIVED:
+        u -= excess / slope
     return u, True
 
 
@@ -230,6 +232,11 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
             else:  # where the rate would vanish were it straight, but well inside
                 width = high - low
                 share = low + width * min(max(-low_rate / (high_rate - low_rate), 0.1), 0.9)
+    if DERIVED:
+        unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+        eliminate(matrix, residual)
+        for k in range(n):
+            y[k] -= residual[k]
     if not left < NEARLY:
         for k in range(n):
             y[k] = state[k]

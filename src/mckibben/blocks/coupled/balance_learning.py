@@ -14,9 +14,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable, Group
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import rows, vector
-from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance_adapting import (
     AREA,
     FRICTION,
@@ -25,6 +23,8 @@ from mckibben.blocks.coupled.balance_adapting import (
     RELAXATION,
     STIFFNESS,
 )
+from mckibben.blocks.fields import rows, vector
+from mckibben.blocks.inverse import Inverse
 
 if TYPE_CHECKING:
     from mckibben.blocks.coupled.balance import Balance

@@ -20,7 +20,7 @@ L), with mass the last two moves (n by 2), the tare (n), whether nothing came be
 from __future__ import annotations
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.kernels import kernel
 
 HEAD = 16
 """n, schedules, degree, loads, stops, lags, elastic terms, area's terms, scale, p0, lowest and highest

@@ -19,12 +19,10 @@ from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
-from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, Vector
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.many_channels import ManyChannels
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 
@@ -85,7 +83,7 @@ def coupled_memory_start(coefficients: Array, state: Array, inputs: Array, virgi
 
 
 @dataclass(frozen=True, config=STRICT)
-class CoupledMemory(ManyChannels, Primitive):
+class CoupledMemory(Block):
     """Lags, play operators and a polynomial readout.
 
     Parameters
@@ -104,6 +102,7 @@ class CoupledMemory(ManyChannels, Primitive):
     """
 
     kind: ClassVar[str] = "coupled-memory"
+    ports: ClassVar[Ports] = SEVERAL
     kernel: ClassVar[Kernel] = coupled_memory_step
     start_kernel: ClassVar[Start] = coupled_memory_start
     parameters: ClassVar[tuple[str, ...]] = ("readout",)

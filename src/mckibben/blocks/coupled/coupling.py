@@ -15,12 +15,11 @@ from numpy.typing import ArrayLike
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive
-from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, rows
-from mckibben.blocks.core.kernels import step
-from mckibben.blocks.core.linear import LinearSystem
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.stateless import Stateless
+from mckibben.blocks.base import Block, Kernel
+from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, rows
+from mckibben.blocks.kernels import step
+from mckibben.blocks.linear import LinearSystem
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 WORST_CONDITION = 1e8
@@ -39,7 +38,7 @@ def coupling_step(coefficients: Array, state: Array, inputs: Array, outputs: Arr
 
 
 @dataclass(frozen=True, config=STRICT)
-class Coupling(Stateless, Primitive):
+class Coupling(Block):
     """Coupling of n muscles, h_j = sum_i G_ij v_i.
 
     Parameters

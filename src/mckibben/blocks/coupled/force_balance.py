@@ -24,24 +24,14 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import (
-    STRICT,
-    Channel,
-    Channels,
-    Rows,
-    Vector,
-    rows,
-    vector,
-)
-from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.linear_system import eliminate, newton_cost
-from mckibben.blocks.core.many_channels import ManyChannels
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.parametrised import parameter_vector
+from mckibben.blocks.base import SEVERAL, Cost, Kernel, Ports, Start
 from mckibben.blocks.coupled.balance_fields import tell_clipped
+from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector, rows, vector
+from mckibben.blocks.inverse import Invertible
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import parameter_vector
+from mckibben.blocks.solving import eliminate, newton_cost
 from mckibben.errors import ModelError
 
 ELASTIC, AREA = 3, 3
@@ -245,7 +235,7 @@ def force_balance_inverse_start(
 
 
 @dataclass(frozen=True, config=STRICT)
-class ForceBalance(ManyChannels, Invertible):
+class ForceBalance(Invertible):
     """From displacements of n muscles to their pressures.
 
     Parameters
@@ -269,6 +259,7 @@ class ForceBalance(ManyChannels, Invertible):
     """
 
     kind: ClassVar[str] = "force-balance"
+    ports: ClassVar[Ports] = SEVERAL
     kernel: ClassVar[Kernel] = force_balance_step
     start_kernel: ClassVar[Start] = force_balance_start
     inverse_kernel: ClassVar[Kernel] = force_balance_inverse_step
@@ -358,7 +349,7 @@ class ForceBalance(ManyChannels, Invertible):
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return about four operations a number, for those of stops come again."""
-        operations = 4 * self.c_numbers(sample_time).size
+        operations = 4 * self.coefficients(sample_time).size
         return Cost(operations, operations)
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
@@ -371,7 +362,12 @@ class ForceBalance(ManyChannels, Invertible):
         n = len(self.driven)
         return self.n_scratch + 3 * n + n * n + len(self.inputs)
 
-    inverse_counts: ClassVar[bool] = True
+    solved: ClassVar[bool] = True
+
+    @property
+    def n_inverse_states(self) -> int:
+        """As many as this block's, which count already."""
+        return self.n_states
 
     def inverse_complaint(self, state: Array) -> str:
         """Tell of pressures for which no equilibrium was found."""

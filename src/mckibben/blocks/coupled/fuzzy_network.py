@@ -18,22 +18,13 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import (
-    STRICT,
-    Channel,
-    Channels,
-    Rows,
-    Vector,
-)
-from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.kernels import SLACK, kernel, step
-from mckibben.blocks.core.linear_system import eliminate, newton_cost
-from mckibben.blocks.core.many_channels import ManyChannels
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.stateless import Stateless
+from mckibben.blocks.base import SEVERAL, Cost, Kernel, Ports, Start
 from mckibben.blocks.coupled.fuzzy_rules import answer, contract, sloped_answer
+from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.inverse import Invertible
+from mckibben.blocks.kernels import DERIVED, SLACK, kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import eliminate, newton_cost
 from mckibben.errors import ModelError
 
 MOST_STEPS = 40
@@ -107,6 +98,14 @@ def fuzzy_network_inverse_step(
                 break
         for i in range(m):
             x[i] = min(max(best[i] - share * change[i], low[i]), high[i])
+    if DERIVED:
+        sloped_answer(c, left, best, memberships, tilts, y, slopes)
+        for j in range(m):
+            y[j] -= inputs[j]
+        eliminate(slopes, y)
+        for i in range(m):
+            if low[i] < best[i] < high[i]:
+                best[i] -= y[i]
     for i in range(m):
         state[i] = best[i]
         outputs[i] = best[i]
@@ -146,7 +145,7 @@ def fuzzy_network_inverse_start(
 
 
 @dataclass(frozen=True, config=STRICT)
-class FuzzyNetwork(Stateless, ManyChannels, Invertible):
+class FuzzyNetwork(Invertible):
     """Takagi-Sugeno network with a rule for every combination of sets.
 
     Parameters
@@ -165,6 +164,7 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
     """
 
     kind: ClassVar[str] = "fuzzy-network"
+    ports: ClassVar[Ports] = SEVERAL
     kernel: ClassVar[Kernel] = fuzzy_network_step
     inverse_kernel: ClassVar[Kernel] = fuzzy_network_inverse_step
     inverse_start_kernel: ClassVar[Start] = fuzzy_network_inverse_start
@@ -277,7 +277,7 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
         """Return the limits, lowest then highest, and the network's."""
         return np.concatenate([*np.array(self.limits).T, own])
 
-    inverse_counts: ClassVar[bool] = True
+    solved: ClassVar[bool] = True
 
     def inverse_complaint(self, state: Array) -> str:
         """Tell of references that the network cannot give."""

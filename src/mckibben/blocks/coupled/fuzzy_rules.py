@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import NOTHING, kernel
+from mckibben.blocks.kernels import NOTHING, kernel
 
 
 @kernel

@@ -19,17 +19,17 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block, Kernel, Start
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
-from mckibben.blocks.core.fields import STRICT, Channel
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.saving import nested
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.blocks.coupled.balance_law import begin, keep, unbalanced
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
+from mckibben.blocks.fields import STRICT, Channel
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 
@@ -95,7 +95,7 @@ def load_estimate_start(
 
 
 @dataclass(frozen=True, config=STRICT)
-class LoadEstimate(Primitive):
+class LoadEstimate(Block):
     """From displacements and pressures of muscles, and what schedules them, to their loads.
 
     Its memory begins where the balance's does: at rest without pressure, under the loads that the

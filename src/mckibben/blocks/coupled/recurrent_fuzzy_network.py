@@ -26,13 +26,10 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, Vector
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.many_channels import ManyChannels
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import own_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Cost, Kernel, Ports, Start, own_sample_time
+from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 LEAST_FIRING = 1e-290
@@ -124,7 +121,7 @@ Lag = Annotated[int, Interval(ge=0, le=10)]
 
 
 @dataclass(frozen=True, config=STRICT)
-class RecurrentFuzzyNetwork(ManyChannels, Primitive):
+class RecurrentFuzzyNetwork(Block):
     """Recurrent Takagi-Sugeno network in a NARMAX loop.
 
     Parameters
@@ -142,6 +139,7 @@ class RecurrentFuzzyNetwork(ManyChannels, Primitive):
     """
 
     kind: ClassVar[str] = "recurrent-fuzzy-network"
+    ports: ClassVar[Ports] = SEVERAL
     kernel: ClassVar[Kernel] = recurrent_fuzzy_network_step
     start_kernel: ClassVar[Start] = recurrent_fuzzy_network_start
     rate_dependent: ClassVar[bool] = True

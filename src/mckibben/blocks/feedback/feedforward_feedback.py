@@ -11,12 +11,11 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Run
-from mckibben.blocks.core.composition import Composition
-from mckibben.blocks.core.exportable import Board
-from mckibben.blocks.core.fields import STRICT, Channel, Initial
-from mckibben.blocks.core.saving import nested
+from mckibben.blocks.base import Block, Board, Run
+from mckibben.blocks.compose import Composition
 from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 

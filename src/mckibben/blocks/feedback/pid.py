@@ -19,12 +19,10 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
-from mckibben.blocks.core.fields import STRICT, Channel, Channels, Vector
-from mckibben.blocks.core.kernels import accumulate, kernel, step
-from mckibben.blocks.core.many_channels import ManyChannels
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.fields import STRICT, Channel, Channels, Vector
+from mckibben.blocks.kernels import accumulate, kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 MEASURED = "_measured"
@@ -72,7 +70,7 @@ def pid_start(
 
 
 @dataclass(frozen=True, config=STRICT)
-class PIDFeedback(ManyChannels, Primitive):
+class PIDFeedback(Block):
     """Independent PID loops of n muscles.
 
     Parameters
@@ -94,6 +92,7 @@ class PIDFeedback(ManyChannels, Primitive):
     """
 
     kind: ClassVar[str] = "pid"
+    ports: ClassVar[Ports] = SEVERAL
     kernel: ClassVar[Kernel] = pid_step
     start_kernel: ClassVar[Start] = pid_start
     rate_dependent: ClassVar[bool] = True

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-from mckibben.blocks.core.block import Block, Primitive
-from mckibben.blocks.core.single_channel import ScheduledChannel
+from mckibben.blocks.base import Block, Ports
 from mckibben.errors import ModelError
 
 
-class Activation(ScheduledChannel, Primitive):
+class Activation(Block):
     """From contraction, at a force that schedules it, to pressure; it depends on a filtered rate."""
 
     rate_dependent: ClassVar[bool] = True
-    scheduled_by: ClassVar[str] = "force"
+    ports: ClassVar[Ports] = ("input",), ("force",), ("output",)
 
     rate_time_constant: float
 

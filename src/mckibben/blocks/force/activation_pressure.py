@@ -22,8 +22,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.fields import (
     CONTRACTION,
     FORCE,
     PRESSURE,
@@ -32,10 +32,9 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import needs_sample_time
 from mckibben.blocks.force.activation import Activation
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 POINTS = 4

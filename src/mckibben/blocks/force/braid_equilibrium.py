@@ -20,11 +20,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, Initial
-from mckibben.blocks.core.kernels import SLACK, kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import Memoryless, Ranged, nothing_clipped
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, Initial
+from mckibben.blocks.inverse import Invertible, nothing_clipped
+from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
+from mckibben.blocks.notation import Notation
 
 NEWTONS_PER_BAR = 0.1
 """Force of one bar on one square millimetre [N]."""
@@ -81,6 +81,8 @@ def braid_equilibrium_step(
             if abs(candidate - e) <= STILL or candidate in (low, high):
                 break
             e = candidate
+        if DERIVED:
+            e = improved(balance, p, e, c)
     outputs[0] = c[8] * e + c[9]
 
 
@@ -98,7 +100,7 @@ def braid_equilibrium_inverse_step(
 
 
 @dataclass(frozen=True, config=STRICT)
-class BraidEquilibrium(Memoryless, Ranged):
+class BraidEquilibrium(Invertible):
     """Displacement at which a loaded, braided muscle rests under a pressure.
 
     Parameters
@@ -160,7 +162,7 @@ class BraidEquilibrium(Memoryless, Ranged):
     output: ChannelField = DISPLACEMENT
 
     @property
-    def input_range(self) -> tuple[float, float]:  # type: ignore[override]
+    def input_range(self) -> tuple[float, float]:
         """Least and greatest pressure that the balance is solved for [bar]."""
         c = self.coefficients(None)
         return float(balance(c[6], c)), float(balance(c[7], c))

@@ -16,12 +16,9 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block, Kernel, Start
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
-from mckibben.blocks.core.fields import STRICT, Channel, Initial
-from mckibben.blocks.core.kernels import Step, kernel, step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.saving import nested
+from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.blocks.force.multistate_friction import (
     MultistateFriction,
@@ -29,6 +26,9 @@ from mckibben.blocks.force.multistate_friction import (
     multistate_friction_step,
 )
 from mckibben.blocks.force.polynomial_force import PolynomialForce
+from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 LEAST_PULL = 1e-9
@@ -77,7 +77,7 @@ def kernels_of(law: type[ForceLaw]) -> tuple[Step, Start]:
 
 
 @dataclass(frozen=True, config=STRICT)
-class ForceFeedforward(Primitive):
+class ForceFeedforward(Block):
     """Pressure by wished-for force and measured length.
 
     Parameters

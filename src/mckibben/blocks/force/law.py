@@ -8,21 +8,21 @@ from typing import ClassVar
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Primitive
-from mckibben.blocks.core.fields import Channel, Initial
-from mckibben.blocks.core.single_channel import ScheduledChannel
-from mckibben.blocks.core.stateless import Stateless
+from mckibben.blocks.base import Block, Ports
+from mckibben.blocks.fields import Channel, Initial
 from mckibben.errors import ModelError
 
 
-class ForceLaw(Stateless, ScheduledChannel, Primitive):
+class ForceLaw(Block):
     """A static force law: driven by length [mm], scheduled by pressure [bar], giving force [N]."""
 
     initial: ClassVar[Initial] = "first_sample"
 
-    scheduled_by: ClassVar[str] = "pressure"
+    ports: ClassVar[Ports] = ("input",), ("pressure",), ("output",)
 
+    input: Channel
     pressure: Channel
+    output: Channel
 
     terms_kernel: ClassVar[Callable[[float, Array], tuple[float, float]]]
     """Force per pressure [N/bar], and force without any [N], from a length and `coefficients`."""

@@ -29,8 +29,8 @@ from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive, Start
-from mckibben.blocks.core.fields import (
+from mckibben.blocks.base import Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.fields import (
     FORCE,
     LENGTH,
     PRESSURE,
@@ -39,10 +39,8 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.core.kernels import accumulate, kernel, step
-from mckibben.blocks.core.notation import Notation, tex, with_unit
-from mckibben.blocks.core.refusals import needs_sample_time
-from mckibben.blocks.core.single_channel import ScheduledChannel
+from mckibben.blocks.kernels import accumulate, kernel, step
+from mckibben.blocks.notation import Notation, tex, with_unit
 from mckibben.errors import ModelError
 
 Direction = Literal["shared", "both", "lengthening", "shortening"]
@@ -138,7 +136,7 @@ def _directions(value: object) -> object:
 
 
 @dataclass(frozen=True, config=STRICT)
-class MultistateFriction(ScheduledChannel, Primitive):
+class MultistateFriction(Block):
     """Friction force by length, with elements that switch with the direction of motion.
 
     Parameters
@@ -161,7 +159,7 @@ class MultistateFriction(ScheduledChannel, Primitive):
     """
 
     kind: ClassVar[str] = "multistate-friction"
-    scheduled_by: ClassVar[str] = "pressure"
+    ports: ClassVar[Ports] = ("input",), ("pressure",), ("output",)
     kernel: ClassVar[Kernel] = multistate_friction_step
     start_kernel: ClassVar[Start] = multistate_friction_start
     rate_dependent: ClassVar[bool] = True

@@ -20,12 +20,12 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
-from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
-from mckibben.blocks.core.kernels import kernel, step
-from mckibben.blocks.core.notation import Notation
+from mckibben.blocks.base import Kernel
+from mckibben.blocks.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
 from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.law import ForceLaw
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 MU_DECAY = 40.0

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mckibben.blocks.core import saving
-from mckibben.blocks.core.block import Block
+from mckibben.blocks import saving
+from mckibben.blocks.base import Block
 from mckibben.blocks.laws.inverse_laws import EXACT, inverts
 from mckibben.blocks.laws.trial import Trial
 from mckibben.errors import DataError, ModelError

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.inverse import Invertible
+from mckibben.blocks.base import Block
+from mckibben.blocks.inverse import Invertible
 from mckibben.registry import load, names
 
 

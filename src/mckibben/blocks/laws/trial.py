@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Initial
-from mckibben.blocks.core.single_channel import Ranged
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Initial
 from mckibben.errors import ContractError, ModelError
 
 DEFAULT_LIMITS = (0.0, 5.0)
@@ -96,8 +95,8 @@ def input_limits(block: Block) -> tuple[Array, Array]:
     lowest = np.full(len(block.inputs), DEFAULT_LIMITS[0])
     highest = np.full(len(block.inputs), DEFAULT_LIMITS[1])
     driven = slice(0, len(block.inputs) - len(block.scheduling))
-    if isinstance(block, Ranged):
-        low, high = np.array([block.limits[0]]), np.array([block.limits[1]])
+    if hasattr(block, "input_range"):
+        low, high = np.array([block.input_limits[0]]), np.array([block.input_limits[1]])
     else:
         try:
             low, high = block.inverse().reachable()

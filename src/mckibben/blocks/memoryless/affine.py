@@ -11,12 +11,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Primitive
-from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
-from mckibben.blocks.core.kernels import step
-from mckibben.blocks.core.linear import LinearSystem
-from mckibben.blocks.core.notation import Notation, summed
-from mckibben.blocks.core.single_channel import Memoryless
+from mckibben.blocks.base import Block, Kernel
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField
+from mckibben.blocks.kernels import step
+from mckibben.blocks.linear import LinearSystem
+from mckibben.blocks.notation import Notation, summed
 from mckibben.errors import ModelError
 
 
@@ -27,7 +26,7 @@ def affine_step(coefficients: Array, state: Array, inputs: Array, outputs: Array
 
 
 @dataclass(frozen=True, config=STRICT)
-class Affine(Memoryless, Primitive):
+class Affine(Block):
     """Gain and offset.
 
     Parameters

@@ -15,12 +15,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
-from mckibben.blocks.core.fields import PRESSURE, STRICT, ChannelField, Initial
-from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.kernels import step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import Memoryless
+from mckibben.blocks.base import Kernel
+from mckibben.blocks.fields import PRESSURE, STRICT, ChannelField, Initial
+from mckibben.blocks.inverse import Invertible
+from mckibben.blocks.kernels import step
+from mckibben.blocks.notation import Notation
 
 LOST = 0.95
 """Share of the smallest pressures that does not act."""
@@ -60,7 +59,7 @@ def contact_inverse_step(coefficients: Array, state: Array, inputs: Array, outpu
 
 
 @dataclass(frozen=True, config=STRICT)
-class Contact(Memoryless, Invertible):
+class Contact(Invertible):
     """Dead zone of small pressures.
 
     Parameters
@@ -74,6 +73,7 @@ class Contact(Memoryless, Invertible):
     kind: ClassVar[str] = "contact"
     kernel: ClassVar[Kernel] = contact_step
     inverse_kernel: ClassVar[Kernel] = contact_inverse_step
+    counts_clipped: ClassVar[bool] = False
     parameters: ClassVar[tuple[str, ...]] = ("pressure",)
     initial: ClassVar[Initial] = "first_sample"
     notation: ClassVar[Notation] = Notation(

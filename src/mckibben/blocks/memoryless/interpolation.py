@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.kernels import kernel
 from mckibben.errors import ModelError
 
 

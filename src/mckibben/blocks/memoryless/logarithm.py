@@ -16,11 +16,10 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Kernel, Primitive
-from mckibben.blocks.core.fields import PRESSURE, STRICT, ChannelField, Initial
-from mckibben.blocks.core.kernels import step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import Memoryless
+from mckibben.blocks.base import Block, Kernel
+from mckibben.blocks.fields import PRESSURE, STRICT, ChannelField, Initial
+from mckibben.blocks.kernels import step
+from mckibben.blocks.notation import Notation
 
 FLOOR = 0.05
 """Of u + offset, where the logarithm turns into its tangent."""
@@ -43,7 +42,7 @@ def exponential_step(coefficients: Array, state: Array, inputs: Array, outputs: 
 
 
 @dataclass(frozen=True, config=STRICT)
-class Logarithm(Memoryless, Primitive):
+class Logarithm(Block):
     """Logarithm of a raised input.
 
     Parameters
@@ -78,7 +77,7 @@ class Logarithm(Memoryless, Primitive):
 
 
 @dataclass(frozen=True, config=STRICT)
-class Exponential(Memoryless, Primitive):
+class Exponential(Block):
     """What undoes a `Logarithm`.
 
     Parameters

@@ -7,12 +7,11 @@ from typing import ClassVar, Self
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Primitive
-from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
-from mckibben.blocks.core.kernels import step
-from mckibben.blocks.core.linear import LinearSystem
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import Memoryless
+from mckibben.blocks.base import Block, Kernel
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField
+from mckibben.blocks.kernels import step
+from mckibben.blocks.linear import LinearSystem
+from mckibben.blocks.notation import Notation
 
 
 @step
@@ -22,7 +21,7 @@ def negative_step(coefficients: Array, state: Array, inputs: Array, outputs: Arr
 
 
 @dataclass(frozen=True, config=STRICT)
-class Negative(Memoryless, Primitive):
+class Negative(Block):
     """y = -u.
 
     Parameters

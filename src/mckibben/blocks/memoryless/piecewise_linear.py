@@ -12,12 +12,11 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Primitive
-from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Vector
-from mckibben.blocks.core.kernels import step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.single_channel import Memoryless
+from mckibben.blocks.base import Block, Kernel
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Vector
+from mckibben.blocks.kernels import step
 from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
+from mckibben.blocks.notation import Notation
 
 
 @step
@@ -28,7 +27,7 @@ def piecewise_linear_step(coefficients: Array, state: Array, inputs: Array, outp
 
 
 @dataclass(frozen=True, config=STRICT)
-class PiecewiseLinear(Memoryless, Primitive):
+class PiecewiseLinear(Block):
     """Straight lines between knots.
 
     Parameters

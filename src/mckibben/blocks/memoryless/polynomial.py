@@ -15,22 +15,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel, Start
-from mckibben.blocks.core.fields import (
-    DISPLACEMENT,
-    STRICT,
-    ChannelField,
-    Coefficients,
-    Initial,
-)
-from mckibben.blocks.core.kernels import SLACK, kernel, step
-from mckibben.blocks.core.notation import Notation, summed
-from mckibben.blocks.core.single_channel import (
-    Memoryless,
-    Ranged,
-    check_input_range,
-    nothing_clipped,
-)
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Coefficients, Initial
+from mckibben.blocks.inverse import Invertible, check_input_range, nothing_clipped
+from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
+from mckibben.blocks.notation import Notation, summed
 from mckibben.errors import ModelError
 
 
@@ -48,6 +37,11 @@ def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: A
     """Evaluate; coefficients are [centre, scale, ascending polynomial coefficients]."""
     x = (inputs[0] - coefficients[0]) / coefficients[1]
     outputs[0] = horner(coefficients[2:], x)
+
+
+@kernel
+def _value(x: float, c: Array) -> float:
+    return horner(c, x)
 
 
 @step
@@ -93,11 +87,13 @@ def polynomial_inverse_step(
         if candidate in (x, low, high):
             break
         x = candidate
+    if DERIVED:
+        x = improved(_value, y, x, c)
     outputs[0] = centre + scale * x
 
 
 @dataclass(frozen=True, config=STRICT)
-class Polynomial(Memoryless, Ranged):
+class Polynomial(Invertible):
     """Polynomial of a centred and scaled input.
 
     Parameters
@@ -166,7 +162,7 @@ class Polynomial(Memoryless, Ranged):
         return np.array([*own[:2], *self._arguments(), *own[2:]])
 
     def _arguments(self) -> tuple[float, float]:
-        low, high = self.limits
+        low, high = self.input_limits
         return (low - self.centre) / self.scale, (high - self.centre) / self.scale
 
     def worked(self) -> tuple[str, ...]:

@@ -11,8 +11,8 @@ from functools import cache
 from typing import Any
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Start
-from mckibben.blocks.core.kernels import Step, in_scratch, kernel, step
+from mckibben.blocks.base import Block, Start
+from mckibben.blocks.kernels import Step, in_scratch, kernel, step
 from mckibben.blocks.predictive.memory import Resume
 from mckibben.blocks.predictive.plan import plan, plan_scratch
 from mckibben.blocks.predictive.plan_one import one_scratch, plan_one

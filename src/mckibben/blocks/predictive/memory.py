@@ -7,14 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.composition import Composition
-from mckibben.blocks.core.inverse import Inverse
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Composition, PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.play_type.gpi import GPI
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.inverse import Inverse
+from mckibben.blocks.kernels import kernel
 from mckibben.errors import ModelError
 
 Ways = Callable[[Array], Array]

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.kernels import kernel
 from mckibben.blocks.predictive.supply import weighed_at
 
 MOST_STEPS = 30

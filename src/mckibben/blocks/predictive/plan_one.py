@@ -10,7 +10,7 @@ minima of all V, each approached as far as limits let, are the plan.
 from __future__ import annotations
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.kernels import kernel
 
 SINGLE = {"STAYING": 1e-6}
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt, Interval, Le
@@ -21,15 +21,12 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block, Run, Start
-from mckibben.blocks.core.commanding import drives
-from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector
-from mckibben.blocks.core.kernels import Step
-from mckibben.blocks.core.notation import Notation
-from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
-from mckibben.blocks.core.saving import nested
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.base import Block, Cost, Kernel, Run, Start, explicit_state, needs_sample_time
+from mckibben.blocks.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.inverse import drives
+from mckibben.blocks.kernels import Step
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.predictive.horizon import (
     PASSES,
     STILL,
@@ -41,8 +38,8 @@ from mckibben.blocks.predictive.memory import memory_of, resume_of, undoing
 from mckibben.blocks.predictive.plan import MOST_STEPS, plan, plan_scratch
 from mckibben.blocks.predictive.plan_one import one_scratch
 from mckibben.blocks.predictive.supply import allowed, limit_rows
+from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
-from mckibben.system.compiling import bound
 
 NUDGE = 1e-3
 """Of the pressure range: by how much pressures are moved to see the model's slope."""
@@ -201,11 +198,16 @@ class Predictive(Block):
         return kernels_of(model_step, undo_step, undo_start, resume, one=one)
 
     @property
-    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
-        """Those that look ahead with the compensator's."""
-        return self._kernels or ()
+    def kernel(self) -> Kernel | None:  # type: ignore[override]
+        """That which looks ahead with the compensator's; None where that is of several."""
+        return self._kernels[0] if self._kernels else None
 
-    def c_numbers(self, sample_time: float | None) -> Array:
+    @property
+    def start_kernel(self) -> Start | None:  # type: ignore[override]
+        """As `kernel`."""
+        return self._kernels[1] if self._kernels else None
+
+    def coefficients(self, sample_time: float | None) -> Array:
         """Return the coefficients that `mckibben.blocks.predictive.horizon` names.
 
         Raises
@@ -220,7 +222,7 @@ class Predictive(Block):
             )
         rows = self.rows(needs_sample_time(self.kind, sample_time))
         low, high = self.pressures
-        own = self.undone.c_numbers(sample_time), self.compensator.c_numbers(sample_time)
+        own = self.undone.coefficients(sample_time), self.compensator.coefficients(sample_time)
         blocks = (self.undone, self.compensator)
         head = [len(low), self.horizon, len(rows), *(block.n_states for block in blocks)]
         head += map(len, own)
@@ -245,8 +247,7 @@ class Predictive(Block):
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that looks ahead at every sample."""
         if self._kernels is not None:
-            numbers, scratch = self.c_numbers(sample_time), np.zeros(self.n_scratch)
-            return bound(self._kernels[0].batch, numbers, state, scratch, inputs, outputs)
+            return super().bind(sample_time, state, inputs, outputs)
         horizon = _Horizon(self, needs_sample_time(self.kind, sample_time), state)
 
         def run() -> None:

@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import SLACK, kernel
+from mckibben.blocks.kernels import SLACK, kernel
 
 
 def limit_rows(

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.optimisers.tracker import Tracker

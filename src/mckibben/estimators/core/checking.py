@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.recording import Recording, listed

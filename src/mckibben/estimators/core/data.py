@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
 from mckibben.errors import DataError
 
 Mask = NDArray[np.bool_]

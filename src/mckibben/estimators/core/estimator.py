@@ -5,15 +5,15 @@ from __future__ import annotations
 import time
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import ModelWarning
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.parameters import Parametrised
@@ -27,6 +27,20 @@ from mckibben.system.threads import one_blas_thread
 
 Operators = Annotated[int, Interval(ge=1, le=1000)]
 """Number of operators."""
+
+Purpose = Literal["memory", "rate", "several", "force"]
+"""What models are for: loops of one muscle, lags and dynamics, several muscles or loads, forces."""
+
+InverseKind = Literal["exact", "exact where stable", "solved", "none"]
+"""How models are inverted: by a formula, by one whose stability depends on the fit, by solving in
+every sample, or not at all."""
+
+Grid = Mapping[str, tuple[Any, ...]]
+"""Setting -> values to try."""
+
+DefaultFor = Literal["load", "plan of displacement", "plan of force"]
+"""Where one model is used without being named: fitted to each load, beside models that are given the
+load; or fitted before a plan of recordings."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +106,36 @@ class Estimator(Parametrised, ABC):
     """
 
     seed: Annotated[int, Interval(ge=0, le=LARGEST_SEED)] = 0
+
+    title: ClassVar[str] = ""
+    """Full name of the model; its short name if empty."""
+
+    purpose: ClassVar[Purpose | None] = None
+    """What it is for, by which models are listed; None lists it under others."""
+
+    can: ClassVar[str] = ""
+    """What it represents, in a sentence; the first line of the docstring if empty."""
+
+    cannot: ClassVar[str] = ""
+    """What it does not represent, in a sentence."""
+
+    caution: ClassVar[str | None] = None
+    """Why it is good only near the motions that it was trained on; None where it is not."""
+
+    inverse_kind: ClassVar[InverseKind] = "none"
+    """How its models are inverted as a rule; a fitted one may lack its inverse."""
+
+    quick: ClassVar[bool] = False
+    """Whether it is tried first: well known, or good, and fitted in seconds."""
+
+    param_grid: ClassVar[Grid] = {}
+    """Setting -> values tried where orders are chosen by cross-validation."""
+
+    makes: ClassVar[tuple[str, ...]] = ()
+    """Models that it can fit again with as many operators, each by the kinds of its parts in order."""
+
+    default_for: ClassVar[DefaultFor | None] = None
+    """Where it is used without being named."""
 
     effort: ClassVar[float] = 0.5
     """About how long a fit to 10 000 samples takes [s]: models are compared cheapest first."""

@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.memoryless.polynomial import Polynomial
 from mckibben.errors import ModelError

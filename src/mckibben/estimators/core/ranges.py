@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.uncertainty import simulate_all

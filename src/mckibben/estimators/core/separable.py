@@ -15,7 +15,7 @@ import numpy as np
 from annotated_types import Ge
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.searching import SearchingEstimator
@@ -33,8 +33,8 @@ POLISH_SAMPLES = 20_000
 LEAST_REVERSIBLE = 1e-3
 """Least share of the output's range that the operator without dead zone gives."""
 
-DIFFERENCE = 1.5e-8
-"""Step of finite differences, relative to parameters, of which none is counted as less than 1."""
+DIFFERENCE = 1e-7
+"""Step of finite differences, relative to the range that a parameter is searched in."""
 
 WORST = 1e150
 """Cost of parameters whose output overflows; its square is still a number."""
@@ -111,11 +111,11 @@ class SeparableEstimator(SearchingEstimator):
         Shape (samples that count, m); by finite differences of the basis.
         """
         here = self.matrix(theta, data) @ linear
-        _, upper = self.bounds(data)
+        steps = differences(theta, *self.bounds(data))
         columns = []
         for index in range(theta.size):
             moved = theta.copy()
-            moved[index] += difference(theta[index], upper[index])
+            moved[index] += steps[index]
             there = self.matrix(moved, data) @ linear
             columns.append((there - here) / (moved[index] - theta[index]))
         return np.column_stack(columns)
@@ -300,10 +300,10 @@ def counting(data: TrainingData, over_history: Callable[[Run], Array]) -> Array:
     return np.concatenate([run.trim(over_history(run))[run.counts] for run in data.runs])
 
 
-def difference(value: float, upper: float) -> float:
-    """Return a step for finite differences that stays within the upper bound."""
-    step = DIFFERENCE * max(1.0, abs(value))
-    return step if value + step <= upper else -step
+def differences(theta: Array, lower: Array, upper: Array) -> Array:
+    """Return steps for finite differences that stay within the bounds."""
+    steps = DIFFERENCE * (upper - lower)
+    return np.where(theta + steps <= upper, steps, -steps)
 
 
 def _rms(residuals: Array) -> float:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from mckibben.blocks.core.notation import meanings
+from mckibben.blocks.notation import meanings
 from mckibben.errors import ModelError
 
 STRICT_SETTINGS = ConfigDict(strict=True, allow_inf_nan=False)

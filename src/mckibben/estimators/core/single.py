@@ -9,9 +9,9 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless.negative import Negative
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import Mask, TrainingData

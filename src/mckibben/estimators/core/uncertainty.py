@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.running import run_many
+from mckibben.blocks.base import Block
+from mckibben.blocks.running import run_many
 from mckibben.estimators.core.autoregression import Autoregression, autoregression
 from mckibben.estimators.core.data import Run, TrainingData
 

@@ -16,14 +16,15 @@ import numpy as np
 from annotated_types import Gt, Interval
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import rows
 from mckibben.blocks.coupled.load_estimate import parts_of
+from mckibben.blocks.fields import rows
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import LOST, Contact
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.coupled.balance_checks import (
     check_directions,
@@ -132,6 +133,24 @@ class BalanceEstimator(CoupledEstimator):
         muscle 1's area at rest.
     """
 
+    title = "Balance of forces"
+    can = (
+        "Springs, areas, friction and relaxation of one muscle or several in parallel, under "
+        "load, stiffness and rate included; holds off the patterns of its training."
+    )
+    cannot = (
+        "Friction is the same in contraction and extension; one set of lags serves all "
+        "muscles; air's delay between command and pressure is not in it: put air in front."
+    )
+    inverse_kind = "exact"
+    quick = True
+    default_for = "plan of displacement"
+    param_grid: ClassVar[Grid] = {
+        "n_lags": (1, 2, 3),
+        "n_stops": (4, 6, 8),
+        "area": (2, 3),
+    }
+    makes = ("balance", "balance-inverse", "contact balance-inverse")
     effort: ClassVar[float] = 1.0
     alone: ClassVar[bool] = True
     unmeasured: ClassVar[bool] = True
@@ -316,7 +335,7 @@ class BalanceEstimator(CoupledEstimator):
         loaded = [channel.unit in LOADS for channel in data.scheduled]
         scheduled = [i for i, load in enumerate(loaded) if not load]
         x = data.stacked("scheduled")[:, scheduled]
-        levels = [np.unique(np.round(v / (0.1 * max(float(np.ptp(v)), 1e-9)))).size for v in x.T]
+        levels = [np.unique(np.round(v / (0.1 * (float(np.ptp(v)) or 1.0)))).size for v in x.T]
         degree = max(min([self.degree, *(n - 1 for n in levels)]), 1)
         highest = float(data.highest.max())
         margin = 0.02 * span
@@ -346,6 +365,7 @@ class BalanceEstimator(CoupledEstimator):
             hull=np.column_stack([y.min(axis=0) - margin, y.max(axis=0) + margin]),
             scheduled_hull=np.column_stack([x.min(axis=0), x.max(axis=0)]),
             highest=highest,
+            heaviest=float(np.abs(data.stacked("scheduled")[:, loaded]).max(initial=0.0)) or 1.0,
             tare=tare,
             slack=False,
             mass=self.mass,

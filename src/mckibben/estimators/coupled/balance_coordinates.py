@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import Channel, rows
 from mckibben.blocks.coupled.coupling import Coupling
+from mckibben.blocks.fields import Channel, rows
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 

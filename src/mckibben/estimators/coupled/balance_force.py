@@ -12,10 +12,10 @@ from typing import Annotated, ClassVar
 
 from annotated_types import Interval
 
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.load_estimate import load_of
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import ErrorsUnknown
@@ -48,6 +48,18 @@ class BalanceForceEstimator(ErrorsUnknown, SingleEstimator):
     prior : str, Path, Sheet or Prior, optional
         What is likely before, as `balance` takes it.
     """
+
+    title = "Force from a balance of forces"
+    purpose = "force"
+    can = (
+        "Force by length, or displacement, and pressure: a balance of forces asked for its "
+        "load, with friction and relaxation."
+    )
+    cannot = (
+        "Loops at held length come from friction alone; beyond the lengths recorded its area "
+        "goes on straight."
+    )
+    quick = True
 
     input: str = "length"
     output: str = "force"

@@ -14,16 +14,15 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import rows
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_in import balance_in
+from mckibben.blocks.fields import rows
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_checks import held
 from mckibben.estimators.coupled.balance_search import Search
-from mckibben.estimators.coupled.balance_structure import LEAST_PULL
 from mckibben.estimators.coupled.base import LOADS
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
@@ -236,7 +235,7 @@ def _told(search: Search, values: Array) -> bool:
     """Tell whether the linear stage found that a load pulls, and how much."""
     structure = search.structure
     area = float(values[structure.places("areas", 0)[0]])
-    return not structure.in_newtons or area < 0.99 * structure.highest / LEAST_PULL
+    return not structure.in_newtons or area * structure.least_pull < 0.99
 
 
 def _turned(search: Search, places: Sequence[int]) -> Search:

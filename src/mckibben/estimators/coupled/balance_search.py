@@ -43,7 +43,7 @@ LIGHTEST = 1e-7
 """Root of the damping of a step that is hardly damped."""
 
 UNKNOWN = 1e-10
-"""Effect, relative to the largest of any number, that is none."""
+"""Effect of a number's size, relative to the largest of any, that is none."""
 
 
 class Search:
@@ -240,7 +240,8 @@ class Search:
         """
         structure = self.structure
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
-        known = size > UNKNOWN * size.max()
+        effect = size * (mix.T @ structure.sizes(base + mix @ prior)) / mix.sum(axis=0)
+        known = effect > UNKNOWN * effect.max()
         base = base + mix[:, ~known] @ prior[~known]
         triangle = triangle[:, np.append(known, True)]
         mix, prior, size = mix[:, known], prior[known], size[known]
@@ -326,7 +327,7 @@ class Search:
             mix = mix[:, ~mix[bladders].any(axis=0)]
         errors, slopes = self.errors(values)
         moving = slopes @ mix
-        size = np.maximum(np.sqrt((moving**2).sum(axis=0)), 1e-12)
+        size = np.maximum(np.sqrt((moving**2).sum(axis=0)), 1e-300)
         condition, own = inverted(moving / size)
         n_free = errors.size * self.every - mix.shape[1]
         # of all samples, of which some are looked at

@@ -9,8 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.core.linear_system import eliminate
 from mckibben.blocks.coupled.balance_law import keep, settle, shortened, unbalanced
 from mckibben.blocks.coupled.balance_terms import (
     AT_REST,
@@ -26,6 +24,8 @@ from mckibben.blocks.coupled.balance_terms import (
     muscles,
     resisted,
 )
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.solving import eliminate
 
 NOTHING: Array = np.zeros(0)
 """Where no stops and lags begin: at rest."""

@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.running import run_many
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.blocks.coupled.balance_law import keep, settle
 from mckibben.blocks.coupled.balance_terms import AT_REST
+from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_loads import under
 from mckibben.estimators.coupled.balance_search import Search

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import Channel, rows, vector
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_law import NEVER
+from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.estimators.coupled.balance_own import Own
 
 GRID = 21
@@ -32,7 +32,7 @@ MOST_LONGER, APART = 0.5, 0.7
 """Logarithms by which a lag may become longer or shorter at once, and by which lags differ."""
 
 LEAST_PULL = 1e-3
-"""Pull of a newton, over that of the highest pressure on the area at rest, that is none."""
+"""Pull of the heaviest load, over that of the highest pressure on the area at rest, that is none."""
 
 LEAST_STIFF = 1e-3
 """Stiffness that has to be left, relative to the force of the highest pressure over the stroke."""
@@ -56,6 +56,8 @@ class Structure:
         What schedules, lowest and highest.
     highest : float
         Pressure [bar].
+    heaviest : float
+        Largest load; 1 without one.
     tare : bool
         Whether displacements count from rest at the start.
     slack : bool
@@ -84,6 +86,7 @@ class Structure:
     hull: Array
     scheduled_hull: Array
     highest: float
+    heaviest: float
     tare: bool
     slack: bool
     lag_range: tuple[float, float]
@@ -237,6 +240,34 @@ class Structure:
         """Whether forces are in newtons: those of a muscle alone under one load."""
         return self.n == len(self.loaded) == 1
 
+    @property
+    def least_pull(self) -> float:
+        """Least pull of a load's unit, on an area at rest of 1."""
+        return LEAST_PULL * self.highest / self.heaviest
+
+    def sizes(self, values: Array) -> Array:
+        """Return the sizes of coefficients, in their units, beside areas at rest as they are now."""
+        area = float(np.max([values[self.places("areas", k)[0]] for k in range(self.n)]))
+        force = area * self.highest
+        stiff = force / self.scale
+        x = np.abs(self.scheduled_hull).max(axis=1)
+        powers = 1.0 / self.powers(np.where(x > 0, x, 1.0))
+        sizes = np.full(self.size, stiff)  # of damping and mass, too, by seconds
+        for k in range(self.n):
+            sizes[self.places("hull", k)] = self.scale
+            sizes[self.places("wall", k)] = self.scale / self.highest
+            sizes[self.places("push", k)] = force
+            sizes[self.places("springs", k)] = np.outer(powers, [force, *self.n * [stiff]]).ravel()
+            sizes[self.places("elasticity", k)] = force
+            sizes[self.places("areas", k)] = area
+            sizes[self.places("loads", k)] = force / self.heaviest
+        sizes[self.grip], sizes[self.timing] = self.highest, 1.0
+        sizes[self.own.first : self.own.starts] = force
+        lags = np.full((self.n_starts, self.n, 1 + self.lags.size), self.scale)
+        lags[:, :, 0] = 1.0
+        sizes[self.own.starts :] = lags.ravel()
+        return sizes
+
     def free(self, *, moving: bool, plain: bool = False, first: bool = False) -> Array:
         """Return how coefficients follow from what is free, shape (coefficients, free).
 
@@ -324,7 +355,7 @@ class Structure:
                 for place in self.places(name, k).tolist():
                     ask({place: 1.0}, 0.0)
             for place in self.places("loads", k).tolist():
-                ask({place: 1.0}, LEAST_PULL * unit / self.highest if self.in_newtons else 0.0)
+                ask({place: 1.0}, self.least_pull * unit if self.in_newtons else 0.0)
             ask({int(self.places("wall", k)[0]): -1.0}, -0.1 * self.scale / self.highest)
             areas, friction = self.places("areas", k), self.places("friction", k)
             ask({int(areas[0]): 1.0}, 0.1 * unit)

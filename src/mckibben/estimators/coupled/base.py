@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import DataError
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import Mask, TrainingData, moves_alone
@@ -41,6 +41,8 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
         Channels that schedule the model: an extensor's pressure, a load, a temperature. Default
         ``pressure_extensor`` and ``force``, where there are any.
     """
+
+    purpose = "several"
 
     input: str | tuple[str, ...] | None = None
     output: str | tuple[str, ...] | None = None

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.errors import DataError
 from mckibben.estimators.coupled.balance import BalanceEstimator

@@ -12,6 +12,9 @@ import numpy as np
 
 from mckibben.arrays import Array
 
+LIGHTEST = 1e-11
+"""Damping of every consequent, relative to the size of what it multiplies."""
+
 
 @dataclass(frozen=True)
 class Sets:
@@ -88,9 +91,12 @@ class Consequents:
         parts = np.hstack([common, np.eye(len(gram))])
         whole = parts.T @ gram @ parts
         size = np.diag(whole)[:n_terms]
-        damping = np.concatenate([np.zeros(n_terms), np.tile(self.ridge * size, n_rules)])
-        whole[np.diag_indices_from(whole)] += damping + 1e-11 * size.max()
-        return np.asarray(parts @ np.linalg.solve(whole, parts.T @ right), dtype=np.float64)
+        unit = np.tile(1.0 / np.sqrt(np.where(size > 0, size, 1.0)), 1 + n_rules)
+        whole *= unit * unit[:, np.newaxis]
+        damping = np.repeat([0.0, self.ridge], [n_terms, len(gram)])
+        whole[np.diag_indices_from(whole)] += damping + LIGHTEST
+        found = np.linalg.solve(whole, unit[:, np.newaxis] * (parts.T @ right))
+        return np.asarray(parts @ (unit[:, np.newaxis] * found), dtype=np.float64)
 
     def fit(self, x: Array, columns: Array, y: Array) -> Array:
         """Return consequents by damped least squares, shape (rules * terms, outputs)."""

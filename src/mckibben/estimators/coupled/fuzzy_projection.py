@@ -43,7 +43,7 @@ def project(
 
     Among the steps taken, the one that does best on the validation data is kept.
     """
-    scale = np.maximum(high - low, 1e-9)
+    scale = np.where(high > low, high - low, 1.0)
     start = Sets.even(low, low + scale, n_sets)
     if n_sets == 1:  # it fires alone, wherever it is
         return start

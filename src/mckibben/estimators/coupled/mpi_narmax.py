@@ -17,8 +17,8 @@ from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
 from mckibben import registry
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
@@ -49,13 +49,17 @@ class MPINarmaxEstimator(CoupledEstimator):
         Runs that the network learns from: all, or as in the paper those under a load only.
     constants : bool
         Whether a consequent has a constant; the paper's fourth layer has none.
-    method : {"pso", "ls", "trust-region"}
-        Antecedents and feedbacks by the paper's particle swarm; even and none; or refined from those on
-        the free-running error, over ever longer parts of the runs. Consequents by least squares always.
+    method : {"pso", "ls"}
+        Antecedents and feedbacks by the paper's particle swarm; or even and none. Consequents by least
+        squares always.
     ridge : float
         Damping of what is a rule's own.
     """
 
+    title = "MPI in a recurrent fuzzy network (MPI–NARMAX)"
+    can = "Hysteresis under a load that varies, by a recurrent fuzzy network behind a modified PI."
+    cannot = "No inverse; nothing keeps the network sensible under other pulls."
+    caution = "its network is arbitrary under loads and motions of another kind"
     effort: ClassVar[float] = 6.0
 
     most_inputs: ClassVar[float] = 1
@@ -67,7 +71,7 @@ class MPINarmaxEstimator(CoupledEstimator):
     memory: Literal["mpi", "rdpi"] = "mpi"
     learns_from: Literal["all", "loaded"] = "all"
     constants: bool = True
-    method: Literal["pso", "ls", "trust-region"] = "pso"
+    method: Literal["pso", "ls"] = "pso"
     ridge: Annotated[float, Gt(0)] = 1e-4
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
@@ -98,8 +102,6 @@ class MPINarmaxEstimator(CoupledEstimator):
         chosen = (even, still)
         if self.method == "pso":
             chosen = problem.swarm(even, self.seed, tracker)
-        elif self.method == "trust-region":
-            chosen = problem.refined(even, still, tracker)
         tracker.reached(0.9)
         network = problem.best(*chosen)
         return Series((hysteresis, network))

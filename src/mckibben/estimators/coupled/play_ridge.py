@@ -20,12 +20,13 @@ import numpy as np
 from annotated_types import Ge, Gt, Interval, Len
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, rows, vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
+from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
 
 PENALTIES = np.geomspace(1e-8, 10.0, 28)
 """Tried, relative to the size of what is read out."""
@@ -58,6 +59,17 @@ class PlayRidgeEstimator(CoupledEstimator):
         error of the least.
     """
 
+    title = "Ridge regression on play operators and lags"
+    purpose = "several"
+    can = (
+        "One muscle or several, under loads too, any number of outputs: lags, play operators "
+        "and products of all inputs, in closed form; always stable."
+    )
+    cannot = (
+        "No inverse; beyond the inputs recorded its products go on as polynomials; no dynamics "
+        "that oscillate."
+    )
+    quick = True
     alone: ClassVar[bool] = True
     through: ClassVar[bool] = True
     paired: ClassVar[bool] = False
@@ -151,3 +163,20 @@ def features(block: CoupledMemory, run: Run) -> Array:
         for chosen in combinations_with_replacement(range(n), power)
     ]
     return np.column_stack([linear, *products])
+
+
+COUPLED_MEMORY = preset(
+    PlayRidgeEstimator,
+    "Lags and play operators of several muscles, with one penalty that is given.",
+    title="Coupled lags and play operators",
+    can=(
+        "Any number of outputs from lags, play operators and products of all inputs; in "
+        "closed form."
+    ),
+    cannot="No inverse; products know nothing of inputs larger than those recorded.",
+    makes=("coupled-memory",),
+    alone=False,
+    needs_time=True,
+    lags=(0.3, 1.0, 8.0),
+    ridge=1e-4,
+)

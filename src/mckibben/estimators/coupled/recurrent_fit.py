@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, rows, vector
-from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
+from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.blocks.kernels import kernel
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
@@ -30,15 +30,6 @@ SWARM = Swarm(20, 30, (0.9, 0.4), 2.0, 2.0, fastest=0.5, stops=False)
 
 ROUNDS = 8
 """Times that consequents are solved for with the network's own free-running past."""
-
-HORIZONS = (0.25, 0.5, 1.0)
-"""Parts of the runs over which the trust region's steps are taken, one after another."""
-
-TRUST_STEPS = 6
-"""Of the trust region at each horizon."""
-
-FAR = 100.0
-"""Errors count for no more [mm]."""
 
 SEARCH_SAMPLES = 6000
 """Samples of all runs on which the swarm compares free runs, from the start of each."""
@@ -110,7 +101,8 @@ class RecurrentProblem:
         pairs = zip(self.inputs, self.targets, strict=True)
         x = np.concatenate([self.regress(u, y) for u, y in pairs])
         low = x.min(axis=0)
-        return low, np.maximum(x.max(axis=0), low + 1e-6)
+        high = x.max(axis=0)
+        return low, np.where(high > low, high, low + 1.0)
 
     def solved(
         self, sets: Sets, feedbacks: Array, pasts: tuple[Array, ...]
@@ -236,45 +228,6 @@ class RecurrentProblem:
             inputs=tuple(np.ascontiguousarray(u[:most]) for u in self.inputs),
             targets=tuple(y[:most] for y in self.targets),
         )
-
-    def refined(self, even: Sets, still: Array, tracker: Tracker) -> tuple[Sets, Array]:
-        """Return antecedents and feedbacks refined on free runs over ever longer horizons."""
-        from scipy.optimize import least_squares
-
-        lower, upper, span = self.bounds
-        n = even.vector.size
-        values = np.clip(np.concatenate([even.vector, still.ravel()]), lower, upper)
-        longest = max(len(y) for y in self.targets)
-        for place, share in enumerate(HORIZONS):
-            part = self.shortened(round(share * longest))
-            n_parts = len(HORIZONS)
-            own = tracker.part(0.1 + 0.8 * place / n_parts, 0.1 + 0.8 * (place + 1) / n_parts)
-            own.best, own.budget = values, TRUST_STEPS * (values.size + 1)
-
-            def missed(x: Array, part: RecurrentProblem = part, own: Tracker = own) -> Array:
-                network = part.solved(
-                    even.replaced(x[:n]), x[n:].reshape(still.shape), part.targets
-                )
-                pairs = zip(part.free_runs(network), part.targets, strict=True)
-                errors = np.concatenate([z - y for z, y in pairs])
-                errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
-                own.saw(x, float(np.sqrt(np.mean(errors**2))))
-                return errors
-
-            with own.searching():
-                own.reached(0.0)
-                own.best = least_squares(
-                    missed,
-                    values,
-                    bounds=(lower, upper),
-                    x_scale=np.tile(span, 3),
-                    max_nfev=TRUST_STEPS,
-                ).x
-            values = own.best
-            tracker.saw_all(own)
-            if own.interrupted:
-                break
-        return even.replaced(values[:n]), values[n:].reshape(still.shape)
 
     def swarm(self, even: Sets, seed: int, tracker: Tracker) -> tuple[Sets, Array]:
         """Return centres, widths and feedbacks by particle swarm on the free-running error."""

@@ -18,20 +18,22 @@ from annotated_types import Ge, Interval
 
 from mckibben import registry
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, rows, vector
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Fitted
 from mckibben.estimators.coupled.fuzzy_fit import Method, Search, fit_network
 from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm
+from mckibben.estimators.hysteresis.pi import play_operators
+from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
-from mckibben.estimators.play_type.pi import play_operators
+from mckibben.presets import preset
 from mckibben.recording import Recording
 
 BEYOND = 0.1
@@ -140,6 +142,14 @@ def as_block(
 class TSFNNEstimator(NetworkEstimator):
     """Fuzzy network on the raw pressures: the paper's baseline, without memory."""
 
+    title = "Takagi–Sugeno fuzzy network of raw pressures (TSFNN)"
+    can = "A network without memory, as a baseline."
+    cannot = "Hysteresis; combinations of pressures unlike those recorded."
+    caution = (
+        "its network is arbitrary where muscles move in other combinations (mckibben "
+        "reproduce sdchm)"
+    )
+    inverse_kind = "solved"
     effort: ClassVar[float] = 5.0
 
     paired: ClassVar[bool] = False
@@ -177,6 +187,16 @@ class SDCHMEstimator(NetworkEstimator):
         Times that network and friction are fitted in turn.
     """
 
+    title = "Stiffness-dependent coupled hysteresis model (SDCHM)"
+    can = (
+        "Hysteresis, coupling and stiffness of muscles round a backbone; its damped network "
+        "holds where pressures move in other combinations."
+    )
+    cannot = (
+        "Strong rate dependence; with next to no damping (ridge) its network is arbitrary off"
+        " the runs recorded."
+    )
+    inverse_kind = "solved"
     effort: ClassVar[float] = 20.0
     each_alone: ClassVar[bool] = True
 
@@ -244,8 +264,6 @@ class SDCHMEstimator(NetworkEstimator):
 
     def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
         """Return the memory of a muscle's own motion: play operators, all partial sums positive."""
-        from scipy.optimize import lsq_linear
-
         low = min(float(part.min()) for part in given)
         high = max(float(part.max()) for part in given)
         span = high - low
@@ -254,18 +272,14 @@ class SDCHMEstimator(NetworkEstimator):
         plays = np.concatenate([play_operators(part, radii, "first_sample") for part in given])
         # weights are differences of partial sums, which must stay positive for an inverse
         steps = np.column_stack([-np.diff(plays, axis=1), plays[:, -1]])
-        columns = np.column_stack([steps, np.ones(len(steps))])
-        lower = np.append(np.full(radii.size, LEAST_SLOPE), -np.inf)
-        y = np.concatenate(wanted)
-        gram, right = columns.T @ columns, columns.T @ y
-        factor = np.linalg.cholesky(gram + 1e-10 * np.trace(gram) * np.eye(len(gram)))
-        found = lsq_linear(factor.T, np.linalg.solve(factor, right), (lower, np.inf)).x
-        weights = np.diff(found[:-1], prepend=0.0)
+        least = np.full(radii.size, LEAST_SLOPE)
+        sums, offset = solve_linear(steps, np.concatenate(wanted), nonnegative=True, least=least)
+        weights = np.diff(sums, prepend=0.0)
         margin = BEYOND * span
         return PI(
             vector(radii),
             vector(weights),
-            float(found[-1]),
+            offset,
             (low - margin, high + margin),
             "first_sample",
             channel,
@@ -340,3 +354,36 @@ def coupled(memories: list[Block], runs: list[Run], data: TrainingData) -> Coupl
             if j != i:
                 gains[i, j] = float(v @ run.outputs[:, j]) / float(v @ v)
     return Coupling(rows(gains), data.outputs, data.outputs)
+
+
+COUPLED_PI = preset(
+    SDCHMEstimator,
+    "Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline.",
+    title="Coupled Prandtl–Ishlinskii model",
+    can="Hysteresis of every muscle, and a constant coupling.",
+    cannot="The coupling does not change with stiffness.",
+    inverse_kind="exact",
+    quick=True,
+    memory="gpi",
+    n_sets=0,
+    n_friction=0,
+)
+
+SDCHM_PUBLISHED = preset(
+    SDCHMEstimator,
+    "SDCHM as its paper identifies it: GPI, coupling, and a network trained by particle swarm.",
+    title="SDCHM as its paper identifies it",
+    can="As sdchm, identified as its paper has it.",
+    cannot="Combinations of pressures unlike those recorded: its network is arbitrary there.",
+    caution=(
+        "its network is arbitrary where muscles move in other combinations (mckibben "
+        "reproduce sdchm)"
+    ),
+    effort=25.0,
+    constants=False,
+    method="pso",
+    ridge=1e-9,
+    memory="gpi",
+    memory_settings={"threshold_rule": "paper", "initial": "virgin"},
+    n_friction=0,
+)

@@ -9,8 +9,8 @@ import numpy as np
 from annotated_types import Ge, Interval
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
 from mckibben.blocks.force.activation_memory import ActivationMemory
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
@@ -38,6 +38,17 @@ class ActivationMemoryEstimator(SeparableEstimator):
         Of the filter of the rate [s]; default three samples.
     """
 
+    title = "Activation pressure with memory"
+    purpose = "force"
+    can = (
+        "Pressure for a contraction under a varying force, at any frequency: surface, "
+        "friction with memory, viscosity, relaxation."
+    )
+    cannot = (
+        "Is itself a compensator, so it has no inverse here; extrapolates as polynomials do "
+        "beyond the forces and contractions seen."
+    )
+    quick = True
     needs_time: ClassVar[bool] = True
 
     effort: ClassVar[float] = 1.0

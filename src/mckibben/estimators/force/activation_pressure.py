@@ -14,8 +14,8 @@ import numpy as np
 from annotated_types import Ge
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
 from mckibben.blocks.force.activation_pressure import ActivationPressure
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.searching import SearchingEstimator
@@ -44,6 +44,12 @@ class ActivationPressureEstimator(SearchingEstimator):
         found is set to that of the first run that is not static.
     """
 
+    title = "Activation pressure by characteristic points"
+    purpose = "force"
+    can = (
+        "Pressure for a contraction under a force, at one frequency of a sine; as its paper has it."
+    )
+    cannot = "Knows no minor loops and no other frequency: its hysteresis is a term in the rate."
     needs_time: ClassVar[bool] = True
 
     input: str = "contraction"

@@ -11,8 +11,8 @@ import numpy as np
 from annotated_types import Ge, Interval
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.core.block import Block
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.blocks.force.multistate_friction import (
     EACH_WAY,
@@ -27,6 +27,7 @@ from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.force.static import ORDERS, Law, force_columns, force_law
 from mckibben.estimators.optimisers.multi_start import Choice
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
 from mckibben.recording import Recording, listed
 
 Structure = Literal["eleven", "each-way", "eighteen"]
@@ -96,6 +97,8 @@ class MultistateEstimator(SeparableEstimator):
         Whether friction may grow with pressure; wants recordings at several pressures.
     """
 
+    purpose = "force"
+    inverse_kind = "exact"
     needs_time: ClassVar[bool] = True
 
     input: str = "length"
@@ -335,3 +338,36 @@ class MultistateEstimator(SeparableEstimator):
         if self.fit_pressure_gain:
             below[-1], above[-1] = -0.5, 1.0
         return template, below, above
+
+
+MULTISTATE = preset(
+    MultistateEstimator,
+    "Multistate friction with one shared element and one for each direction: eleven parameters.",
+    title="Multistate friction (three elements)",
+    can=(
+        "Friction force with elements for each direction of motion, rate included, integrated"
+        " exactly."
+    ),
+    cannot="Needs a static law beside it; compensated by feedforward only.",
+    default_for="plan of force",
+    elements="each-way",
+    effort=3.0,
+)
+
+MULTISTATE_11 = preset(
+    MultistateEstimator,
+    "Multistate friction by bounded least squares from many starts, and exchange of elements.",
+    title="Multistate friction with eleven parameters",
+    can="The paper's friction model of eleven parameters.",
+    cannot="Structure of one muscle; see multistate for yours.",
+    elements="eleven",
+)
+
+MULTISTATE_18 = preset(
+    MultistateEstimator,
+    "Multistate friction with three elements in both directions: eighteen parameters.",
+    title="Multistate friction with eighteen parameters",
+    can="The paper's friction model of eighteen parameters.",
+    cannot="Structure of one muscle; many parameters are hardly determined.",
+    elements="eighteen",
+)

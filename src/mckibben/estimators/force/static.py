@@ -9,14 +9,15 @@ import numpy as np
 from annotated_types import Gt
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.chou_hannaford import ChouHannaford
 from mckibben.blocks.force.polynomial_force import PolynomialForce
 from mckibben.blocks.force.tondu_lopez import MU_DECAY, TonduLopez
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.presets import preset
 
 Law = Literal["bilinear", "petrovic", "minh", "schindele"]
 ORDERS: dict[Law, tuple[int, int]] = {
@@ -37,6 +38,8 @@ class ForceLawEstimator(SeparableEstimator):
     pressure : str
         Channel of the pressure.
     """
+
+    purpose = "force"
 
     input: str = "length"
     output: str = "force"
@@ -62,6 +65,9 @@ class PolynomialForceEstimator(ForceLawEstimator):
     law : {"bilinear", "petrovic", "minh", "schindele"}
         Whose orders in length.
     """
+
+    inverse_kind = "exact"
+    cannot = "No hysteresis."
 
     law: Law = "bilinear"
 
@@ -105,6 +111,12 @@ def force_law(
 class ChouHannafordEstimator(ForceLawEstimator):
     """Chou and Hannaford's law: thread length, turns and a constant, by least squares."""
 
+    title = "Force law of Chou and Hannaford"
+    can = "Static force of an ideal braid, three numbers."
+    cannot = "No end effects, no bladder, no hysteresis."
+    inverse_kind = "exact"
+    quick = True
+
     nonnegative: bool = True
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
@@ -141,6 +153,10 @@ class TonduLopezEstimator(ForceLawEstimator):
     diameter : float
         Of the muscle [mm]; what it is off by goes into mu.
     """
+
+    title = "Force law of Tondu and Lopez"
+    can = "Static force of a cylinder with end and pressure corrections."
+    cannot = "No hysteresis; bends less than data often do."
 
     rest_length: Annotated[float, Gt(0)] | None = None
     diameter: Annotated[float, Gt(0)] = 10.0
@@ -179,3 +195,34 @@ class TonduLopezEstimator(ForceLawEstimator):
         template, lower, upper = super().parameter_bounds(data)
         lower[0], upper[0] = 0.2, 0.9
         return template, lower, upper
+
+
+FORCE_BILINEAR = preset(
+    PolynomialForceEstimator,
+    "The bilinear-quadratic law.",
+    title="Bilinear force law",
+    can="Static force, linear in pressure, polynomial in length.",
+    law="bilinear",
+)
+
+FORCE_MINH = preset(
+    PolynomialForceEstimator,
+    "Minh's law: cubic in length, with coefficients linear in pressure.",
+    title="Force law of Minh",
+    law="minh",
+)
+
+FORCE_PETROVIC = preset(
+    PolynomialForceEstimator,
+    "Petrovic's polynomial: quadratic in length with pressure, and without.",
+    title="Force law of Petrovic",
+    quick=True,
+    law="petrovic",
+)
+
+FORCE_SCHINDELE = preset(
+    PolynomialForceEstimator,
+    "Schindele and Aschemann's polynomials: cubic with pressure, of fourth order without.",
+    title="Force law of Schindele and Aschemann",
+    law="schindele",
+)

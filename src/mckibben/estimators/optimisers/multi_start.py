@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.estimators.optimisers.tracker import Tracker
 
+MARGIN = 1e-9
+"""Least distance from the bounds at which a refinement begins, relative to theirs."""
+
 EXCHANGES = 3
 """How often groups of parameters are exchanged and what was found refined, at most."""
 
@@ -64,6 +67,9 @@ def multi_start(
     Every start is evaluated once; the best ``n_refined`` are refined by a bounded trust-region
     method, with the derivatives of the residuals where given, else with finite differences. Where
     there are choices, the best is then improved by exchange, and refined again.
+
+    Residuals are refined relative to the least RMSE of the starts, and parameters relative to their
+    bounds, so that no tolerance or step of the search depends on a unit.
     """
     from scipy.optimize import least_squares
 
@@ -80,16 +86,25 @@ def multi_start(
         return inside, cost(inside)
 
     def refine(start: Array) -> None:
-        margin = 1e-9 * (upper - lower)
+        span = upper - lower
+        unit = tracker.best_cost or 1.0
+
+        def errors(z: Array) -> Array:
+            return evaluate(lower + span * z) / unit
+
+        def slopes(z: Array) -> Array:
+            assert jacobian is not None
+            return jacobian(lower + span * z) * span / unit
+
         least_squares(
-            evaluate,
-            np.clip(start, lower + margin, upper - margin),
-            jac="2-point" if jacobian is None else jacobian,
-            bounds=(lower, upper),
-            x_scale=np.maximum(upper - lower, 1e-12),
+            errors,
+            np.clip((start - lower) / span, MARGIN, 1.0 - MARGIN),
+            jac="2-point" if jacobian is None else slopes,
+            bounds=(0.0, 1.0),
             max_nfev=max_evaluations,
             ftol=1e-7,
             xtol=1e-7,
+            gtol=None,
         )
 
     with tracker.searching():

@@ -12,7 +12,7 @@ import warnings
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.laws.trial import wander
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.export.c.wiring import Call, Wiring
@@ -54,7 +54,7 @@ def _moved(block: Block, numbers: Array, sample_time: float | None) -> Array:
             warnings.simplefilter("ignore", ModelWarning)
             try:
                 near = block.unpack(parameters * (1 + NUDGE * rng.uniform(-1, 1, parameters.size)))
-                moved = near.c_numbers(sample_time)
+                moved = near.coefficients(sample_time)
             except ModelError:
                 continue
         if moved.size == numbers.size:  # else its structure follows its parameters: all stay

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, render, source_files, test_content
 from mckibben.export.c.vectors import Vectors, vectors

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
-from mckibben.blocks.core.kernels import SINGLE
+from mckibben.blocks.kernels import SINGLE
 from mckibben.errors import ModelError
 
 REAL, INT, VIEW = "mck_real", "int", "view"
@@ -88,7 +88,7 @@ class Source:
         text = textwrap.dedent("".join(lines))
         tree = ast.parse(text).body[0]
         assert isinstance(tree, ast.FunctionDef)
-        self.tree = tree
+        self.tree = _WithoutDerivatives().visit(tree)
         self.comments = dict(_comments(text))
         closed = inspect.getclosurevars(self.function).nonlocals
         self.globals: Mapping[str, Any] = {**self.function.__globals__, **closed}
@@ -196,6 +196,14 @@ class Source:
             if name in table and known.get(name) == self.globals[name]:
                 return float(table[name])
         return SINGLE.get(name)
+
+
+class _WithoutDerivatives(ast.NodeTransformer):
+    """Leaves out what derivatives alone ask for."""
+
+    def visit_If(self, node: ast.If) -> ast.If | None:
+        self.generic_visit(node)
+        return None if ast.unparse(node.test).partition(" ")[0] == "DERIVED" else node
 
 
 def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:

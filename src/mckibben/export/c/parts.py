@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.export.c.language import Kernel
 
@@ -74,5 +74,5 @@ def part_of(block: Block, sample_time: float | None) -> Part:
     start, given = block.start, None
     if not isinstance(start, str):
         given = block.initial_state(np.zeros(len(block.inputs)))
-    numbers = block.c_numbers(sample_time)
+    numbers = block.coefficients(sample_time)
     return Part(block, numbers, start == "virgin", given, block.c_kernels)

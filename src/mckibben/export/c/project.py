@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.core.kernels import in_scratch
-from mckibben.blocks.core.saving import to_text
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.kernels import in_scratch
+from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError
 from mckibben.export.c.literals import literal, rows
 from mckibben.export.c.parts import check_single

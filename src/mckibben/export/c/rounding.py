@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block, Primitive
+from mckibben.blocks.base import Block
 from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.errors import ModelWarning
 
@@ -22,7 +22,7 @@ def warn_of_rounding(block: Block, sample_time: float | None) -> None:
 
     The same kernel is run on single and on double precision numbers.
     """
-    if not (block.filters and isinstance(block, Primitive)):
+    if not (block.filters and hasattr(block, "kernel")):
         return
     rng = np.random.default_rng(0)
     samples = min(SAMPLES, MOST_PRODUCTS // max(block.n_states, 1))
@@ -39,9 +39,9 @@ def warn_of_rounding(block: Block, sample_time: float | None) -> None:
         )
 
 
-def _run(block: Primitive, inputs: np.ndarray, sample_time: float | None) -> np.ndarray:
+def _run(block: Block, inputs: np.ndarray, sample_time: float | None) -> np.ndarray:
     kind = inputs.dtype
     state = block.initial_state(inputs[0].astype(np.float64)).astype(kind)
     outputs = np.empty((len(inputs), 1), dtype=kind)
-    type(block).kernel.batch(block.coefficients(sample_time).astype(kind), state, inputs, outputs)
+    block.kernel.batch(block.coefficients(sample_time).astype(kind), state, inputs, outputs)
     return outputs.astype(np.float64)

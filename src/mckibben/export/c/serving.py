@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.single_channel import Ranged
+from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.export.c.adjusting import coefficient_limits, memory_limits
 from mckibben.export.c.literals import literal, rows
@@ -113,8 +112,8 @@ def limits(block: Block, serving: Serving) -> Limits:
 
 def _known(block: Block) -> tuple[Array, Array]:
     """Return the driven inputs' range as far as the block knows it."""
-    if isinstance(block, Ranged):
-        return np.array([block.limits[0]]), np.array([block.limits[1]])
+    if hasattr(block, "input_range"):
+        return np.array([block.input_limits[0]]), np.array([block.input_limits[1]])
     n = len(block.inputs) - len(block.scheduling)
     try:
         return block.inverse().reachable()

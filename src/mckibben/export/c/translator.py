@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mckibben.blocks.core.kernels import accumulate
+from mckibben.blocks.kernels import accumulate
 from mckibben.export.c.language import (
     FUNCTIONS,
     INT,

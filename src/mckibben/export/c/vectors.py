@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.errors import ModelError, ModelWarning
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.exportable import Cost, Exportable
+from mckibben.blocks.base import Block, Cost
 from mckibben.errors import DataError
 from mckibben.export.c.parts import Part, part_of
 
@@ -66,9 +65,8 @@ class Wiring:
         costs = (call.part.block.cost(self.sample_time) for call in self.calls)
         return sum(costs, start=Cost(0, 0))
 
-    def call(self, block: Exportable, given: Sequence[str]) -> list[str]:
+    def call(self, block: Block, given: Sequence[str]) -> list[str]:
         """Append a part, and return the signals that it gives."""
-        assert isinstance(block, Block)
         call = Call(part_of(block, self.sample_time), tuple(given), self.n_signals, self.n_numbers)
         self.steps.append(call)
         self.n_numbers += block.n_states + block.n_scratch

@@ -20,9 +20,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.saving import to_dict, to_text
+from mckibben.blocks.base import Block
 from mckibben.blocks.laws.trial import input_limits
+from mckibben.blocks.saving import to_dict, to_text
 from mckibben.errors import DataError, ModelError
 from mckibben.export.c.literals import literal
 from mckibben.export.c.project import described, source_files

@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.saving import to_text
+from mckibben.blocks.base import Block
+from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, source_files
 from mckibben.export.folders import refuse_folder, write_folder

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.estimators.narx.network import NarxNetworkEstimator
-from mckibben.estimators.play_type.pi import PIEstimator
+from mckibben.estimators.dynamics.narx_network import NarxNetworkEstimator
+from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.papers.field_models.published import THRESHOLDS
 from mckibben.registry import load
 

@@ -10,9 +10,9 @@ behind it to scale it to a muscle.
 
 from __future__ import annotations
 
-from mckibben.blocks.core.fields import PRESSURE, Channel
-from mckibben.blocks.dynamic.process_model import ProcessModel
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.dynamics.process_model import ProcessModel
+from mckibben.blocks.fields import PRESSURE, Channel
+from mckibben.blocks.hysteresis.pi import PI
 
 THRESHOLDS = (0.0, 0.3392, 0.6654, 0.9917, 1.3179, 1.6442, 1.9704)
 """r_1 to r_7 [bar], Eq. (16)."""

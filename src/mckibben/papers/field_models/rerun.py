@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.base import Block
+from mckibben.blocks.hysteresis.pi import PI
 from mckibben.comparison.columns import columns_of_board
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.ranking import compare

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mckibben import registry
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.kept import Kept
 from mckibben.errors import ModelWarning
 from mckibben.papers.keeping import fitted

@@ -16,9 +16,9 @@ identified. It is printed for 0.1 Hz; at other rates it extrapolates.
 from __future__ import annotations
 
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.fields import DISPLACEMENT, Channel
+from mckibben.blocks.fields import DISPLACEMENT, Channel
+from mckibben.blocks.hysteresis.rate_dependent_pi import RateDependentPI
 from mckibben.blocks.memoryless.polynomial import Polynomial
-from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 
 THRESHOLDS = (0.0, 0.0101, 0.0296, 0.2596, 0.4318, 0.8309, 1.6003, 1.9544, 3.9537, 4.95)
 """r_i [V]."""

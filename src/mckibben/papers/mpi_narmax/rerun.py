@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mckibben import registry
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.kept import Kept
 from mckibben.control import (
     BlockController,

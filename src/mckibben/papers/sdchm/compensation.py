@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.comparison.kept import Kept

@@ -13,7 +13,7 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.kept import Kept
 from mckibben.papers.keeping import fitted
 from mckibben.papers.reproduction import Progress

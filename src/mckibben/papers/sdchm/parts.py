@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from mckibben import registry
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.metrics import err
 from mckibben.papers.reproduction import Cell, Table

@@ -6,8 +6,8 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Table 3.
 
 from __future__ import annotations
 
-from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.coupling import Coupling
+from mckibben.blocks.fields import Channel
 
 
 def coupling() -> Coupling:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Block
+from mckibben.blocks.base import Block
 from mckibben.comparison.free_run import run_free
 from mckibben.control.identified import known_ranges
 from mckibben.errors import MckibbenError, ModelError

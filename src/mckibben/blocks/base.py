@@ -1,0 +1,587 @@
+"""What a block is: an immutable parameter set with dynamics.
+
+A block is one compiled kernel with its coefficients, or composes other blocks. Both kinds *bind*: given
+state, input and output arrays they return a function without arguments that runs them, and everything
+else here is built on that.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
+from mckibben.blocks import saving
+from mckibben.blocks.fields import Channel, Initial
+from mckibben.blocks.kernels import Step, in_scratch
+from mckibben.blocks.linear import LinearSystem, Polynomials, as_control, as_scipy
+from mckibben.blocks.parameters import Parametrised
+from mckibben.blocks.running import Stream, refuse_time, run_many
+from mckibben.errors import DataError, ModelError
+from mckibben.recording import Recording
+from mckibben.system.compiling import bound
+from mckibben.system.showing import DrawsItself
+
+if TYPE_CHECKING:
+    from scipy.signal import dlti, lti
+
+    from control import StateSpace, TransferFunction
+
+Run = Callable[[], None]
+Kernel = Step
+Start = Callable[..., None]
+
+VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
+"""Named starts, and whether a start kernel takes them as if nothing had happened before.
+
+"fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamics.linear_start`."""
+
+Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+"""Names of fields of channels: driven, scheduling, and given."""
+
+SEVERAL: Ports = ("driven",), ("scheduled",), ("given",)
+"""Of blocks of several channels."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Arithmetic operations of a step, roughly: usual and at worst."""
+
+    usual: int
+    worst: int
+
+    def __add__(self, other: Cost) -> Cost:
+        return Cost(self.usual + other.usual, self.worst + other.worst)
+
+    @classmethod
+    def of(cls, numbers: Array, n_states: int) -> Cost:
+        """Return the cost of one pass: about two operations a number, four a state."""
+        operations = 2 * numbers.size + 4 * n_states
+        return cls(operations, operations)
+
+
+class Board(Protocol):
+    """Where blocks are laid out as calls in order; signals are named by text."""
+
+    def call(self, block: Block, given: Sequence[str]) -> list[str]:
+        """Run a block on signals, and return those that it gives."""
+
+    def add(self, terms: Sequence[str]) -> str:
+        """Return the sum of signals."""
+
+    def resume(self, state: Sequence[float]) -> None:
+        """Start the blocks called last from a state of them all."""
+
+
+class Block(DrawsItself, Parametrised):
+    """An immutable parameter set with dynamics.
+
+    Concrete blocks are frozen dataclasses, registered under `kind`. They know their inputs and
+    outputs, their state, how to run, and where it exists their exact inverse. They know nothing of
+    data or fitting.
+    """
+
+    face: ClassVar[str] = "block"
+
+    kernel: ClassVar[Kernel]
+    """Advances one sample, ``kernel(coefficients, state, inputs, outputs)``. One with a parameter
+    ``scratch`` behind the state is given `n_scratch` numbers to compute in."""
+
+    start_kernel: ClassVar[Start | None] = None
+    """Fills the state, ``start_kernel(coefficients, state, first inputs, virgin)``, by a named rule."""
+
+    ports: ClassVar[Ports] = ("input",), (), ("output",)
+    """Fields of the channels driven, of those that schedule, and of those given."""
+
+    rate_dependent: ClassVar[bool] = False
+    """Whether the sample time matters to any block of this class."""
+
+    path_dependent: ClassVar[bool] = False
+    """Whether it matters how an input goes from one turning point to the next, as where several
+    muscles find their equilibrium together."""
+
+    of_local_rules: ClassVar[bool] = False
+    """Whether it is made of rules that each know a part of the inputs' joint range, so that nothing says
+    what it gives where none was shown any data."""
+
+    undoing: ClassVar[bool] = False
+    """Whether blocks of this class undo another, which `undone` gives."""
+
+    increasing: ClassVar[tuple[str, ...]] = ()
+    """Fields of numbers in increasing order, which single precision must not make one."""
+
+    filters: ClassVar[bool] = False
+    """Whether it is linear with poles of its own, which may be too slow for single precision."""
+
+    sample_time: float | None = None
+    """Time between samples that a discrete block is bound to [s]; None for any."""
+
+    samples_ahead: int = 0
+    """By how many samples it wants references before they are due, to plan with."""
+
+    dead_time: float = 0.0
+    """By how long outputs come late, which its inverse leaves as it is [s]."""
+
+    @property
+    def title(self) -> str:
+        """What the block is called among blocks: its kind, and of an inverse, of what."""
+        return self.kind
+
+    @property
+    def needs_double(self) -> str:
+        """Why single precision will not do, as part of a sentence; empty where it does."""
+        return ""
+
+    # -- channels ----------------------------------------------------------------------------
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Driven inputs, then scheduling inputs."""
+        driven, scheduling, _ = self.ports
+        return self._channels(*driven, *scheduling)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Names of the inputs that schedule the block but are not driven through it."""
+        return tuple(channel.name for channel in self._channels(*self.ports[1]))
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """Outputs."""
+        return self._channels(*self.ports[2])
+
+    def _channels(self, *fields: str) -> tuple[Channel, ...]:
+        found: list[Channel] = []
+        for field in fields:
+            value = getattr(self, field)
+            found += value if isinstance(value, tuple) else [value]
+        return tuple(found)
+
+    def check_channels(self) -> None:
+        """Refuse names that repeat, or no channels at all."""
+        for channels in (self.inputs, self.outputs):
+            names = [channel.name for channel in channels]
+            if not names or len(set(names)) < len(names):
+                raise ModelError(
+                    f"channels of {self.kind!r} are {names}. Remedy: give each a name of its own."
+                )
+
+    @property
+    def input_limits(self) -> tuple[float, float]:
+        """Lowest and highest input; infinite where the block has no field ``input_range``."""
+        ends: tuple[float, float] | None = getattr(self, "input_range", None)
+        return (-np.inf, np.inf) if ends is None else ends
+
+    @property
+    def n_missable(self) -> int:
+        """How many of the last inputs may be absent: NaN, in a stream, in C, and in arrays."""
+        return 0
+
+    # -- memory ------------------------------------------------------------------------------
+
+    @property
+    def n_states(self) -> int:
+        """Length of the state vector."""
+        return 0
+
+    @property
+    def n_scratch(self) -> int:
+        """How many numbers a step computes in beside the state, for code that cannot allocate."""
+        return 0
+
+    @property
+    def start(self) -> Initial:
+        """Memory before the first sample that is used where none is given."""
+        return getattr(self, "initial", "first_sample")
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state before the first sample, shape (n_states,), a new array.
+
+        Parameters
+        ----------
+        first : array, shape (n_inputs,)
+            The first input sample.
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            As if the input had only risen to the first sample; as if nothing had ever happened; or
+            the state itself. Default is the block's own.
+        """
+        start = self.start if initial is None else initial
+        if not isinstance(start, str) or start not in VIRGIN:
+            return explicit_state(self, start)
+        state = np.zeros(self.n_states)
+        kernel = self.start_kernel
+        if kernel is not None:
+            given = np.ascontiguousarray(first, dtype=np.float64)
+            scratch = scratch_of(kernel, self.n_scratch)
+            kernel(self.start_numbers(), state, *scratch, given, VIRGIN[start])
+        return state
+
+    def start_numbers(self) -> Array:
+        """Return the coefficients as starts read them, which no sample time changes."""
+        return self.coefficients(self.sample_time or 1.0)
+
+    def state_at(self, first: Array, output: Array) -> Array | None:
+        """Return the state at rest at a first input where the output is known, for models of it.
+
+        None, by default, where past outputs are no part of the state.
+        """
+        del first, output
+        return None
+
+    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
+        """Return the start to use on a recording, which some rules look at; by default as given."""
+        del recording
+        return initial
+
+    # -- its kernel --------------------------------------------------------------------------
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return the numbers that the kernel reads, one-dimensional; by default the parameters.
+
+        Raises
+        ------
+        ModelError
+            If the block has no kernel: it is composed of others, each of which has its own.
+        """
+        del sample_time
+        if getattr(self, "kernel", None) is None:
+            raise ModelError(
+                f"{self.kind!r} is neither one kernel nor a composition, so it cannot be exported. "
+                "Remedy: compose it of blocks."
+            )
+        return self.pack()
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the block over ``inputs`` into ``outputs``, changing ``state``.
+
+        ``inputs`` has shape (n, n_inputs) and ``outputs`` (n, n_outputs), both C-contiguous; all
+        arrays are used in place at every call, so the caller may refill ``inputs`` between calls.
+        """
+        numbers, kernel = self.coefficients(sample_time), self.kernel
+        scratch = scratch_of(kernel, self.n_scratch)
+        return bound(kernel.batch, numbers, state, *scratch, inputs, outputs)
+
+    @property
+    def c_kernels(self) -> tuple[Callable[..., Any], ...]:
+        """Kernels of a step, and of the start if it has memory, which C is translated from."""
+        step, start = getattr(self, "kernel", None), self.start_kernel
+        if step is None or (self.n_states and start is None):
+            return ()
+        return (step, start) if self.n_states and start is not None else (step,)
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return what a step costs."""
+        return Cost.of(self.coefficients(sample_time), self.n_states)
+
+    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Give the name and the numbers of every field that is `increasing`."""
+        for name in self.increasing:
+            yield name, getattr(self, name)
+
+    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+        """Lay the block out on a board, and return the signals that it gives."""
+        return board.call(self, given)
+
+    def inverse(self) -> Block:
+        """Return the block that undoes this one.
+
+        Raises
+        ------
+        ModelError
+            If this block has no inverse; the text says which condition fails and what to do.
+        """
+        raise ModelError(
+            f"{self.kind!r} has no exact inverse. Remedy: use an invertible model (pi, gpi, mpi)."
+        )
+
+    @property
+    def undone(self) -> Block | None:
+        """Of a compensator, the model that it undoes; None where it undoes none, as feedback alone."""
+        try:
+            return self.inverse()
+        except ModelError:
+            return None
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that can be reached whatever happened before, lowest and highest.
+
+        Each has shape (n_outputs,). Bounded by the block's own input range where it has one;
+        infinite where it has none.
+        """
+        n = len(self.outputs)
+        return np.full(n, -np.inf), np.full(n, np.inf)
+
+    def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the outputs that can be reached where the inputs between two ends can be.
+
+        A block without memory must be monotone; one with memory answers with its own `reachable`.
+        """
+        if self.n_states == 0 and not self.scheduling and np.isfinite([*low, *high]).all():
+            first, second = np.sort(self.simulate(np.array([low, high])), axis=0)
+            return first, second
+        return self.reachable()
+
+    # -- linear blocks -----------------------------------------------------------------------
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return a linear block as a state-space system; its state is 0 at the operating point.
+
+        Parameters
+        ----------
+        sample_time : float, optional
+            Time between samples [s]; needed by blocks that are continuous in time.
+
+        Raises
+        ------
+        ModelError
+            If it is not linear.
+        """
+        del sample_time
+        raise ModelError(
+            f"{self.kind!r} is not linear, so it has no transfer function. Remedy: hand over a linear "
+            "model (oe, arx, armax, bj, p1 to p3), or look at its describing function."
+        )
+
+    def continuous(self) -> Polynomials | None:
+        """Return the transfer function of what is continuous in time, without dead time; else None."""
+        return None
+
+    def to_scipy(self, sample_time: float | None = None) -> dlti | lti:
+        """Return a linear model as a system of SciPy; see `mckibben.blocks.linear.as_scipy`."""
+        return as_scipy(self, sample_time)
+
+    def to_control(self, sample_time: float | None = None) -> StateSpace | TransferFunction:
+        """Return a linear model as one of python-control; see `mckibben.blocks.linear.as_control`."""
+        return as_control(self, sample_time)
+
+    @classmethod
+    @abstractmethod
+    def example(cls) -> Block:
+        """Return a small, typical block of this class, for documentation and contract tests."""
+
+    # -- running -----------------------------------------------------------------------------
+
+    @overload
+    def simulate(
+        self, data: Recording, *, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Recording: ...
+
+    @overload
+    def simulate(
+        self, data: ArrayLike, *, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Array: ...
+
+    def simulate(
+        self,
+        data: Recording | ArrayLike,
+        *,
+        initial: Initial | None = None,
+        sample_time: float | None = None,
+    ) -> Recording | Array:
+        """Run free over a recording or an array of inputs.
+
+        Parameters
+        ----------
+        data : Recording or array_like, shape (n,) or (n, n_inputs)
+            A recording needs a channel for every input.
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            Memory before the first sample; default is the block's own.
+        sample_time : float, optional
+            Time between samples [s]; for arrays of a rate-dependent block only.
+
+        Returns
+        -------
+        Recording or array
+            The same kind: a recording of the inputs and the modelled outputs, or an array of shape
+            (n, n_outputs), or (n,) for one output from a one-dimensional input.
+
+        Raises
+        ------
+        DataError
+            On absent channels, wrong units or shapes, or values that are not finite.
+        ModelError
+            If the block is rate-dependent and the data have no time.
+        """
+        if isinstance(data, Recording):
+            inputs = self._inputs_from(data)
+            outputs = self._run(inputs, data.sample_time, self.start_on(data, initial))
+            if not np.isfinite(outputs).all():
+                raise ModelError(
+                    f"the output of {self.kind!r} is not finite on {data.name}. "
+                    "Remedy: this model does not suit these data; identify it again."
+                )
+            names = [channel.name for channel in self.outputs]
+            modelled = dict(zip(names, outputs.T, strict=True))
+            units = {channel.name: channel.unit for channel in self.outputs}
+            kept = data.select([channel.name for channel in self.inputs])
+            return kept.with_channels(units, **modelled)
+        try:
+            array = np.asarray(data, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise DataError(
+                f"these are no inputs ({error})", remedy="give a recording or an array of numbers"
+            ) from None
+        outputs = self._run(self._inputs_from_array(array), sample_time, initial)
+        return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
+
+    def stream(self, sample_time: float | None = None, *, initial: Initial | None = None) -> Stream:
+        """Return a stepper for use sample by sample, in the state before the first sample.
+
+        Parameters
+        ----------
+        sample_time : float, optional
+            Time between steps [s]; needed by rate-dependent blocks.
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            Memory before the first step; default is the block's own.
+        """
+        return Stream(self, sample_time, initial)
+
+    def simulate_many(
+        self,
+        parameters: ArrayLike,
+        data: ArrayLike,
+        *,
+        initial: Initial | None = None,
+        sample_time: float | None = None,
+    ) -> Array:
+        """Run many parameter sets of this structure over the same inputs, on all cores.
+
+        Parameters
+        ----------
+        parameters : array_like, shape (k, n_parameters)
+            One set a row, as `pack` gives them.
+        data : array_like, shape (n,) or (n, n_inputs)
+            Inputs.
+        initial, sample_time
+            As for `simulate`.
+
+        Returns
+        -------
+        array, shape (k, n), or (k, n, n_outputs) for several outputs
+        """
+        sets = np.atleast_2d(np.asarray(parameters, dtype=np.float64))
+        blocks = [self.unpack(row) for row in sets]
+        inputs = self._inputs_from_array(np.asarray(data, dtype=np.float64))
+        outputs = run_many(blocks, inputs, sample_time=sample_time, initial=initial)
+        return outputs[:, :, 0] if outputs.shape[2] == 1 else outputs
+
+    def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
+        """Return the state after a recording, shape (n_states,): its memory, to start another with."""
+        inputs = self._inputs_from(data)
+        state = self.initial_state(inputs[0], self.start_on(data, initial))
+        self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
+        return state
+
+    def _run(self, inputs: Array, sample_time: float | None, initial: Initial | None) -> Array:
+        state = self.initial_state(inputs[0], initial)
+        outputs = np.empty((inputs.shape[0], len(self.outputs)))
+        refuse_time(sample_time)
+        self.check_time(sample_time)
+        self.bind(sample_time, state, inputs, outputs)()
+        self.report(state)
+        return outputs
+
+    def check_time(self, sample_time: float | None) -> None:
+        """Warn where a sample time changes what the block is, or a part of it."""
+        for part in getattr(self, "parts", ()):
+            part.check_time(sample_time)
+
+    def report(self, state: Array) -> None:
+        """Warn of what happened during a run that its user should know, read off the final state."""
+        del state
+
+    def n_clipped(self, state: Array) -> int:
+        """Return how many samples were clipped, or not solved, in a run that ended in a state."""
+        del state
+        return 0
+
+    def _inputs_from(self, recording: Recording) -> Array:
+        for channel in self.inputs:
+            if channel.name in recording and recording.units[channel.name] != channel.unit:
+                raise DataError(
+                    f"the model wants this input in {channel.unit or 'no unit'}, "
+                    f"the recording has {recording.units[channel.name] or 'no unit'}",
+                    file=recording.source,
+                    channel=channel.name,
+                    remedy="convert the recording, or name its unit when reading it",
+                )
+        return np.ascontiguousarray(recording.matrix(channel.name for channel in self.inputs))
+
+    def _inputs_from_array(self, array: Array) -> Array:
+        n_inputs = len(self.inputs)
+        table = array[:, np.newaxis] if array.ndim == 1 else array
+        if table.ndim != 2 or table.shape[1] != n_inputs or table.shape[0] == 0:
+            raise DataError(
+                f"inputs have shape {array.shape}, but {self.kind!r} has {n_inputs} input(s)",
+                remedy=f"give an array of shape (n, {n_inputs})"
+                + (" or (n,)" if n_inputs == 1 else ""),
+            )
+        finite = np.isfinite(table)
+        finite[:, n_inputs - self.n_missable :] = True
+        if not finite.all():
+            row, column = np.argwhere(~finite)[0]
+            raise DataError(
+                f"the input is {table[row, column]}",
+                channel=self.inputs[column].name,
+                row=int(row) + 1,
+                remedy="remove or interpolate samples that are not finite",
+            )
+        return np.ascontiguousarray(table)
+
+    # -- saving ------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the block as a JSON-ready dict, exact to the last bit."""
+        return saving.to_dict(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the block as JSON that a person can read; see `mckibben.load`."""
+        saving.save(self, path)
+
+
+def explicit_state(block: Block, initial: Initial) -> Array:
+    """Return an explicit initial state after checking its length."""
+    if isinstance(initial, str):
+        raise ModelError(
+            f"{block.kind!r} knows no start {initial!r}. Remedy: give 'first_sample', 'virgin', or "
+            f"{block.n_states} numbers."
+        )
+    state = np.array(initial, dtype=np.float64)
+    if state.shape != (block.n_states,) or not np.isfinite(state).all():
+        raise ModelError(
+            f"{block.kind!r} has {block.n_states} states, the initial state given has shape "
+            f"{state.shape}. Remedy: give {block.n_states} finite numbers, or 'first_sample'."
+        )
+    return state
+
+
+def scratch_of(kernel: Callable[..., Any], size: int) -> list[Array]:
+    """Return the scratch that a kernel computes in, as a list of one array, or of none."""
+    return [np.zeros(size)] if in_scratch(kernel) else []
+
+
+def needs_sample_time(kind: str, sample_time: float | None) -> float:
+    """Return the sample time, or say that a rate-dependent block cannot do without."""
+    if sample_time is None or not sample_time > 0:
+        raise ModelError(
+            f"{kind!r} depends on rate and needs a sample time, but the data have no time. "
+            "Remedy: read the recording with a time column or --rate, or give sample_time."
+        )
+    return sample_time
+
+
+def own_sample_time(kind: str, own: float, sample_time: float | None) -> float:
+    """Return the sample time of a discrete block, after checking that the data have the same."""
+    step = needs_sample_time(kind, sample_time)
+    if abs(step - own) > 1e-3 * own:
+        raise ModelError(
+            f"{kind!r} holds for a sample time of {own:g} s, but the data have {step:g} s. Remedy: "
+            f"resample them to {own:g} s, or identify the model again."
+        )
+    return own

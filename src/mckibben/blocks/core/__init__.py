@@ -1,1 +1,0 @@
-"""What a block is, and what blocks are made with: channels, kernels, parameters, inverses, files."""

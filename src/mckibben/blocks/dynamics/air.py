@@ -1,0 +1,316 @@
+"""Air and command: from what a valve or regulator is told to the pressure that is there.
+
+The command u (a voltage, or a pressure asked for) is a goal for the pressure x, while filling and while
+venting another, between which the valve stays closed:
+
+    filling  T_f x' = g_f - x   where  g_f = clip(K (u - u_0 - h/2)) > x,
+    venting  T_v x' = g_v - x   where  g_v = clip(K (u - u_0 + h/2)) < x,
+
+clipped to the pressures of surroundings and supply. What is measured is x, late by a dead time. Within a
+sample the command is held, so x goes one way only and x <- x + (1 - exp(-T / T_f)) (g_f - x) is exact at
+any sample time. As of `Creep`, the output of a sample is that at its end; where command and pressure are
+read at one instant, the sample for which the command was held is part of the dead time.
+
+The inverse is in closed form and knows nothing of the dead time: what comes of it comes late by that,
+unless it is given its reference ahead (`mckibben.control.preview`).
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from annotated_types import Ge, Gt, Le
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.fields import PRESSURE, STRICT, Channel, ChannelField, StoredInitial
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.errors import ModelError, ModelWarning
+
+LONGEST_DEAD_TIME = 254
+"""Samples."""
+
+LONGEST_LAG = 1e6
+"""Seconds."""
+
+APPROACHED = 0.05
+"""Share of the range at both ends that lags only creep through, which is not counted as reachable."""
+
+WHOLE = 1e-6
+"""Share of a sample by which a dead time may be off a whole number of them."""
+
+
+@kernel
+def _moved(c: Array, x: float, u: float) -> float:
+    """Return the pressure after a sample."""
+    filling = min(max(c[0] * (u - c[1]), c[5]), c[6])
+    if filling > x:
+        return x + c[3] * (filling - x)
+    venting = min(max(c[0] * (u - c[2]), c[5]), c[6])
+    if venting < x:
+        return x + c[4] * (venting - x)
+    return x
+
+
+@kernel
+def _middle_of(c: Array) -> float:
+    """Return the command that aims for no pressure, in the middle between filling and venting."""
+    return 0.5 * (c[1] + c[2])
+
+
+@kernel
+def _resting(c: Array, u: float, virgin: bool) -> float:
+    """Return the pressure where a command leads; or, virgin, that of the surroundings, or 0."""
+    if virgin:
+        return c[5] if c[5] > -math.inf else 0.0
+    return min(max(c[0] * (u - _middle_of(c)), c[5]), c[6])
+
+
+@step
+def air_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; the state is [pressure, past pressures, latest first].
+
+    Coefficients are [gain, offset while filling, while venting, share of the way that a sample fills,
+    that it vents, lowest, highest pressure, dead time in samples].
+    """
+    late = int(coefficients[7])
+    state[0] = _moved(coefficients, state[0], inputs[0])
+    outputs[0] = state[late]
+    for k in range(late, 0, -1):
+        state[k] = state[k - 1]
+
+
+@kernel
+def air_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at rest where the first command leads, or at the pressure of the surroundings."""
+    state[:] = _resting(coefficients, inputs[0], virgin)
+
+
+@step
+def air_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Undo the model; coefficients are [forward ones, lowest, highest command].
+
+    The state is [pressure, samples clipped].
+    """
+    c = coefficients
+    lowest, highest = c[c.size - 2], c[c.size - 1]
+    middle = _middle_of(c)
+    wanted, x = inputs[0], state[0]
+    # pressures that differ by less are held, in the middle between filling and venting
+    held = ROUNDING * (abs(wanted) + c[0] * abs(middle))
+    if wanted > x + held:
+        u = min(x + (wanted - x) / c[3], c[6]) / c[0] + c[1]
+    elif wanted < x - held:
+        u = max(x + (wanted - x) / c[4], c[5]) / c[0] + c[2]
+    else:
+        wanted = x
+        u = x / c[0] + middle
+    u = min(max(u, lowest), highest)
+    reached = _moved(c, x, u)
+    if abs(reached - wanted) > SLACK * (abs(wanted) + c[0] * abs(u)):
+        state[1] += 1.0
+        state[0] = reached
+    else:
+        state[0] = wanted
+    outputs[0] = u
+
+
+@kernel
+def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at rest where the command for the first pressure leads, within its limits."""
+    c = coefficients
+    u = min(max(inputs[0] / c[0] + _middle_of(c), c[c.size - 2]), c[c.size - 1])
+    state[0], state[1] = _resting(c, u, virgin), 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class Air(Invertible):
+    """Valve or regulator, and the air behind it, from command to measured pressure.
+
+    Parameters
+    ----------
+    gain : float
+        K, pressure per command; positive.
+    offset : float
+        u_0 [command]: where the goal is 0, in the middle between filling and venting.
+    hysteresis : float
+        h [command]: by how much the command for a pressure is higher while it rises than while it
+        falls; not negative.
+    filling_time, venting_time : float
+        Time constants T_f and T_v [s]; 0 for none.
+    dead_time : float
+        By how long the pressure comes late [s]: up to 254 samples. It is rounded to whole samples, with
+        a warning where that changes it.
+    ambient, supply : float or None
+        Lowest and highest pressure that the valve can aim for; None for no such limit.
+    input_range : (float, float), optional
+        Lowest and highest command that the inverse may give. Default none.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest where the first command leads, in the middle
+        between filling and venting; or at the ambient pressure, or 0.
+    input, output : Channel
+        Command, and pressure.
+    """
+
+    kind: ClassVar[str] = "air"
+    kernel: ClassVar[Kernel] = air_step
+    start_kernel: ClassVar[Start] = air_start
+    inverse_kernel: ClassVar[Kernel] = air_inverse_step
+    inverse_start_kernel: ClassVar[Start] = air_inverse_start
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = (
+        "gain",
+        "offset",
+        "hysteresis",
+        "filling_time",
+        "venting_time",
+    )
+    notation: ClassVar[Notation] = Notation(
+        r"\begin{cases} T_f \dot{x} = g_f - x & \text{filling, } g_f = K (u - u_0 - h/2) "
+        r"> x \\ T_v \dot{x} = g_v - x & \text{venting, } g_v = K (u - u_0 + h/2) < x "
+        r"\end{cases}",
+        "y(t) = x(t - T_d)",
+        gain="K [{y}/{u}]",
+        offset="u_0 [{u}]",
+        hysteresis="h [{u}]",
+        filling_time="T_f [s]",
+        venting_time="T_v [s]",
+        dead_time="T_d [s]",
+        ambient=r"p_{\min} [{y}]",
+        supply=r"p_{\max} [{y}]",
+    )
+
+    gain: Annotated[FiniteFloat, Gt(0)]
+    offset: FiniteFloat
+    hysteresis: Annotated[FiniteFloat, Ge(0)]
+    filling_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
+    venting_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
+    dead_time: Annotated[FiniteFloat, Ge(0)] = 0.0
+    ambient: FiniteFloat | None = 0.0
+    supply: FiniteFloat | None = None
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = Channel("voltage", "V")
+    output: ChannelField = PRESSURE
+
+    def __post_init__(self) -> None:
+        check_input_range(self.kind, self.input_range)
+        lowest, highest = self.pressures
+        if not lowest < highest:
+            raise ModelError(
+                f"{self.kind!r} has an ambient pressure of {lowest:g} and a supply of {highest:g} "
+                f"{self.output.unit}. Remedy: give a supply above the ambient pressure, or None."
+            )
+
+    @property
+    def pressures(self) -> tuple[float, float]:
+        """Lowest and highest pressure aimed for; infinite where there is no limit."""
+        lowest = -math.inf if self.ambient is None else self.ambient
+        highest = math.inf if self.supply is None else self.supply
+        return lowest, highest
+
+    @property
+    def offsets(self) -> tuple[float, float]:
+        """Where the goal is 0 while filling, and while venting [command]."""
+        return self.offset + 0.5 * self.hysteresis, self.offset - 0.5 * self.hysteresis
+
+    @property
+    def n_states(self) -> int:
+        """The pressure and, with a dead time, past ones."""
+        return 1 + (LONGEST_DEAD_TIME if self.dead_time > 0 else 0)
+
+    def goal(self, command: float, way: Literal[-1, 1]) -> float:
+        """Return the pressure where a held command leads: in filling, 1, or in venting, -1."""
+        lowest, highest = self.pressures
+        aimed = self.gain * (command - self.offset - 0.5 * way * self.hysteresis)
+        return min(max(aimed, lowest), highest)
+
+    def dead_samples(self, sample_time: float | None) -> int:
+        """Return the dead time in samples, rounded.
+
+        Raises
+        ------
+        ModelError
+            Without a sample time, or where they are more than 254.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        samples = self.dead_time / step
+        if not samples <= LONGEST_DEAD_TIME + 0.5:
+            raise ModelError(
+                f"a dead time of {self.dead_time:g} s is {samples:.0f} samples. Remedy: a dead time "
+                f"of at most {LONGEST_DEAD_TIME} samples, or a longer sample time."
+            )
+        return round(samples)
+
+    def check_time(self, sample_time: float | None) -> None:
+        """Warn where the dead time is no whole number of samples."""
+        samples = self.dead_samples(sample_time)
+        assert sample_time is not None
+        if abs(self.dead_time / sample_time - samples) > WHOLE:
+            warnings.warn(
+                f"the dead time of {self.kind!r}, {self.dead_time:g} s, is no whole number of samples "
+                f"of {sample_time:g} s: {samples * sample_time:g} s is taken",
+                ModelWarning,
+                stacklevel=4,
+            )
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [gain, offsets, shares of the way, pressures, dead time], for a sample time.
+
+        Raises
+        ------
+        ModelError
+            Without a sample time, or where the dead time is more than 254 samples.
+        """
+        late = self.dead_samples(sample_time)
+        assert sample_time is not None
+        times = (self.filling_time, self.venting_time)
+        shares = [-math.expm1(-sample_time / time) if time > 0 else 1.0 for time in times]
+        return np.array([self.gain, *self.offsets, *shares, *self.pressures, late])
+
+    def start_numbers(self) -> Array:
+        """Return the coefficients at a sample time that its dead time allows."""
+        return self.coefficients(self.dead_time or 1.0)
+
+    @property
+    def n_inverse_states(self) -> int:
+        """The pressure, and the count of samples clipped; past pressures do not matter."""
+        return 2
+
+    def inverse_state(self, state: Array) -> Array:
+        """Return the pressure, and no samples clipped."""
+        return np.array([state[0], 0.0])
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the pressures that can be reached whatever happened before, each of shape (1,).
+
+        With lags the ends of the range are only approached: a twentieth is left out at both. How
+        fast references may change there depends on the lags.
+        """
+        low, high = self.input_limits
+        ends = sorted([self.goal(low, -1), self.goal(high, 1)])
+        lowest, highest = np.array(ends)
+        lags = self.filling_time > 0 or self.venting_time > 0
+        left = APPROACHED * (highest - lowest) if lags and np.isfinite(ends).all() else 0.0
+        return np.array([lowest + left]), np.array([highest - left])
+
+    def inverse_complaint(self, state: Array) -> str:
+        """Tell of references that were clipped."""
+        low, high = self.reachable()
+        return (
+            f"{int(state[-1])} sample(s) of the reference {self.output.name!r} were clipped: they are "
+            f"beyond supply or surroundings, or change faster than {self.input.name} within its limits "
+            f"makes the air flow. Reachable in time is {low[0]:.6g} to {high[0]:.6g} {self.output.unit}"
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a regulator of 0.6 bar/V that vents more slowly than it fills."""
+        return cls(0.6, 0.1, 0.06, 0.03, 0.05, 0.02, 0.0, 6.0, (0.0, 10.0))

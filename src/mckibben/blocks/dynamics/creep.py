@@ -1,0 +1,149 @@
+"""Creep: a visco-elastic follow-up of what goes in, and its exact inverse.
+
+y = u + sum_k c_k x_k,  tau_k x_k' = u - x_k: a spring in series with Kelvin-Voigt elements. Behind a
+hysteresis model it adds the lag (short time constants) and creep (long ones) of a muscle's braid and
+rubber. The input is held from sample to sample, x_k <- a_k x_k + (1 - a_k) u with
+a_k = exp(-T / tau_k), so the output answers at once and the inverse is in closed form.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Vector
+from mckibben.blocks.inverse import Invertible
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.linear import LinearSystem
+from mckibben.blocks.notation import Notation
+from mckibben.errors import ModelError
+
+
+@step
+def creep_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; coefficients are [a, c], the state is x."""
+    n = state.size
+    u = inputs[0]
+    y = u
+    for k in range(n):
+        state[k] = coefficients[k] * state[k] + (1.0 - coefficients[k]) * u
+        y += coefficients[n + k] * state[k]
+    outputs[0] = y
+
+
+@kernel
+def creep_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with the elements at rest: at the first input, or at 0."""
+    state[:] = 0.0 if virgin else inputs[0]
+
+
+@step
+def creep_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Undo the model; coefficients and state as forward."""
+    n = state.size
+    gain = 1.0
+    for k in range(n):
+        gain += coefficients[n + k] * (1.0 - coefficients[k])
+    rest = inputs[0]
+    for k in range(n):
+        rest -= coefficients[n + k] * coefficients[k] * state[k]
+    u = rest / gain
+    for k in range(n):
+        state[k] = coefficients[k] * state[k] + (1.0 - coefficients[k]) * u
+    outputs[0] = u
+
+
+@kernel
+def creep_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with the elements at rest: where the first output is held, or at 0."""
+    crept = 0.0
+    for k in range(state.size):
+        crept += coefficients[state.size + k]
+    state[:] = 0.0 if virgin else inputs[0] / (1.0 + crept)
+
+
+@dataclass(frozen=True, config=STRICT)
+class Creep(Invertible):
+    """Visco-elastic creep behind a model of the immediate response.
+
+    Parameters
+    ----------
+    compliances : sequence of float, length K
+        c_k: creep once it has ended, relative to the immediate response; not negative.
+    time_constants : sequence of float, length K
+        tau_k, how long each creep takes [s]; positive.
+    initial : {"first_sample", "virgin", "fitted"}
+        Where the elements are before the first sample: at rest at the first input, or at 0, or, on
+        recordings whose output is known, where that tells (else at rest at the first input).
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "creep"
+    kernel: ClassVar[Kernel] = creep_step
+    start_kernel: ClassVar[Start] = creep_start
+    inverse_kernel: ClassVar[Kernel] = creep_inverse_step
+    inverse_start_kernel: ClassVar[Start] = creep_inverse_start
+    rate_dependent: ClassVar[bool] = True
+    counts_clipped: ClassVar[bool] = False
+    parameters: ClassVar[tuple[str, ...]] = ("compliances", "time_constants")
+    notation: ClassVar[Notation] = Notation(
+        r"y = u + \sum_k c_k x_k,\quad \tau_k \dot{x}_k = u - x_k",
+        compliances="c_k",
+        time_constants=r"\tau_k [s]",
+    )
+
+    compliances: Vector
+    time_constants: Vector
+    initial: Literal["first_sample", "virgin", "fitted"] = "first_sample"
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        if len(self.compliances) != len(self.time_constants):
+            raise ModelError(
+                f"{self.kind!r} has {len(self.compliances)} compliances and "
+                f"{len(self.time_constants)} time constants. Remedy: give one to each."
+            )
+        if min(self.compliances, default=0.0) < 0 or min(self.time_constants, default=1.0) <= 0:
+            raise ModelError(
+                f"{self.kind!r} has a negative compliance, or a time constant that is not positive. "
+                "Remedy: give compliances of 0 or more, and positive times in seconds."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """One to every Kelvin-Voigt element."""
+        return len(self.compliances)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [decays over a sample, compliances].
+
+        Raises
+        ------
+        ModelError
+            Without a sample time.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        return np.array([*np.exp(-step / np.array(self.time_constants)), *self.compliances])
+
+    def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the outputs that can be reached at once, however far the elements have crept."""
+        crept = float(np.sum(self.compliances))
+        return low + crept * high, high + crept * low
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the elements, each a state."""
+        decays, c = self.coefficients(sample_time).reshape(2, -1)
+        matrices = (np.diag(decays), (1 - decays)[:, np.newaxis], (c * decays)[np.newaxis])
+        at_once = np.array([[1.0 + c @ (1 - decays)]])
+        return LinearSystem(*matrices, at_once, sample_time, np.zeros(1), np.zeros(1))
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a fast and a slow element."""
+        return cls((0.08, 0.05), (1.5, 40.0))

@@ -1,0 +1,346 @@
+"""Continuous-time process models P1, P1Z, P2, P2Z, P2U, P2UZ and P3 with delay, discretised exactly.
+
+Y(s) / U(s) = K (Tz s + 1) / D(s) exp(-Td s), D(s) = (Tp1 s + 1) (Tp2 s + 1) (Tp3 s + 1), or, for a
+pair of poles that may oscillate (U), D(s) = Tw^2 s^2 + 2 zeta Tw s + 1. Names as in MATLAB; the
+P2UZ model is Eq. (11) of "Analysis and modeling of a pneumatic artificial muscle system", whose
+zeta of 9.1 is above 1: any positive one is allowed.
+
+The input goes in straight lines from sample to sample (first-order hold), or is held (zero-order).
+Either way the response is exact, for delays between samples too: the state is carried over each
+corner of the delayed input by matrix exponentials.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from annotated_types import Ge, Gt
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block, Kernel, Start, needs_sample_time
+from mckibben.blocks.dynamics.linear_start import LinearStart
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    FittedInitial,
+    Vector,
+)
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.linear import LinearSystem, Polynomials
+from mckibben.blocks.notation import Notation, tex
+from mckibben.errors import ModelError
+
+LONGEST_DELAY = 254
+"""Samples."""
+
+
+@step
+def process_model_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; the state is [x, past inputs, latest first].
+
+    Coefficients are [n, delay in samples, u_0, y_0, D now, D before, C, three input vectors,
+    matrix].
+    """
+    n, m = int(coefficients[0]), int(coefficients[1])
+    u0, y0 = coefficients[2], coefficients[3]
+    now, before = coefficients[4], coefficients[5]
+    c = coefficients[6:]
+    kept = state.size - 2 * n
+    for k in range(kept - 1, 0, -1):
+        state[n + k] = state[n + k - 1]
+    state[n] = inputs[0] - u0
+    first, second, third = state[n + m], state[n + m + 1], state[n + m + 2]
+    y = now * first + before * second
+    for i in range(n):
+        x = c[n + i] * first + c[2 * n + i] * second + c[3 * n + i] * third
+        for j in range(n):
+            x += c[4 * n + i * n + j] * state[j]
+        state[n + kept + i] = x
+        y += c[i] * x
+    for i in range(n):
+        state[i] = state[n + kept + i]
+    outputs[0] = y + y0
+
+
+@kernel
+def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with the lags at rest: at the first input, or at the operating point."""
+    n = int(coefficients[0])
+    u = 0.0 if virgin else inputs[0] - coefficients[2]
+    state[:] = 0.0
+    state[0] = u
+    state[n : state.size - n] = u
+
+
+@dataclass(frozen=True, config=STRICT)
+class ProcessModel(LinearStart):
+    """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
+
+    Parameters
+    ----------
+    gain : float
+        K, output per input at rest.
+    time_constants : sequence of float
+        Lags Tp1, Tp2, Tp3 [s], or Tw alone where there is a damping; positive.
+    damping : float or None
+        zeta, damping of the pair of poles, positive; makes the pair of poles of P2U.
+    zero_time : float or None
+        Tz, time of the zero [s]; may be negative.
+    delay : float
+        Td, dead time [s], up to 254 samples; not negative.
+    input_offset, output_offset : float
+        The operating point.
+    hold : {"first", "zero"}
+        What the input does between samples: go on in a straight line, or stay.
+    initial : {"first_sample", "virgin", "fitted"} or sequence of float
+        Default memory before the first sample: at rest at the first input, or at the operating
+        point, or, on recordings that have the output, what explains it best (else at rest at the
+        first input).
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "process-model"
+    kernel: ClassVar[Kernel] = process_model_step
+    start_kernel: ClassVar[Start] = process_model_start
+    rate_dependent: ClassVar[bool] = True
+    filters: ClassVar[bool] = True
+    notation: ClassVar[Notation] = Notation(
+        gain="K [{y}/{u}]",
+        time_constants="T_{p,i} [s]",
+        damping=r"\zeta",
+        zero_time="T_z [s]",
+        delay="T_d [s]",
+        input_offset="u_0 [{u}]",
+        output_offset="y_0 [{y}]",
+    )
+
+    gain: FiniteFloat
+    time_constants: Vector
+    damping: Annotated[FiniteFloat, Gt(0)] | None = None
+    zero_time: FiniteFloat | None = None
+    delay: Annotated[FiniteFloat, Ge(0)] = 0.0
+    input_offset: FiniteFloat = 0.0
+    output_offset: FiniteFloat = 0.0
+    hold: Literal["first", "zero"] = "first"
+    initial: FittedInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        n = len(self.time_constants)
+        if (
+            not 1 <= n <= 3
+            or min(self.time_constants) <= 0
+            or (self.damping is not None and n != 1)
+        ):
+            raise ModelError(
+                f"{self.kind!r} has the time constants {self.time_constants}. Remedy: give one to three "
+                "positive ones [s], and one alone with a damping."
+            )
+
+    @property
+    def parameters(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The fields that this structure has."""
+        optional = [n for n in ("damping", "zero_time") if getattr(self, n) is not None]
+        late = ["delay"] if self.delay > 0 else []
+        return ("gain", "time_constants", *optional, *late, "input_offset", "output_offset")
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return 2 if self.damping is not None else len(self.time_constants)
+
+    @property
+    def name(self) -> str:
+        """MATLAB's name of the structure, P1 to P3 with U and Z; a delay adds D."""
+        under = "U" if self.damping is not None else ""
+        return f"P{self.order}{'D' * (self.delay > 0)}{under}{'Z' * (self.zero_time is not None)}"
+
+    @property
+    def n_free(self) -> int:
+        """As many states as there are lags."""
+        return self.order
+
+    @property
+    def n_states(self) -> int:
+        """Of the lags, past inputs, and as many for the lags again, to compute in."""
+        return 2 * self.order + (3 if self.delay == 0 else LONGEST_DELAY + 3)
+
+    def denominator(self) -> Array:
+        """Return D(s), descending powers."""
+        if self.damping is not None:
+            (t,) = self.time_constants
+            return np.array([t**2, 2 * self.damping * t, 1.0])
+        found = np.array([1.0])
+        for t in self.time_constants:
+            found = np.polymul(found, [t, 1.0])
+        return found
+
+    def state_space(self) -> tuple[Array, Array, Array, float]:
+        """Return A, B, C and D of the lags without delay, in controllable form, x_1 being at rest u.
+
+        The state is scaled so that x = (u, 0, ..., 0) at rest, which keeps digits of slow lags.
+        """
+        d = self.denominator()
+        n = d.size - 1
+        a = np.diag(np.ones(n - 1), 1)
+        a[-1] = -d[:0:-1] / d[0]
+        b = np.zeros(n)
+        b[-1] = 1.0 / d[0]
+        c = np.zeros(n)
+        c[0] = self.gain
+        through = 0.0
+        if self.zero_time is not None:
+            if n > 1:
+                c[1] = self.gain * self.zero_time
+            else:
+                through = self.gain * self.zero_time / d[0]
+                c[0] = self.gain - through
+        return a, b, c, through
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return what the kernel reads, for a sample time.
+
+        Raises
+        ------
+        ModelError
+            Without a sample time, or where the delay is more than 254 samples.
+        """
+        return _discretised(self, sample_time).copy()
+
+    def discretised(self, sample_time: float | None) -> Array:
+        """Return the same, computed; see `coefficients`."""
+        step = needs_sample_time(self.kind, sample_time)
+        samples = self.delay / step
+        m = int(np.floor(samples + 1e-9))
+        if m > LONGEST_DELAY:
+            raise ModelError(
+                f"a delay of {self.delay:g} s is {m} samples. Remedy: a delay of at most "
+                f"{LONGEST_DELAY} samples, or a longer sample time."
+            )
+        part = min(max(samples - m, 0.0), 1.0)
+        a, b, c, through = self.state_space()
+        n = b.size
+        early, early_from, early_to = held(a, b, part * step)
+        late, late_from, late_to = held(a, b, (1 - part) * step)
+        vectors = np.zeros((3, n))
+        if self.hold == "first":
+            # the delayed input at the start of the step, at its corner, and at its end
+            start, corner, end = late @ early_from, late @ early_to + late_from, late_to
+            vectors[0] = (1 - part) * end
+            vectors[1] = part * end + corner + (1 - part) * start
+            vectors[2] = part * start
+            now, before = (1 - part) * through, part * through
+        else:
+            # until the corner the input is two samples old, then one
+            vectors[1] = late_from + late_to
+            vectors[2] = late @ (early_from + early_to)
+            now, before = (through, 0.0) if part == 0 else (0.0, through)
+        head = [n, m, self.input_offset, self.output_offset, now, before]
+        return np.concatenate([head, c, vectors.ravel(), (late @ early).ravel()])
+
+    def start_numbers(self) -> Array:
+        """Return [n, 0, u_0], which is what the start reads."""
+        return np.array([self.order, 0.0, self.input_offset])
+
+    def inverse(self) -> Block:
+        """Refuse: the output lags the input, and the inverse would have to differentiate."""
+        raise ModelError(
+            f"{self.kind!r} ({self.name}) has no exact inverse: its output lags its input, so following "
+            "a reference would take derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, "
+            "mpi), or a transfer-function identified with delay=0."
+        )
+
+    def equations(self) -> tuple[str, ...]:
+        """Return the transfer function of this structure."""
+        pair = r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1"
+        return (self._transfer("K", "T_z", pair, "T_{{p,{}}} s + 1", "T_d"),)
+
+    def worked(self) -> tuple[str, ...]:
+        """Return the transfer function with its numbers."""
+        a, b = (tex(float(c)) for c in self.denominator()[:2])
+        zero = "" if self.zero_time is None else tex(self.zero_time)
+        names = [f"{tex(t)}\\,s + 1" for t in self.time_constants]
+        pair = rf"{a}\,s^2 + {b}\,s + 1"
+        return (self._transfer(tex(self.gain), zero, pair, names, tex(self.delay)),)
+
+    def _transfer(
+        self, gain: str, zero: str, pair: str, lag: str | Sequence[str], delay: str
+    ) -> str:
+        lags = [
+            lag.format(k + 1) if isinstance(lag, str) else lag[k]
+            for k in range(len(self.time_constants))
+        ]
+        below = pair if self.damping is not None else "".join(rf"({text})" for text in lags)
+        above = gain if self.zero_time is None else rf"{gain} ({zero}\,s + 1)"
+        late = rf"\, e^{{-{delay}\,s}}" if self.delay else ""
+        return rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}"
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the lags behind the past inputs that the dead time and the hold remember."""
+        found = _discretised(self, sample_time)
+        n, m = int(found[0]), int(found[1])
+        now, before = found[4:6]
+        c, first, second, third = found[6 : 6 + 4 * n].reshape(4, n)
+        lags = found[6 + 4 * n :].reshape(n, n)
+        # [x, u of the last m + 2 samples, latest first]
+        size = n + m + 2
+        driven = np.zeros((n, m + 3))  # by the input now, a sample ago and so on
+        driven[:, m], driven[:, m + 1], driven[:, m + 2] = first, second, third
+        at_once = np.zeros(m + 3)
+        at_once[m], at_once[m + 1] = now, before
+        a, b = np.zeros((size, size)), np.zeros((size, 1))
+        a[:n, :n], a[:n, n:], b[:n, 0] = lags, driven[:, 1:], driven[:, 0]
+        a[n + 1 :, n:-1], b[n, 0] = np.eye(m + 1), 1.0
+        given = np.concatenate([c @ lags, c @ driven[:, 1:] + at_once[1:]])[np.newaxis]
+        through = np.array([[c @ driven[:, 0] + at_once[0]]])
+        offsets = np.array([self.input_offset]), np.array([self.output_offset])
+        return LinearSystem(a, b, given, through, sample_time, *offsets)
+
+    def continuous(self) -> Polynomials:
+        """Return the lags and the zero.
+
+        Raises
+        ------
+        ModelError
+            If there is a dead time, which polynomials cannot hold.
+        """
+        if self.delay > 0:
+            raise ModelError(
+                f"{self.kind!r} has a dead time of {self.delay:g} s, which a continuous transfer "
+                "function has no place for. Remedy: give a sample time."
+            )
+        zero = [] if self.zero_time is None else [self.gain * self.zero_time]
+        return Polynomials((*zero, self.gain), tuple(self.denominator().tolist()))
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the P2UZ model that the paper prints."""
+        return cls(6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
+
+
+@lru_cache(maxsize=8)
+def _discretised(model: ProcessModel, sample_time: float | None) -> Array:
+    return model.discretised(sample_time)  # once for many runs of one model
+
+
+def held(a: Array, b: Array, step: float) -> tuple[Array, Array, Array]:
+    """Return how a state goes on over a step, and how much of the input at its start and end joins it.
+
+    For x' = A x + B v with v going in a straight line: x+ = Phi x + G v_start + H v_end.
+    """
+    from scipy.linalg import expm
+
+    n = b.size
+    whole = np.zeros((n + 2, n + 2))
+    whole[:n, :n], whole[:n, n], whole[n, n + 1] = a * step, b * step, 1.0
+    found = expm(whole)
+    return found[:n, :n], found[:n, n] - found[:n, n + 1], found[:n, n + 1]

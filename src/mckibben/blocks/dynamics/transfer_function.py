@@ -1,0 +1,299 @@
+"""Discrete transfer function: what ARX, ARMAX, output-error and Box-Jenkins models come to free-running.
+
+y_t - y_0 = B(q) / F(q) (u_t - u_0),  B = b_0 + b_1 q^-1 + ...,  F = 1 + f_1 q^-1 + ...
+
+Of the models named, B / F is what a free run needs; the noise model beside it, C / D, says what past
+errors tell of coming ones, and only `predict` looks at it. The inverse is F / B. It exists where the
+output answers at once (b_0 is not zero) and all zeros of B lie within the unit circle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge, Gt
+from numpy.typing import NDArray
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Kernel, Start, own_sample_time
+from mckibben.blocks.dynamics.linear_start import LinearStart
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Coefficients,
+    FittedInitial,
+)
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.linear import LinearSystem, Polynomials
+from mckibben.blocks.notation import FEW, Notation, summed
+from mckibben.errors import ModelError
+from mckibben.recording import Recording
+
+
+@step
+def transfer_function_step(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the filter in transposed direct form; coefficients are [u_0, y_0, b, f, gain]."""
+    n = state.size
+    b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
+    u = inputs[0] - coefficients[0]
+    y = b[0] * u
+    if n > 0:
+        y += state[0]
+    for i in range(n - 1):
+        state[i] = state[i + 1] + b[i + 1] * u - f[i + 1] * y
+    if n > 0:
+        state[n - 1] = b[n] * u - f[n] * y
+    outputs[0] = y + coefficients[1]
+
+
+@kernel
+def transfer_function_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start the filter at rest: at the first input, or at the operating point."""
+    n = state.size
+    b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
+    u = 0.0 if virgin else inputs[0] - coefficients[0]
+    y = coefficients[4 + 2 * n] * u
+    coming = 0.0
+    for i in range(n, 0, -1):
+        coming += b[i] * u - f[i] * y
+        state[i - 1] = coming
+
+
+@dataclass(frozen=True, config=STRICT)
+class TransferFunction(LinearStart):
+    """Discrete transfer function about an operating point.
+
+    Parameters
+    ----------
+    numerator : sequence of float
+        b_0, b_1, ..., what the input adds at once and samples later; leading zeros are
+        delays. At least one.
+    denominator : sequence of float
+        f_1, f_2, ..., what of past outputs goes on (the leading 1 is left out); may be empty.
+    sample_time : float
+        Time between samples that it holds for [s]; positive.
+    input_offset, output_offset : float
+        u_0 and y_0, the operating point.
+    initial : {"first_sample", "virgin", "fitted"} or sequence of float
+        Default memory before the first sample: at rest at the first input, or at u_0, or, on recordings
+        that have the output, what explains it best (else at rest at the first input).
+    input, output : Channel
+        Channel driven and channel given.
+    noise_numerator, noise_denominator : sequence of float
+        c_1, c_2, ... and d_1, d_2, ... of the noise model C / D, its leading ones left out.
+    noise_deviation : float or None
+        Standard deviation of the white noise that drives it; None where it is not known.
+    """
+
+    kind: ClassVar[str] = "transfer-function"
+    kernel: ClassVar[Kernel] = transfer_function_step
+    start_kernel: ClassVar[Start] = transfer_function_start
+    rate_dependent: ClassVar[bool] = True
+    filters: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = (
+        "numerator",
+        "denominator",
+        "input_offset",
+        "output_offset",
+    )
+    notation: ClassVar[Notation] = Notation(
+        r"y_t - y_0 = \frac{B(q)}{F(q)} (u_t - u_0) + \frac{C(q)}{D(q)} e_t",
+        r"B(q) = \sum_k b_k q^{-k},\quad F(q) = 1 + \sum_k f_k q^{-k}",
+        numerator="b_k from 0 [{y}/{u}]",
+        denominator="f_k",
+        sample_time="T [s]",
+        input_offset="u_0 [{u}]",
+        output_offset="y_0 [{y}]",
+        noise_numerator="c_k",
+        noise_denominator="d_k",
+        noise_deviation=r"\sigma_e [{y}]",
+    )
+
+    numerator: Coefficients
+    denominator: Coefficients
+    sample_time: Annotated[FiniteFloat, Gt(0)]
+    input_offset: FiniteFloat = 0.0
+    output_offset: FiniteFloat = 0.0
+    initial: FittedInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+    noise_numerator: Coefficients = ()
+    noise_denominator: Coefficients = ()
+    noise_deviation: Annotated[FiniteFloat, Ge(0)] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.numerator:
+            raise ModelError(
+                f"{self.kind!r} has no numerator. Remedy: give one coefficient or more."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """The order."""
+        return max(len(self.numerator) - 1, len(self.denominator))
+
+    @property
+    def n_free(self) -> int:
+        """As many states as there are poles."""
+        return len(self.denominator)
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """Poles in the z plane."""
+        return np.asarray(np.roots([1.0, *self.denominator]), dtype=np.complex128)
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all poles lie within the unit circle."""
+        return bool(np.all(np.abs(self.poles) < 1))
+
+    @property
+    def gain(self) -> float:
+        """Output per input at rest; infinite for an integrator."""
+        whole = 1.0 + float(np.sum(self.denominator))
+        return float(np.sum(self.numerator)) / whole if whole != 0 else float("inf")
+
+    def _padded(self) -> tuple[Array, Array]:
+        n = self.n_states
+        b = np.pad(np.array(self.numerator), (0, n + 1 - len(self.numerator)))
+        f = np.pad(np.array([1.0, *self.denominator]), (0, n - len(self.denominator)))
+        return b, f
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [u_0, y_0, b, f, gain], with no gain where that is infinite.
+
+        Raises
+        ------
+        ModelError
+            Without a sample time, or at another than the model's own.
+        """
+        own_sample_time(self.kind, self.sample_time, sample_time)
+        gain = self.gain if np.isfinite(self.gain) else 0.0
+        b, f = self._padded()
+        return np.array([self.input_offset, self.output_offset, *b, *f, gain])
+
+    def predict(self, recording: Recording, horizon: int = 1) -> Recording:
+        """Predict the output some samples ahead from outputs measured until then; no free run.
+
+        Parameters
+        ----------
+        recording : Recording
+            With the input, which is known until the sample predicted, and the measured output.
+        horizon : int
+            Samples ahead, at least 1.
+
+        Returns
+        -------
+        Recording
+            The input, and the output predicted. Where the block's `initial` is "fitted", the state
+            before the first sample is that with the least one-step errors on this recording. The noise
+            before the first sample is taken to be zero.
+
+        Raises
+        ------
+        DataError
+            If the recording lacks a channel.
+        ModelError
+            If the horizon is not a positive whole number.
+        """
+        from scipy.signal import convolve, lfilter
+
+        if not isinstance(horizon, int) or horizon < 1:
+            raise ModelError(
+                f"the horizon is {horizon!r}. Remedy: predict a whole number of samples, 1 or more."
+            )
+        c, d = [1.0, *self.noise_numerator], [1.0, *self.noise_denominator]
+        name = self.output.name
+        inputs, measured = self._inputs_from(recording), recording[name]
+        fitted = self.initial == "fitted"
+        rest = self.simulate(
+            inputs, initial="first_sample" if fitted else None, sample_time=recording.sample_time
+        )[:, 0]
+        errors = np.asarray(lfilter(d, c, measured - rest))
+        if fitted and self.n_free:
+            free = lfilter(d, c, self.free_responses(len(inputs), recording.sample_time), axis=0)
+            errors = errors - free @ np.linalg.lstsq(free, errors, rcond=1e-12)[0]
+        # what an error does to the samples after it, of which there are no more than in the recording
+        ahead = lfilter(c, d, np.eye(1, min(horizon, len(errors)))[0])
+        predicted = measured - np.asarray(convolve(errors, ahead))[: len(errors)]
+        kept = recording.select([self.input.name])
+        return kept.with_channels({name: self.output.unit}, **{name: predicted})
+
+    def inverse(self) -> TransferFunction:
+        """Return the filter that undoes this one.
+
+        Raises
+        ------
+        ModelError
+            If the output answers late, or a zero lies on or outside the unit circle.
+        """
+        lead = self.numerator[0]
+        if lead == 0:
+            raise ModelError(
+                f"{self.kind!r} has no inverse: its output answers a sample late. "
+                "Remedy: identify it with delay=0."
+            )
+        zeros = np.roots(self.numerator)
+        if np.any(np.abs(zeros) >= 1 - 1e-9):
+            raise ModelError(
+                f"{self.kind!r} has no inverse: a zero at |z| = {np.abs(zeros).max():.3g} would make it "
+                "unstable. Remedy: identify it with fewer coefficients in B, or invert another model."
+            )
+        b = np.array(self.numerator)
+        return TransferFunction(
+            tuple((np.array([1.0, *self.denominator]) / lead).tolist()),
+            tuple((b[1:] / lead).tolist()),
+            self.sample_time,
+            self.output_offset,
+            self.input_offset,
+            self.initial if isinstance(self.initial, str) else "first_sample",
+            self.output,
+            self.input,
+        )
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the filter, in observable form, without its noise model."""
+        own_sample_time(self.kind, self.sample_time, sample_time or self.sample_time)
+        b, f = self._padded()
+        n = self.n_states
+        a = np.eye(n, k=1)
+        if n:
+            a[:, 0] = -f[1:]
+        return LinearSystem(
+            *(a, (b[1:] - f[1:] * b[0])[:, np.newaxis], np.eye(1, n), b[:1, np.newaxis]),
+            self.sample_time,
+            np.array([self.input_offset]),
+            np.array([self.output_offset]),
+            Polynomials(tuple(np.trim_zeros(b, "f").tolist()) or (0.0,), tuple(f.tolist())),
+        )
+
+    def worked(self) -> tuple[str, ...]:
+        """Return the polynomials with their numbers, where they are short."""
+        own = (self.numerator, (1.0, *self.denominator))
+        noise = ((1.0, *self.noise_numerator), (1.0, *self.noise_denominator))
+        if max(map(len, (*own, *noise))) > FEW:
+            return ()
+        top, below = map(_powers, own)
+        text = rf"y_t - y_0 = \frac{{{top}}}{{{below}}}\,(u_t - u_0)"
+        if max(map(len, noise)) > 1:
+            text += rf" + \frac{{{_powers(noise[0])}}}{{{_powers(noise[1])}}}\,e_t"
+        return (text,)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a second-order lag with a gain of 6.8 mm/bar, sampled at 100 Hz."""
+        return cls((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)
+
+
+def _powers(coefficients: Sequence[float]) -> str:
+    return summed(
+        [(c, f"q^{{-{k}}}" if k else "") for k, c in enumerate(coefficients) if c or not k]
+    )

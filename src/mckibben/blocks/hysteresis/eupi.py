@@ -1,0 +1,223 @@
+"""Extended unparallel Prandtl-Ishlinskii (EUPI) model, for loops whose branches differ in slope.
+
+The unparallel play operator has edges of different slope: with x the input counted from the lower end
+of its range, it follows x - r on the rising edge and alpha x + beta r on the falling one, and holds
+between. Beside the weighted operators stands a polynomial of x without memory:
+y = y_0 + sum_k a_k x^k + sum_i w_i F_i[x]. With alpha = beta = 1 and no polynomial it is the classical
+PI model; with the polynomial alone set to 0, the unparallel (UPI) model.
+
+Named among the alternatives in "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling
+Behavior for Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator", Section 3.1. Publications
+differ in how they write the falling edge; this general form contains them. Where the falling edge
+would run below the rising one (small r and alpha < 1) the two are the same line.
+
+The inverse is solved for every sample, until the bracket closes to rounding.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge, Gt
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import solve_sample, solved_start
+from mckibben.errors import ModelError
+
+
+@inlined
+def unparallel_play(s: float, x: float, r: float, alpha: float, beta: float) -> float:
+    """Move an operator whose edges differ in slope."""
+    return max(min(s, alpha * x + beta * r), x - r)
+
+
+@summing_step
+def eupi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; coefficients are [u_0, alpha, beta, offset, a_1..a_3, thresholds, weights]."""
+    n = state.size
+    origin, alpha, beta, offset = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    a1, a2, a3 = coefficients[4], coefficients[5], coefficients[6]
+    r = coefficients[7 : n + 7]
+    w = coefficients[n + 7 :]
+    x = inputs[0] - origin
+    y = 0.0
+    for i in range(n):
+        state[i] = unparallel_play(state[i], x, r[i], alpha, beta)
+        y += w[i] * state[i]
+    outputs[0] = offset + ((a3 * x + a2) * x + a1) * x + y
+
+
+@kernel
+def eupi_matrix(x: Array, alpha: float, beta: float, r: Array, s: Array, operators: Array) -> None:
+    """Run unparallel play operators side by side: ``operators[t, i]`` is operator i after sample t.
+
+    Shapes: x (n,), r and s (N,), operators (n, N). Changes the states ``s``.
+    """
+    for t in range(x.size):
+        for i in range(r.size):
+            s[i] = unparallel_play(s[i], x[t], r[i], alpha, beta)
+            operators[t, i] = s[i]
+
+
+@kernel
+def _advance(u: float, c: Array, state: Array) -> None:
+    x = u - c[0]
+    for i in range(state.size):
+        state[i] = unparallel_play(state[i], x, c[7 + i], c[1], c[2])
+
+
+@kernel
+def _trial(u: float, memory: tuple[Array, Array]) -> float:
+    c, state = memory
+    n = state.size
+    x = u - c[0]
+    y = c[3] + ((c[6] * x + c[5]) * x + c[4]) * x
+    for i in range(n):
+        y += c[7 + n + i] * unparallel_play(state[i], x, c[7 + i], c[1], c[2])
+    return y
+
+
+@step
+def eupi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Solve for the input; see `mckibben.blocks.solving`."""
+    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
+
+
+@kernel
+def eupi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start the operators before the first sample."""
+    x = inputs[0] - coefficients[0]
+    start_operators(coefficients[7 : state.size + 7], x, x, virgin, state)
+
+
+eupi_inverse_start = solved_start(_trial, eupi_start)
+
+
+@dataclass(frozen=True, config=STRICT)
+class EUPI(Invertible):
+    """Extended unparallel Prandtl-Ishlinskii model.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length N
+        Thresholds, in the unit of the input: 0 <= r_0 < r_1 < ...
+    weights : sequence of float, length N
+        Weights, output per input. The inverse wants none negative.
+    falling_slope : float
+        alpha, slope of the falling edge where the rising one has 1; positive.
+    falling_threshold : float
+        beta, threshold of the falling edge per threshold of the rising one; at least 0.
+    polynomial : (float, float, float)
+        a_1, a_2, a_3 of the part without memory. The inverse wants it to increase.
+    offset : float
+        Constant of the output.
+    input_range : (float, float)
+        Lowest and highest input; x counts from the lowest, and the inverse clips to both.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "eupi"
+    solved: ClassVar[bool] = True
+    inverse_remembers = "input"
+    kernel: ClassVar[Kernel] = eupi_step
+    start_kernel: ClassVar[Start] = eupi_start
+    inverse_kernel: ClassVar[Kernel] = eupi_inverse_step
+    inverse_start_kernel: ClassVar[Start] = eupi_inverse_start
+    increasing = ("thresholds",)
+    parameters: ClassVar[tuple[str, ...]] = (
+        "weights",
+        "falling_slope",
+        "falling_threshold",
+        "polynomial",
+        "offset",
+    )
+    notation: ClassVar[Notation] = Notation(
+        r"y = y_0 + \sum_{k} a_k x^k + \sum_i w_i F_i[x],\quad x = u - u_{\min}",
+        r"F_{i,t} = \begin{cases} \max(x_t - r_i,\, F_{i,t-1}) & x \text{ rises} \\ "
+        r"\min(\alpha x_t + \beta r_i,\, F_{i,t-1}) & x \text{ falls} \end{cases}",
+        thresholds="r_i [{u}]",
+        weights="w_i [{y}/{u}]",
+        falling_slope=r"\alpha",
+        falling_threshold=r"\beta",
+        polynomial="a_k [{y}/{u}|{y}/{u}^2|{y}/{u}^3]",
+        offset="y_0 [{y}]",
+    )
+
+    thresholds: Vector
+    weights: Vector
+    falling_slope: Annotated[FiniteFloat, Gt(0)]
+    falling_threshold: Annotated[FiniteFloat, Ge(0)]
+    polynomial: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    offset: FiniteFloat
+    input_range: tuple[FiniteFloat, FiniteFloat]
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, self.thresholds, self.weights)
+        check_input_range(self.kind, self.input_range)
+
+    @property
+    def n_states(self) -> int:
+        """One an operator."""
+        return len(self.thresholds)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights]."""
+        del sample_time
+        edges = (self.input_range[0], self.falling_slope, self.falling_threshold)
+        shape = (self.offset, *self.polynomial)
+        return np.array([*edges, *shape, *self.thresholds, *self.weights])
+
+    def peaks(self) -> Array:
+        """Return the peaks from which the operators just come back to the lowest input."""
+        return self.input_range[0] + (1 + self.falling_threshold) * np.array(self.thresholds)
+
+    def check_invertible(self) -> None:
+        """Demand weights that are not negative, and a part without memory that increases."""
+        if min(self.weights) < 0 or self.least_slope() <= 0:
+            raise ModelError(
+                "'eupi' has no inverse: a weight is negative, or its part without memory does not "
+                "increase. Remedy: identify it with non-negative weights (nonnegative=True)."
+            )
+
+    def least_slope(self) -> float:
+        """Return a lower bound of the slope of the part without memory by the input."""
+        low, high = self.input_range
+        a1, a2, a3 = self.polynomial
+        turn = -a2 / (3 * a3) if a3 else 0.0
+        places = np.array([0.0, high - low, min(max(turn, 0.0), high - low)])
+        slope = (a1 + 2 * a2 * places + 3 * a3 * places**2).min()
+        reversible = self.thresholds[0] == 0 and self.falling_slope <= 1
+        return float(slope + (self.weights[0] if reversible else 0.0))
+
+    def remembered(self, state: Array) -> tuple[float, ...]:
+        """Return the lowest input: which one was last, the operators do not tell."""
+        del state
+        return (self.input_range[0],)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a loop over 0 to 5 bar that falls more steeply than it rises."""
+        shape = (1.0, 0.2, -0.02)
+        return cls((0.0, 0.3, 0.8, 1.5), (2.0, 1.5, 1.0, 0.5), 1.1, 0.8, shape, 2.0, (0.0, 5.0))

@@ -1,0 +1,367 @@
+"""The generalised Prandtl-Ishlinskii (GPI) model, for asymmetric and saturating loops, and its inverse.
+
+Operators play between two envelopes, gamma_R on rising and gamma_L on falling input:
+w_t = max(gamma_R(u_t) - r, w_{t-1}) when u rises, min(gamma_L(u_t) + r, w_{t-1}) when it falls, and
+w_{t-1} when it stands still; the output is y = sum_i x_i w_i.
+
+The inverse finds the common envelope value z at which the weighted sum equals the reference, then
+u = gamma_R^{-1}(z) while the reference rises and gamma_L^{-1}(z) while it falls. At a reversal z is
+continuous while u jumps across the dead zone between the envelopes, where every operator holds, so
+the inverse stays exact through minor loops.
+
+The paper starts operators from f_r(u_0, 0), Eq. (1), without saying which branch a first sample takes.
+Both together leave one meaning: 0, moved no further than into [gamma_R(u_0) - r, gamma_L(u_0) + r],
+which is the rule ``virgin``. ``first_sample`` takes gamma_R(u_0) - r, as if the input had only risen.
+
+Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (1) to (7), the inverse Eqs. (16) to (20).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from typing import Annotated, ClassVar, NamedTuple, Self
+
+import numpy as np
+from pydantic import BeforeValidator, FiniteFloat, InstanceOf
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.adaptive.learning import start_learning
+from mckibben.blocks.adaptive.operators import LearntOperators, follow_learning, inverse_at
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.hysteresis.envelopes.base import Envelope, nested_envelope
+from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
+from mckibben.blocks.hysteresis.play_operators import (
+    check_invertible_sum,
+    check_thresholds,
+    follow,
+    start_operators,
+    start_sum,
+)
+from mckibben.blocks.inverse import check_input_range
+from mckibben.blocks.kernels import Step, kernel, step, summing_step
+from mckibben.blocks.notation import Notation
+from mckibben.errors import ModelError
+
+EnvelopeField = Annotated[InstanceOf[Envelope], BeforeValidator(nested_envelope)]
+
+
+class Kernels(NamedTuple):
+    """The kernels of models with two kinds of envelopes."""
+
+    step: Step
+    start: Start
+    inverse_step: Step
+    inverse_start: Start
+    adaptive_step: Step
+    adaptive_start: Start
+
+
+@cache
+def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
+    """Return the kernels of models with these kinds of envelopes.
+
+    Coefficients are [kind and size of rising, of falling, thresholds, weights, rising, falling], and of
+    the inverse [lowest, highest input] before. The state is [operators, previous input], and of the
+    inverse also [previous reference, samples clipped].
+    """
+    rising_at, rising_from = rising.value, rising.inverse
+    falling_at, falling_from = falling.value, falling.inverse
+
+    @summing_step
+    def gpi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Run a GPI model."""
+        n = state.size - 1
+        r = coefficients[4 : n + 4]
+        w = coefficients[n + 4 : 2 * n + 4]
+        first = 2 * n + 4 + int(coefficients[1])
+        u = inputs[0]
+        y = 0.0
+        if u > state[n]:
+            edge = rising_at(u, coefficients[2 * n + 4 : first])
+            for i in range(n):
+                state[i] = max(state[i], edge - r[i])
+                y += w[i] * state[i]
+        else:
+            edge = falling_at(u, coefficients[first:]) if u < state[n] else np.inf
+            for i in range(n):
+                state[i] = min(state[i], edge + r[i])
+                y += w[i] * state[i]
+        state[n] = u
+        outputs[0] = y
+
+    @kernel
+    def gpi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start a GPI model before its first sample."""
+        n = state.size - 1
+        first = 2 * n + 4 + int(coefficients[1])
+        u = inputs[0]
+        edge = rising_at(u, coefficients[2 * n + 4 : first])
+        other = falling_at(u, coefficients[first:])
+        start_operators(coefficients[4 : n + 4], edge, other, virgin, state[:n])
+        state[n] = u
+
+    @step
+    def gpi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Invert: find the operators' common edge, and the input from the envelope of the direction."""
+        n = state.size - 3
+        low, high = coefficients[0], coefficients[1]
+        r = coefficients[6 : n + 6]
+        w = coefficients[n + 6 : 2 * n + 6]
+        first = 2 * n + 6 + int(coefficients[3])
+        up, down = coefficients[2 * n + 6 : first], coefficients[first:]
+        y = inputs[0]
+        lowest, highest = falling_at(low, down), rising_at(high, up)
+        direction, clipped = follow(y, state[n + 1], lowest, highest, r, w, state[:n])
+        if clipped:
+            state[n + 2] += 1.0
+        state[n + 1] = y
+        if direction > 0.0:
+            state[n] = min(max(rising_from(state[0], up), low), high)
+        elif direction < 0.0:
+            state[n] = min(max(falling_from(state[0], down), low), high)
+        outputs[0] = state[n]
+
+    @kernel
+    def gpi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start the inverse of a GPI model before its first reference."""
+        n = state.size - 3
+        low, high = coefficients[0], coefficients[1]
+        r = coefficients[6 : n + 6]
+        w = coefficients[n + 6 : 2 * n + 6]
+        first = 2 * n + 6 + int(coefficients[3])
+        up, down = coefficients[2 * n + 6 : first], coefficients[first:]
+        y = inputs[0]
+        lowest = falling_at(low, down) if virgin else rising_at(low, up)
+        start_sum(y, lowest, rising_at(high, up), r, w, virgin, state[:n])
+        falls = virgin and y < 0.0
+        u = falling_from(state[0], down) if falls else rising_from(state[0], up)
+        state[n] = min(max(u, low), high)
+        state[n + 1] = y
+        state[n + 2] = 0.0
+
+    @step
+    def gpi_adaptive_step(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+    ) -> None:
+        """Invert, and learn the weights and an offset from what is measured."""
+        n = int(coefficients[0]) - 1
+        own = coefficients[inverse_at(coefficients) :]
+        first = 2 * n + 6 + int(own[3])
+        s, last, learnt = state[:n], state[n + 1 : n + 4], state[n + 4 :]
+        direction = follow_learning(
+            coefficients, own[6 : n + 6], s, last, learnt, scratch, inputs[0], inputs[1]
+        )
+        if direction > 0.0:
+            state[n] = min(max(rising_from(s[0], own[2 * n + 6 : first]), own[0]), own[1])
+        elif direction < 0.0:
+            state[n] = min(max(falling_from(s[0], own[first:]), own[0]), own[1])
+        outputs[0] = state[n]
+
+    @kernel
+    def gpi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start as the inverse does, with the weights as fitted."""
+        n = int(coefficients[0]) - 1
+        gpi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 3], inputs, virgin)
+        state[n + 3] = 0.0
+        start_learning(coefficients, state[n + 4 :])
+
+    forward = (gpi_step, gpi_start, gpi_inverse_step, gpi_inverse_start)
+    return Kernels(*forward, gpi_adaptive_step, gpi_adaptive_start)
+
+
+@kernel
+def gpi_matrix(
+    u: Array, rising: Array, falling: Array, r: Array, s: Array, operators: Array
+) -> None:
+    """Run generalised play operators side by side: ``operators[t, i]`` is operator i after sample t.
+
+    Shapes: u, rising and falling (n,), r and s (N,), operators (n, N). Changes the states ``s``, which
+    are those after the first sample: nothing moves before the second.
+    """
+    previous = u[0]
+    for t in range(u.size):
+        lower = rising[t] if u[t] > previous else -np.inf
+        upper = falling[t] if u[t] < previous else np.inf
+        for i in range(r.size):
+            s[i] = min(max(s[i], lower - r[i]), upper + r[i])
+            operators[t, i] = s[i]
+        previous = u[t]
+
+
+@dataclass(frozen=True, config=STRICT)
+class GPI(LearntOperators):
+    """Generalised Prandtl-Ishlinskii model.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length N + 1
+        Thresholds on the envelopes' values: 0 <= r_0 < r_1 < ...
+    weights : sequence of float, length N + 1
+        Weights, output per unit of the envelopes. The inverse wants r_0 = 0 and positive partial
+        sums.
+    rising, falling : Envelope
+        gamma_R and gamma_L. The inverse wants gamma_L >= gamma_R over the input range.
+    input_range : (float, float)
+        Lowest and highest input, over which the conditions hold and to which the inverse clips.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "gpi"
+    inverse_remembers = "output"
+    increasing = ("thresholds",)
+    parameters: ClassVar[tuple[str, ...]] = ("weights", "rising", "falling")
+    notation: ClassVar[Notation] = Notation(
+        r"y = \sum_i x_i w_i",
+        r"w_{i,t} = \begin{cases} \max(\gamma_R(u_t) - r_i,\, w_{i,t-1}) & u \text{ "
+        r"rises} \\ \min(\gamma_L(u_t) + r_i,\, w_{i,t-1}) & u \text{ falls} \end{cases}",
+        thresholds="r_i",
+        weights="x_i [{y}]",
+    )
+
+    thresholds: Vector
+    weights: Vector
+    rising: EnvelopeField
+    falling: EnvelopeField
+    input_range: tuple[FiniteFloat, FiniteFloat]
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, self.thresholds, self.weights)
+        check_input_range(self.kind, self.input_range)
+
+    @property
+    def kernel(self) -> Kernel:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.step
+
+    @property
+    def start_kernel(self) -> Start:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.start
+
+    @property
+    def inverse_kernel(self) -> Kernel:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.inverse_step
+
+    @property
+    def inverse_start_kernel(self) -> Start:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.inverse_start
+
+    @property
+    def adaptive_kernel(self) -> Kernel:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.adaptive_step
+
+    @property
+    def adaptive_start_kernel(self) -> Start:  # type: ignore[override]
+        """That of its kinds of envelopes."""
+        return self._kernels.adaptive_start
+
+    @property
+    def _kernels(self) -> Kernels:
+        return kernels_of(type(self.rising), type(self.falling))
+
+    @property
+    def n_states(self) -> int:
+        """One an operator, and the previous input."""
+        return len(self.thresholds) + 1
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [kind and size of rising, of falling, thresholds, weights, rising, falling]."""
+        del sample_time
+        envelopes = (self.rising, self.falling)
+        numbers = [envelope.coefficients() for envelope in envelopes]
+        head = [
+            float(part)
+            for envelope, own in zip(envelopes, numbers, strict=True)
+            for part in (envelope.number, own.size)
+        ]
+        return np.array([*head, *self.thresholds, *self.weights, *numbers[0], *numbers[1]])
+
+    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Give the thresholds, and the knots of the envelopes that have some."""
+        yield from super().kept_apart()
+        for envelope in (self.rising, self.falling):
+            yield from ((name, getattr(envelope, name)) for name in envelope.increasing)
+
+    def peaks(self) -> Array:
+        """Return the peaks from which the operators just come back to the lowest input."""
+        low, high = self.input_limits
+        edges = self.falling(low) + 2 * np.array(self.thresholds)
+        inside = edges[edges < self.rising(high)]
+        return np.asarray(self.rising.solve(inside))
+
+    def check_invertible(self) -> None:
+        """Demand a first threshold of 0, an increasing sum, and envelopes in order within the limits."""
+        check_invertible_sum(self.kind, self.thresholds, self.weights)
+        gap, where = smallest_gap(self.rising, self.falling, self.input_range)
+        if gap < 0:
+            raise ModelError(
+                f"'gpi' has no inverse: at {where:.4g} {self.input.unit} its falling envelope is "
+                f"{-gap:.3g} below the rising one. Remedy: identify it with mckibben fit gpi, which "
+                "keeps them in order."
+            )
+
+    @property
+    def whole_changes(self) -> Array:
+        """What is reached, the width of the widest loop, and what is reached."""
+        return np.array([self.span, 2 * np.dot(self.weights, self.thresholds), self.span])
+
+    def inverse_numbers(self, own: Array) -> Array:
+        """Return [lowest, highest input], then this model's."""
+        return np.array([*self.input_limits, *own])
+
+    def remembered(self, state: Array) -> tuple[float, ...]:
+        """Return the output."""
+        return (np.dot(self.weights, state[:-1]),)
+
+    @property
+    def learnt_limits(self) -> tuple[float, float]:
+        """What the envelopes make of the lowest and highest input."""
+        low, high = self.input_range
+        return float(self.falling(low)), float(self.rising(high))
+
+    def retaught(self, theta: Array) -> GPI:
+        """Return the model with other weights; it has no offset."""
+        return replace(self, weights=tuple(theta[:-1].tolist()))
+
+    def added(self, theta: Array) -> float:
+        """Return the offset."""
+        return float(theta[-1])
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a saturating, asymmetric loop over 0 to 5 bar."""
+        return cls((0.0, 0.1, 0.3, 0.5), (9.0, 4.0, 2.0, 1.0), *Tanh.examples(), (0.0, 5.0))
+
+
+def smallest_gap(
+    rising: Envelope, falling: Envelope, input_range: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the smallest of gamma_L - gamma_R over the input range, and the input where it is."""
+    low, high = input_range
+    for _ in range(4):
+        u = np.linspace(low, high, 1025)
+        gaps = falling(u) - rising(u)
+        best = int(np.argmin(gaps))
+        low, high = u[max(best - 1, 0)], u[min(best + 1, u.size - 1)]
+    return float(gaps[best]), float(u[best])

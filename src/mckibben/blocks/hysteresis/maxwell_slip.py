@@ -1,0 +1,243 @@
+"""Maxwell-slip model, symmetric and modified (asymmetric), with a reversible polynomial.
+
+y = P((u - centre) / scale) + sum_i w_i s_i,
+
+where s_i is the deflection of spring i, whose far end slips once the spring is stretched by its
+limit: rising inputs stretch it, s <- min(s + du, r_i); falling ones press it, s <- max(s + kappa
+du, -lambda r_i). kappa = lambda = 1 is the Maxwell-slip model, whose elements are stop operators;
+other ratios of stiffness and of limits make loops that differ between both directions.
+
+Sources: Goldfarb and Celanovic 1997 (Maxwell-slip); Vo-Minh et al. 2011 (of pneumatic muscles); Liu
+et al. 2016 (the modified model: limits and stiffnesses differ between rising and falling inputs;
+ours has one ratio of each for all elements).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Coefficients,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.hysteresis.play_operators import check_thresholds
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import accumulate, kernel, step
+from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import solve_input, solved_start
+from mckibben.errors import ModelError
+
+
+@kernel
+def stretch(du: float, stiffness: float) -> float:
+    """Return by how much springs that do not slip are deflected where the input moves by ``du``."""
+    return du if du >= 0.0 else stiffness * du
+
+
+@kernel
+def slip(s: float, du: float, limit: float, ratio: float) -> float:
+    """Return what is left of a spring's deflection where it slips."""
+    return min(s, limit) if du >= 0.0 else max(s, -ratio * limit)
+
+
+@kernel
+def slip_matrix(
+    u: Array, limits: Array, stiffness: float, ratio: float, s: Array, deflections: Array
+) -> None:
+    """Run springs side by side: ``deflections[t, i]`` is that of spring i after sample t.
+
+    Shapes: u (n,), limits and s (N,), deflections (n, N). Changes the deflections ``s`` at the start.
+    """
+    before = u[0]
+    for t in range(u.size):
+        du = u[t] - before
+        change = stretch(du, stiffness)
+        for i in range(limits.size):
+            s[i] = slip(s[i] + change, du, limits[i], ratio)
+            deflections[t, i] = s[i]
+        before = u[t]
+
+
+@kernel
+def _advance(u: float, c: Array, state: Array, lost: Array) -> None:
+    n, m = state.size - 1, int(c[0])
+    du = u - state[n]
+    change = stretch(du, c[1])
+    for i in range(n):
+        state[i] = slip(accumulate(state[i], change, lost, i), du, c[5 + m + i], c[2])
+    state[n] = u
+
+
+@kernel
+def _trial(u: float, memory: tuple[Array, Array]) -> float:
+    c, state = memory
+    n, m = state.size - 1, int(c[0])
+    du = u - state[n]
+    change = stretch(du, c[1])
+    y = polynomial_at((u - c[3]) / c[4], c, 5, m)
+    for i in range(n):
+        y += c[5 + m + n + i] * slip(state[i] + change, du, c[5 + m + i], c[2])
+    return y
+
+
+@step
+def maxwell_slip_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; the state is [deflections, previous input].
+
+    Coefficients are [size of the polynomial, kappa, lambda, centre, scale, polynomial, limits,
+    weights].
+    """
+    n, m = state.size - 1, int(coefficients[0])
+    weights = coefficients[5 + m + n :]
+    u = inputs[0]
+    _advance(u, coefficients, state, scratch)
+    y = polynomial_at((u - coefficients[3]) / coefficients[4], coefficients, 5, m)
+    for i in range(n):
+        y += weights[i] * state[i]
+    outputs[0] = y
+
+
+@step
+def maxwell_slip_inverse_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Solve for the input; see `mckibben.blocks.solving`."""
+    u = solve_input(_trial, coefficients, state, inputs)
+    _advance(u, coefficients[:-2], state[:-2], scratch)
+    outputs[0] = u
+
+
+@kernel
+def maxwell_slip_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with all springs slipping upwards, or none deflected."""
+    n, m = state.size - 1, int(coefficients[0])
+    for i in range(n):
+        state[i] = 0.0 if virgin else coefficients[5 + m + i]
+    state[n] = inputs[0]
+
+
+maxwell_slip_inverse_start = solved_start(_trial, maxwell_slip_start)
+
+
+@dataclass(frozen=True, config=STRICT)
+class MaxwellSlip(Invertible):
+    """Springs that slip, beside a reversible polynomial.
+
+    Parameters
+    ----------
+    breakaways : sequence of float, length N
+        Deflections at which rising inputs make the springs slip: 0 < r_0 < r_1 < ..., in the unit
+        of the input.
+    weights : sequence of float, length N
+        Stiffnesses, output per input; negative where the output lags the input.
+    polynomial : sequence of float
+        Ascending coefficients of the reversible part, at least one.
+    stiffness_ratio : float
+        kappa: of falling to rising inputs; positive.
+    limit_ratio : float
+        lambda: of falling to rising inputs; positive.
+    centre, scale : float
+        Of the input in the polynomial; scale positive.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: all springs slipping upwards, or none deflected.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "maxwell-slip"
+    solved: ClassVar[bool] = True
+    inverse_remembers = "input"
+    kernel: ClassVar[Kernel] = maxwell_slip_step
+    start_kernel: ClassVar[Start] = maxwell_slip_start
+    inverse_kernel: ClassVar[Kernel] = maxwell_slip_inverse_step
+    inverse_start_kernel: ClassVar[Start] = maxwell_slip_inverse_start
+    parameters: ClassVar[tuple[str, ...]] = (
+        "weights",
+        "polynomial",
+        "stiffness_ratio",
+        "limit_ratio",
+    )
+    increasing = ("breakaways",)
+    notation: ClassVar[Notation] = Notation(
+        r"y = \sum_k c_k x^k + \sum_i w_i s_i,\quad x = \frac{u - m}{s}",
+        r"s_{i,t} = \begin{cases} \min(s_{i,t-1} + \Delta u,\, r_i) & u \text{ rises} \\ "
+        r"\max(s_{i,t-1} + \kappa \Delta u,\, -\lambda r_i) & u \text{ falls} \end{cases}",
+        breakaways="r_i [{u}]",
+        weights="w_i [{y}/{u}]",
+        polynomial="c_k from 0 [{y}]",
+        stiffness_ratio=r"\kappa",
+        limit_ratio=r"\lambda",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
+
+    breakaways: Vector
+    weights: Vector
+    polynomial: Coefficients
+    stiffness_ratio: Annotated[FiniteFloat, Gt(0)] = 1.0
+    limit_ratio: Annotated[FiniteFloat, Gt(0)] = 1.0
+    centre: FiniteFloat = 0.0
+    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, self.breakaways, self.weights)
+        check_input_range(self.kind, self.input_range)
+        if self.breakaways[0] == 0 or not self.polynomial:
+            raise ModelError(
+                f"{self.kind!r} wants limits above 0 and a polynomial. "
+                "Remedy: give positive limits, and one coefficient or more."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """Deflections and the previous input."""
+        return len(self.breakaways) + 1
+
+    @property
+    def n_scratch(self) -> int:
+        """What single precision loses of the deflections."""
+        return len(self.breakaways)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [size, kappa, lambda, centre, scale, polynomial, limits, weights]."""
+        del sample_time
+        head = [len(self.polynomial), self.stiffness_ratio, self.limit_ratio]
+        tail = [*self.polynomial, *self.breakaways, *self.weights]
+        return np.array([*head, self.centre, self.scale, *tail])
+
+    def least_slope(self) -> float:
+        """Return a lower bound of the slope of the output by the input."""
+        softening = float(np.minimum(self.weights, 0.0).sum()) * max(1.0, self.stiffness_ratio)
+        return least_slope(self.polynomial, self.centre, self.scale, self.input_limits) + softening
+
+    def peaks(self) -> Array:
+        """Return the peaks at which one spring more slips."""
+        low, _ = self.input_limits
+        return low + 2.0 * np.array(self.breakaways)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return an asymmetric loop over 0 to 5 bar."""
+        breakaways, weights, polynomial = (0.3, 0.8, 1.6), (-1.0, -0.8, -0.5), (14.0, 17.0, -1.0)
+        return cls(breakaways, weights, polynomial, 1.1, 0.8, 2.5, 2.5, (0.0, 5.0))

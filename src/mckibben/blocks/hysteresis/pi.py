@@ -1,0 +1,215 @@
+"""The classical Prandtl-Ishlinskii (PI) model: a weighted sum of play operators, and its inverse.
+
+y_t = y_0 + sum_i w_i F_{r_i}[u]_t, with r_0 = 0 so that the first term is the reversible part.
+
+Source: "Analysis and modeling of a pneumatic artificial muscle system", Eqs. (12), (13). The inverse
+is known to be a PI model too; here it is found by walking the same piecewise-linear relation from
+the operators' states, which is as exact, touches only the operators that move, and stays consistent
+when a reference has to be clipped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Self
+
+import numpy as np
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.adaptive.learning import start_learning
+from mckibben.blocks.adaptive.operators import LearntOperators, follow_learning, inverse_at
+from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.hysteresis.play_operators import (
+    check_invertible_sum,
+    check_thresholds,
+    follow,
+    start_operators,
+    start_sum,
+)
+from mckibben.blocks.inverse import check_input_range
+from mckibben.blocks.kernels import kernel, step, summing_step
+from mckibben.blocks.notation import FEW, Notation, summed, tex
+
+
+@summing_step
+def pi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run a PI model; coefficients are [offset, thresholds, weights]."""
+    n = state.size
+    offset = coefficients[0]
+    r = coefficients[1 : n + 1]
+    w = coefficients[n + 1 :]
+    u = inputs[0]
+    y = 0.0
+    for i in range(n):
+        s = min(max(state[i], u - r[i]), u + r[i])
+        state[i] = s
+        y += w[i] * s
+    outputs[0] = offset + y
+
+
+@step
+def pi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Invert a PI model; coefficients are [lowest, highest input, offset, thresholds, weights].
+
+    The state is [forward operators, previous reference, samples clipped].
+    """
+    n = state.size - 2
+    lowest, highest, offset = coefficients[0], coefficients[1], coefficients[2]
+    r = coefficients[3 : n + 3]
+    w = coefficients[n + 3 :]
+    s = state[:n]
+    y = inputs[0]
+    _, clipped = follow(y - offset, state[n] - offset, lowest, highest, r, w, s)
+    if clipped:
+        state[n + 1] += 1.0
+    state[n] = y
+    outputs[0] = s[0]
+
+
+@kernel
+def pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start a PI model before its first sample."""
+    n = state.size
+    start_operators(coefficients[1 : n + 1], inputs[0], inputs[0], virgin, state)
+
+
+@kernel
+def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start the inverse of a PI model before its first reference."""
+    n = state.size - 2
+    lowest, highest, offset = coefficients[0], coefficients[1], coefficients[2]
+    r = coefficients[3 : n + 3]
+    w = coefficients[n + 3 :]
+    start_sum(inputs[0] - offset, lowest, highest, r, w, virgin, state[:n])
+    state[n] = inputs[0]
+    state[n + 1] = 0.0
+
+
+@step
+def pi_adaptive_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Invert a PI model, and learn its weights and offset from what is measured."""
+    n = int(coefficients[0]) - 1
+    r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
+    s, last, learnt = state[:n], state[n : n + 3], state[n + 3 :]
+    follow_learning(coefficients, r, s, last, learnt, scratch, inputs[0], inputs[1])
+    outputs[0] = s[0]
+
+
+@kernel
+def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as the inverse does, with the weights as fitted."""
+    n = int(coefficients[0]) - 1
+    pi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 2], inputs, virgin)
+    state[n + 2] = 0.0
+    start_learning(coefficients, state[n + 3 :])
+
+
+@dataclass(frozen=True, config=STRICT)
+class PI(LearntOperators):
+    """Classical Prandtl-Ishlinskii model.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length N
+        Thresholds of the play operators, in the unit of the input: 0 <= r_0 < r_1 < ...
+    weights : sequence of float, length N
+        Weights, output per input. The exact inverse wants r_0 = 0 and positive partial sums.
+    offset : float
+        Constant of the output.
+    input_range : (float, float), optional
+        Lowest and highest input that may be asked for; the inverse clips there. Default none.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "pi"
+    kernel: ClassVar[Kernel] = pi_step
+    start_kernel: ClassVar[Start] = pi_start
+    inverse_kernel: ClassVar[Kernel] = pi_inverse_step
+    inverse_start_kernel: ClassVar[Start] = pi_inverse_start
+    adaptive_kernel: ClassVar[Kernel] = pi_adaptive_step
+    adaptive_start_kernel: ClassVar[Start] = pi_adaptive_start
+    inverse_remembers = "output"
+    increasing = ("thresholds",)
+    parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
+    notation: ClassVar[Notation] = Notation(
+        r"y = y_0 + \sum_i w_i F_{r_i}[u]",
+        r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
+        thresholds="r_i [{u}]",
+        weights="w_i [{y}/{u}]",
+        offset="y_0 [{y}]",
+    )
+
+    thresholds: Vector
+    weights: Vector
+    offset: FiniteFloat = 0.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, self.thresholds, self.weights)
+        check_input_range(self.kind, self.input_range)
+
+    @property
+    def n_states(self) -> int:
+        """One a play operator."""
+        return len(self.thresholds)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [offset, thresholds, weights]."""
+        del sample_time
+        return np.array([self.offset, *self.thresholds, *self.weights])
+
+    def peaks(self) -> Array:
+        """Return the peaks from which the operators just come back to the lowest input."""
+        return self.input_limits[0] + 2 * np.array(self.thresholds)
+
+    def check_invertible(self) -> None:
+        """Demand a first threshold of 0, and partial sums of the weights that are positive."""
+        check_invertible_sum(self.kind, self.thresholds, self.weights)
+
+    @property
+    def whole_changes(self) -> Array:
+        """What is reached, the width of the widest loop, and what is reached."""
+        return np.array([self.span, 2 * np.dot(self.weights, self.thresholds), self.span])
+
+    def inverse_numbers(self, own: Array) -> Array:
+        """Return [lowest, highest input, offset, thresholds, weights]."""
+        return np.array([*self.input_limits, *own])
+
+    def remembered(self, state: Array) -> tuple[float, ...]:
+        """Return the output."""
+        return (self.offset + np.dot(self.weights, state),)
+
+    def retaught(self, theta: Array) -> PI:
+        """Return the model with other weights and another offset."""
+        return replace(self, weights=tuple(theta[:-1].tolist()), offset=float(theta[-1]))
+
+    def worked(self) -> tuple[str, ...]:
+        """Return the sum with its numbers, where it is short."""
+        if len(self.weights) > FEW:
+            return ()
+        pairs = zip(self.weights, self.thresholds, strict=True)
+        terms = [(w, rf"F_{{{tex(r)}}}[u]" if r else "u") for w, r in pairs]
+        return (f"y = {summed([(self.offset, ''), *terms])}",)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the shape of a small muscle's loop over 0 to 5 bar."""
+        return cls((0.0, 0.3, 0.8, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))

@@ -1,0 +1,315 @@
+"""Preisach model on a grid of thresholds in Everett form, with its closed-form inverse.
+
+A relay switches up where the input rises through a and down where it falls through b <= a; the
+output is the weighted sum over all relays. The plane of (a, b) is cut into cells by the levels;
+each cell off the diagonal carries its weight evenly, each on the diagonal as relays without a dead
+zone (a = b), which is the reversible part of the model. Instead of relays, the turning points of
+the input that are not wiped out are remembered, and the output follows from E(a, b), the weight of
+all relays within b and a: after a minimum b, rising to u gives y_b + 2 E(u, b). Between levels E is
+bilinear.
+
+Sources: Preisach 1935; Mayergoyz, "Mathematical Models of Hysteresis", 1991 (Everett form,
+wiping-out, congruency).
+
+Along a branch the output is linear in the input from one level to the next, so the inverse is in
+closed form; it wants positive weights on the diagonal and none negative.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+import numpy as np
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Cost, Kernel, Start
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.hysteresis.triangular_grid import TriangularGrid
+from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import solved_start
+from mckibben.errors import ModelError
+
+DEPTH = 64
+"""Turning points remembered. More are nested only in loops within loops 32 deep; the smallest two
+are then forgotten."""
+
+
+@kernel
+def _place(u: float, levels: Array) -> tuple[int, float]:
+    """Return the interval of the levels that an input lies in, and where in it, 0 to 1."""
+    low, high = 0, levels.size - 2
+    while low < high:
+        middle = (low + high + 1) // 2
+        if u >= levels[middle]:
+            low = middle
+        else:
+            high = middle - 1
+    return low, (u - levels[low]) / (levels[low + 1] - levels[low])
+
+
+@kernel
+def everett(a: float, b: float, levels: Array, table: Array) -> float:
+    """Return the weight of all relays within b and a; ``table`` holds it at the levels, row by row."""
+    n = levels.size
+    i, x = _place(a, levels)
+    j, y = _place(b, levels)
+    if i == j:
+        return table[(i + 1) * n + i] * (x - y)
+    low = table[i * n + j] * (1.0 - y) + table[i * n + j + 1] * y
+    high = table[(i + 1) * n + j] * (1.0 - y) + table[(i + 1) * n + j + 1] * y
+    return low * (1.0 - x) + high * x
+
+
+@kernel
+def _solve(target: float, other: float, rising: bool, levels: Array, table: Array) -> float:
+    """Return the input for which E between it and the turning point ``other`` is ``target``."""
+    n = levels.size
+    j, _ = _place(other, levels)
+    near, near_e = other, 0.0
+    for i in range(n):
+        k = j + 1 + i if rising else j - i
+        if k < 0 or k >= n:
+            break
+        far = levels[k]
+        if far == near:
+            continue
+        far_e = everett(far, other, levels, table) if rising else everett(other, far, levels, table)
+        if far_e >= target or k == 0 or k == n - 1:
+            if far_e == near_e:
+                return far
+            return near + (far - near) * (target - near_e) / (far_e - near_e)
+        near, near_e = far, far_e
+    return near
+
+
+# The state is [depth, direction, turning points, outputs at them, last input, last output]; the first
+# turning point is the lowest level, from which everything has risen.
+CORNERS, OUTPUTS = 2, 2 + DEPTH
+LAST, LAST_OUTPUT = 2 + 2 * DEPTH, 3 + 2 * DEPTH
+CLIPPED = 4 + 2 * DEPTH
+"""Places in the state, and behind it in that of the inverse."""
+
+SWINGS = DEPTH // 2 - 2
+"""From end to end, before a virgin start."""
+
+
+@kernel
+def _output(u: float, state: Array, levels: Array, table: Array) -> float:
+    """Return the output at ``u``, within the last two turning points."""
+    top = int(state[0]) - 1
+    corner, y = state[CORNERS + top], state[OUTPUTS + top]
+    if u == corner:
+        return y
+    if state[1] > 0.0:
+        return y + 2.0 * everett(u, corner, levels, table)
+    return y - 2.0 * everett(corner, u, levels, table)
+
+
+@kernel
+def _turn(going: float, state: Array) -> None:
+    """Remember the last sample as a turning point, if the input turns there."""
+    if going != state[1]:
+        depth = int(state[0])
+        if depth == DEPTH:
+            depth -= 2
+        state[CORNERS + depth], state[OUTPUTS + depth] = state[LAST], state[LAST_OUTPUT]
+        state[0], state[1] = depth + 1.0, going
+
+
+@kernel
+def _visit(wanted: float, c: Array, state: Array) -> None:
+    """Move to an input, or to the first or last level if it is beyond."""
+    n = int(c[0])
+    levels, table = c[1 : 1 + n], c[1 + n : 1 + n + n * n]
+    u = min(max(wanted, levels[0]), levels[n - 1])
+    if u == state[LAST]:
+        return
+    going = 1.0 if u > state[LAST] else -1.0
+    _turn(going, state)
+    while state[0] >= 3.0:
+        before = state[CORNERS + int(state[0]) - 2]
+        if (u - before) * going < 0.0:
+            break
+        state[0] -= 2.0  # a loop is closed, and wiped out
+    state[LAST], state[LAST_OUTPUT] = u, _output(u, state, levels, table)
+
+
+@step
+def preisach_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; coefficients are [number of levels, levels, Everett table, offset]."""
+    _visit(inputs[0], coefficients, state)
+    outputs[0] = state[LAST_OUTPUT]
+
+
+@step
+def preisach_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Invert in closed form; the state's last number counts samples clipped."""
+    n = int(coefficients[0])
+    levels, table = coefficients[1 : 1 + n], coefficients[1 + n : 1 + n + n * n]
+    bottom = state[OUTPUTS]
+    size = 2.0 * table[(n - 1) * n]
+    target = min(max(inputs[0], bottom), bottom + size)
+    if abs(target - inputs[0]) > SLACK * size:
+        state[CLIPPED] += 1.0
+    if abs(target - state[LAST_OUTPUT]) > ROUNDING * size:
+        going = 1.0 if target > state[LAST_OUTPUT] else -1.0
+        _turn(going, state)
+        while state[0] >= 3.0 and (target - state[OUTPUTS + int(state[0]) - 2]) * going >= 0.0:
+            state[0] -= 2.0
+        top = int(state[0]) - 1
+        half = 0.5 * abs(target - state[OUTPUTS + top])
+        u = _solve(half, state[CORNERS + top], going > 0.0, levels, table)
+        state[LAST] = min(max(u, levels[0]), levels[n - 1])
+        state[LAST_OUTPUT] = target
+    outputs[0] = state[LAST]
+
+
+@kernel
+def preisach_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as if the input had risen from the lowest level to the first one, or swung ever less."""
+    n = int(coefficients[0])
+    low, high, offset = coefficients[1], coefficients[n], coefficients[1 + n + n * n]
+    state[:] = 0.0
+    state[0], state[1] = 1.0, 1.0
+    state[CORNERS], state[OUTPUTS] = low, offset
+    state[LAST], state[LAST_OUTPUT] = low, offset
+    if virgin:
+        middle = min(max(inputs[0], low), high)
+        for k in range(SWINGS):
+            share = 1.0 - k * (1.0 / (SWINGS - 1))
+            _visit(middle + share * (high - middle), coefficients, state)
+            _visit(middle + share * (low - middle), coefficients, state)
+    _visit(inputs[0], coefficients, state)
+
+
+@kernel
+def _first_output(u: float, memory: tuple[Array, Array]) -> float:
+    """Return the output at an input that the memory has been started with."""
+    _, state = memory
+    return state[LAST_OUTPUT]
+
+
+preisach_inverse_start = solved_start(_first_output, preisach_start, 1)
+
+
+@dataclass(frozen=True, config=STRICT)
+class Preisach(TriangularGrid):
+    """Preisach model on a triangular grid.
+
+    Parameters
+    ----------
+    levels : sequence of float, length L + 1
+        Increasing inputs that cut the plane into cells; inputs beyond the first and last are
+        clipped.
+    weights : sequence of float, length L (L + 1) / 2
+        Of the cells, for rising thresholds interval by interval, each from the lowest falling
+        threshold to the diagonal: w_00, w_10, w_11, w_20, ... Half the output that the cell's
+        relays give when they switch.
+    offset : float
+        Output with all relays down.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: the input has risen from the lowest level, or the
+        input has swung ever less, from the whole range to the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "preisach"
+    kernel: ClassVar[Kernel] = preisach_step
+    start_kernel: ClassVar[Start] = preisach_start
+    inverse_kernel: ClassVar[Kernel] = preisach_inverse_step
+    inverse_start_kernel: ClassVar[Start] = preisach_inverse_start
+    parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
+    notation: ClassVar[Notation] = Notation(
+        r"y = y_0 + \sum_{j \le i} w_{ij} \left(1 + R_{ij}[u]\right)",
+        r"R_{ij}[u] = +1 \text{ once } u \text{ rose through cell } i,\; -1 \text{ once "
+        "it fell through cell } j",
+        levels="a_i [{u}]",
+        weights="w_k [{y}]",
+        offset="y_0 [{y}]",
+    )
+
+    levels: Vector
+    weights: Vector
+    offset: FiniteFloat = 0.0
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    @property
+    def n_states(self) -> int:
+        """Depth and direction, turning points with their outputs, last input and output."""
+        return 2 * DEPTH + 4
+
+    def table(self) -> Array:
+        """Return E at pairs of levels, shape (L + 1, L + 1), zero above the diagonal."""
+        n = len(self.levels) - 1
+        cells = np.zeros((n, n))
+        cells[np.tril_indices(n)] = self.weights
+        found = np.zeros((n + 1, n + 1))
+        # all cells with rising thresholds up to level i and falling ones from level j on
+        found[1:, :n] = np.cumsum(np.cumsum(cells[:, ::-1], axis=1)[:, ::-1], axis=0)
+        return np.tril(found, -1)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the memory before the first sample.
+
+        Raises
+        ------
+        ModelError
+            If one given has a depth or direction that cannot be: they say where in it to go on.
+        """
+        state = super().initial_state(first, initial)
+        depth, direction = state[0], state[1]
+        if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
+            raise ModelError(
+                f"the memory of {self.kind!r} has depth {depth:g} and direction {direction:g}. Remedy: "
+                f"give a depth of 1 to {DEPTH}, a direction of 1 or -1, or 'first_sample'."
+            )
+        return state
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [number of levels, levels, Everett table, offset]."""
+        del sample_time
+        return np.array([len(self.levels), *self.levels, *self.table().ravel(), self.offset])
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return what it costs to find the place of an input in the table."""
+        del sample_time
+        once = self._look_up()
+        return Cost(once, once + 64)
+
+    def inverse_cost(self, sample_time: float | None) -> Cost:
+        """Return what it costs to walk along the levels, half of them usually."""
+        del sample_time
+        once, levels = self._look_up(), len(self.levels)
+        return Cost(once * max(1, levels // 2), once * levels + 64)
+
+    def _look_up(self) -> int:
+        return 20 + 4 * len(self.levels).bit_length()
+
+    def check_invertible(self) -> None:
+        """Demand weights that are not negative, and positive on the diagonal."""
+        if min(self.weights) < 0 or self.diagonal.min() <= 0:
+            raise ModelError(
+                "'preisach' has no inverse: its weights must not be negative, and positive on the "
+                "diagonal. Remedy: identify it with nonnegative=true."
+            )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a loop over 0 to 5 bar with more weight near the diagonal."""
+        n = 5
+        weights = [2.0 / (1 + i - j) ** 2 for i in range(n) for j in range(i + 1)]
+        return cls(tuple(np.linspace(0.0, 5.0, n + 1).tolist()), tuple(weights), 1.0)

@@ -1,0 +1,337 @@
+"""Blocks that undo others: one class for all, which runs what the block undone declares.
+
+An inverse takes the outputs of its field ``forward``, then what schedules that one, and gives its
+driven inputs. Its state begins with the forward block's, unless it is shorter.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import BeforeValidator, InstanceOf
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import NARROWEST, Array
+from mckibben.blocks.base import Block, Cost, Kernel, Start, explicit_state
+from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.notation import indexed, lettered
+from mckibben.blocks.saving import nested
+from mckibben.errors import ModelError, ModelWarning
+from mckibben.registry import load
+
+USUAL_TRIALS, MOST_TRIALS = 12, 600
+"""In a step of an inverse that is solved for: on smooth references, and at worst."""
+
+COMMANDS = ("pressure", "voltage")
+"""How channels that drive a muscle are called."""
+
+NARROWEST_SHARE = 1e-9
+"""Least width of an input range as a share of the sizes of its ends."""
+
+
+@kernel
+def nothing_clipped(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with no samples clipped, where the inverse has no other memory."""
+    state[0] = 0.0
+
+
+class Invertible(Block):
+    """A block that declares its inverse: a kernel, what that reads, and how it starts.
+
+    By default its output rises with its one input, within its field ``input_range``, and the inverse
+    clips references beyond what that can reach. The inverse's state is then this block's, what the
+    inverse remembers, and the count of samples clipped; its numbers are this block's and the limits.
+    """
+
+    inverse_kernel: ClassVar[Kernel]
+    """Runs the inverse, as `kernel` runs the block."""
+
+    inverse_start_kernel: ClassVar[Start | None] = None
+    """Fills the inverse's state, as `start_kernel` fills the block's."""
+
+    inverse_path_dependent: ClassVar[bool] = False
+    """Whether it matters how a reference goes from one turning point to the next."""
+
+    inverse_remembers: ClassVar[Literal["input", "output"] | None] = None
+    """What the inverse knows of the last sample beside this block's state."""
+
+    counts_clipped: ClassVar[bool] = True
+    """Whether the last of the inverse's state counts the samples that `inverse_complaint` is about."""
+
+    solved: ClassVar[bool] = False
+    """Whether the inverse is solved for by trials in every sample, having no closed form."""
+
+    def inverse(self) -> Block:
+        """Return the block that undoes this one.
+
+        Raises
+        ------
+        ModelError
+            If a condition of `check_invertible` fails.
+        """
+        return Inverse(self)
+
+    def check_invertible(self) -> None:
+        """Refuse to be undone where a condition fails, saying which and what to do.
+
+        By default, of one input solved for: a range of it, over which the output rises.
+        """
+        if not (self.solved and hasattr(self, "input_range")):
+            return
+        if self.input_range is None:
+            raise ModelError(
+                f"{self.kind!r} has no inverse without an input range. Remedy: give input_range."
+            )
+        steepness = self.least_slope()
+        if not steepness > 0:
+            raise ModelError(
+                f"{self.kind!r} has no inverse: its output may fall while its input rises (least "
+                f"slope {steepness:.3g}). Remedy: identify it with nonnegative=true where it has that "
+                "setting, or invert another model."
+            )
+
+    def least_slope(self) -> float:
+        """Return a lower bound of the slope of the output by the input."""
+        return np.inf
+
+    def inverse_numbers(self, own: Array) -> Array:
+        """Return the numbers that the inverse reads, given this block's: with the limits behind them."""
+        return np.array([*own, *self.input_limits]) if hasattr(self, "input_range") else own
+
+    @property
+    def n_inverse_states(self) -> int:
+        """Length of the inverse's state."""
+        return self.n_states + (self.inverse_remembers is not None) + self.counts_clipped
+
+    @property
+    def n_inverse_scratch(self) -> int:
+        """As `n_scratch`, of the inverse; the same by default."""
+        return self.n_scratch
+
+    def inverse_state(self, state: Array) -> Array:
+        """Return the inverse's state that matches a state of this block, where that tells it."""
+        found = np.array([*state, *self.remembered(state), *([0.0] if self.counts_clipped else [])])
+        if found.size != self.n_inverse_states:
+            raise ModelError(
+                f"{len(state)} states of {self.kind!r} do not tell those of its inverse. "
+                f"Remedy: give {self.n_inverse_states}, or 'first_sample'."
+            )
+        return found
+
+    def remembered(self, state: Array) -> tuple[float, ...]:
+        """Return what the inverse remembers, as a state of this block tells it."""
+        return (float(state[-1]),) if self.inverse_remembers == "input" else ()
+
+    def inverse_cost(self, sample_time: float | None) -> Cost:
+        """Return what a step of the inverse costs; by default one pass, or trials."""
+        if self.solved:
+            once = self.cost(sample_time).usual
+            return Cost(USUAL_TRIALS * once, MOST_TRIALS * once)
+        numbers = self.inverse_numbers(self.coefficients(sample_time))
+        return Cost.of(numbers, self.n_inverse_states)
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that can be reached whatever happened before, each of shape (n_outputs,).
+
+        How far the output falls at the lowest input depends on the highest peak before: the least
+        favourable one counts.
+        """
+        if getattr(self, "input_range", None) is None:
+            return super().reachable()
+        low, high = self.input_limits
+
+        def last(*inputs: float) -> float:
+            return float(self.simulate(inputs, initial="first_sample")[-1])
+
+        peaks = [low, *self.peaks().clip(low, high).tolist(), high]
+        return np.array([max(last(low, peak, low) for peak in peaks)]), np.array([last(low, high)])
+
+    def peaks(self) -> Array:
+        """Return the peaks at which one operator more keeps a memory; none without operators."""
+        return np.empty(0)
+
+    def inverse_complaint(self, state: Array) -> str:
+        """Return what is to be said of a run of the inverse in which samples were counted."""
+        low, high = self.reachable()
+        wanted, given = self.outputs[0], self.inputs[0]
+        return (
+            f"{int(state[-1])} sample(s) of the reference {wanted.name!r} were clipped: they "
+            f"need {given.name} outside its limits. Reachable whatever happened before is "
+            f"{low[0]:.6g} to {high[0]:.6g} {wanted.unit}"
+        )
+
+
+def check_input_range(kind: str, input_range: tuple[float, float] | None) -> None:
+    """Refuse an input range that is empty, or that steps through it could not be told apart in."""
+    if input_range is None:
+        return
+    low, high = input_range
+    width = high - low
+    if not (NARROWEST <= width < np.inf and width >= NARROWEST_SHARE * (abs(low) + abs(high))):
+        raise ModelError(
+            f"the input range {input_range} of {kind!r} is empty, or too narrow or wide to compute "
+            "with. Remedy: give (lowest, highest)."
+        )
+
+
+@dataclass(frozen=True, config=STRICT)
+class Inverse(Block):
+    """The block that undoes another.
+
+    Parameters
+    ----------
+    forward : Block
+        The block undone, which declares how.
+    """
+
+    kind: ClassVar[str] = "inverse"
+    undoing: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("forward",)
+
+    forward: Annotated[InstanceOf[Invertible], BeforeValidator(nested)]
+
+    def __post_init__(self) -> None:
+        self.forward.check_invertible()
+
+    @property
+    def title(self) -> str:
+        """That of the block undone, and that it is undone."""
+        return f"{self.forward.title}-inverse"
+
+    @property
+    def kernel(self) -> Kernel:  # type: ignore[override]
+        """The forward block's inverse kernel."""
+        return self.forward.inverse_kernel
+
+    @property
+    def start_kernel(self) -> Start | None:  # type: ignore[override]
+        """The forward block's."""
+        return self.forward.inverse_start_kernel
+
+    @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether the forward block is."""
+        return self.forward.rate_dependent
+
+    @property
+    def path_dependent(self) -> bool:  # type: ignore[override]
+        """As the forward block says."""
+        return self.forward.inverse_path_dependent
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """The forward block's outputs, then what schedules it."""
+        return (*self.forward.outputs, *self.forward.inputs[len(self.outputs) :])
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """What schedules the forward block."""
+        return self.forward.scheduling
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """The forward block's driven inputs."""
+        channels = self.forward.inputs
+        return channels[: len(channels) - len(self.forward.scheduling)]
+
+    @property
+    def n_states(self) -> int:
+        """As the forward block says."""
+        return self.forward.n_inverse_states
+
+    @property
+    def n_scratch(self) -> int:
+        """As the forward block says."""
+        return self.forward.n_inverse_scratch
+
+    @property
+    def start(self) -> Initial:
+        """The forward block's."""
+        return self.forward.start
+
+    def start_numbers(self) -> Array:
+        """Return the forward block's, as the inverse reads them."""
+        return self.forward.inverse_numbers(self.forward.start_numbers())
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state before the first sample that matches the forward block's.
+
+        An explicit state may be this block's own, or the forward block's.
+        """
+        start = self.start if initial is None else initial
+        if isinstance(start, str):
+            return super().initial_state(first, start)
+        n = self.forward.n_states
+        if len(start) == n != self.n_states:
+            return self.forward.inverse_state(self.forward.initial_state(first, start))
+        state = explicit_state(self, start)
+        if n <= self.n_states:
+            self.forward.initial_state(first, state[:n].tolist())  # which knows what states can be
+        return state
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return the forward block's, as the inverse reads them."""
+        return self.forward.inverse_numbers(self.forward.coefficients(sample_time))
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return what the forward block says."""
+        return self.forward.inverse_cost(sample_time)
+
+    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Give the forward block's."""
+        return self.forward.kept_apart()
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the lowest and highest inputs of the forward block that are given."""
+        if len(self.outputs) == 1:
+            low, high = self.forward.input_limits
+            return np.array([low]), np.array([high])
+        return super().reachable()
+
+    def inverse(self) -> Block:
+        """Return the forward block."""
+        return self.forward
+
+    def report(self, state: Array) -> None:
+        """Warn of what the forward block complains of, as references clipped."""
+        if self.n_clipped(state):
+            warnings.warn(self.forward.inverse_complaint(state), ModelWarning, stacklevel=4)
+
+    def n_clipped(self, state: Array) -> int:
+        """Return how many samples the forward block complains of."""
+        return int(state[-1]) if self.forward.counts_clipped and state[-1] > 0 else 0
+
+    def equations(self) -> tuple[str, ...]:
+        """Return that it solves the equations of the block undone, which follow."""
+        return (r"\hat{u} = P^{-1}[y] \quad\text{such that}\quad P[\hat{u}] = y",)
+
+    def worked(self) -> tuple[str, ...]:
+        """Return which channels go in and come out; P is the block that follows."""
+        letters = []
+        for letter, channels in (("y", self.forward.outputs), (r"\hat{u}", self.outputs)):
+            for place, channel in enumerate(channels):
+                own = indexed(letter, (place,), 1) if len(channels) > 1 else letter
+                letters.append(lettered(own, channel.name, channel.unit))
+        return (r",\quad ".join([*letters, r"P\text{: the model below}"]),)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the inverse of a Prandtl-Ishlinskii model."""
+        return cls(load("blocks", "pi").example())
+
+
+def drives(channel: Channel) -> bool:
+    """Tell whether a channel is what drives a muscle, by its name or unit."""
+    return channel.name.startswith(COMMANDS) or channel.unit in ("bar", "V")
+
+
+def commands(block: Block) -> bool:
+    """Tell whether a block undoes another and gives what drives a muscle.
+
+    Not every inverse does: a forward model solved from a law of forces is one, and gives a displacement.
+    """
+    return block.undoing and drives(block.outputs[0])

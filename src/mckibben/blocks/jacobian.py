@@ -1,0 +1,308 @@
+"""Derivatives of free runs by parameters: one way for every block, exact to rounding.
+
+What a block does is laid out as kernels in order, as for an export. Their coefficients depend smoothly
+on the parameters, by arithmetic of a few numbers: central differences of eighth order give that to
+1e-11 or better. From coefficients to outputs, starts and memories included, kernels are differentiated
+by complex step; see `mckibben.blocks.complex_step`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import VIRGIN, Block
+from mckibben.blocks.complex_step import STEP, twin
+from mckibben.blocks.fields import Initial
+from mckibben.blocks.kernels import in_scratch
+from mckibben.blocks.parameters import Parametrised
+from mckibben.errors import ModelError
+from mckibben.system.threads import cores
+
+Complex = NDArray[np.complex128]
+
+CHANGES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+"""Of a parameter, relative, between the places of a central difference of its coefficients."""
+
+AGREEING = 1e-11
+"""Relative difference of derivatives of coefficients that is rounding."""
+
+WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
+"""Of such a difference of eighth order, from the nearest places on."""
+
+
+@dataclass
+class _Call:
+    """A block that is one kernel, run on some signals; the next ones are its outputs."""
+
+    block: Block
+    given: list[int]
+    first: int
+    state: Array | None = None
+
+
+@dataclass
+class _Layout:
+    """What a block does, in order; signals are numbered, the inputs first."""
+
+    n: int
+    steps: list[_Call | tuple[list[int], int]] = field(default_factory=list)
+
+    def call(self, block: Block, given: Sequence[str]) -> list[str]:
+        """Append a block, and return the signals that it gives."""
+        self.steps.append(_Call(block, [int(place) for place in given], self.n))
+        self.n += len(block.outputs)
+        return [str(place) for place in range(self.n - len(block.outputs), self.n)]
+
+    def add(self, terms: Sequence[str]) -> str:
+        """Append a sum of signals."""
+        self.steps.append(([int(place) for place in terms], self.n))
+        self.n += 1
+        return str(self.n - 1)
+
+    def resume(self, state: Sequence[float]) -> None:
+        """Start the blocks called last from a state of them all."""
+        left = np.array(state, dtype=np.float64)
+        for call in reversed(self.calls):
+            if left.size:
+                left, call.state = np.split(left, [left.size - call.block.n_states])
+
+    @property
+    def calls(self) -> list[_Call]:
+        """The blocks, in order."""
+        return [step for step in self.steps if isinstance(step, _Call)]
+
+
+def _laid_out(block: Block) -> tuple[_Layout, list[int]]:
+    """Return what a block does, and which signals it gives."""
+    layout = _Layout(len(block.inputs))
+    given = block.wired(layout, [str(place) for place in range(layout.n)])
+    for call in layout.calls:
+        if not call.block.c_kernels:
+            raise ModelError(
+                f"{call.block.title!r} has no derivatives: it is not one kernel with a start kernel. "
+                "Remedy: declare a start_kernel beside its kernel, or compose it of such blocks."
+            )
+    return layout, [int(place) for place in given]
+
+
+def _moved(value: Any, numbers: Iterator[float]) -> Any:
+    """Return the value of a field with other numbers, be they within bounds or a little outside."""
+    if type(value) is float:
+        return next(numbers)
+    if type(value) is tuple:
+        return tuple(_moved(item, numbers) for item in value)
+    if not isinstance(value, Parametrised):
+        return value
+    if type(value).unpack is not Parametrised.unpack:
+        return value.unpack([next(numbers) for _ in range(value.n_parameters)])
+    other = object.__new__(type(value))
+    known: Any = value
+    vars(other).update({each.name: getattr(known, each.name) for each in fields(known)})
+    vars(other).update({name: _moved(getattr(known, name), numbers) for name in value.parameters})
+    return other
+
+
+def _numbers(block: Block, sample_time: float | None) -> list[Array]:
+    """Return the coefficients of all kernels."""
+    return [call.block.coefficients(sample_time) for call in _laid_out(block)[0].calls]
+
+
+class Tangents:
+    """Free runs of a block with their derivatives by its parameters, stretch by stretch.
+
+    Parameters
+    ----------
+    block : Block
+    sample_time : float or None
+        [s].
+    places : sequence of int, optional
+        Of k parameters in `pack`; all by default.
+
+    Raises
+    ------
+    ModelError
+        If a part is not a kernel.
+    """
+
+    def __init__(
+        self, block: Block, sample_time: float | None, places: Sequence[int] | None = None
+    ) -> None:
+        self.block = block
+        values = block.pack()
+        self._layout, self._gives = _laid_out(block)
+        own = _numbers(block, sample_time)
+        places = range(values.size) if places is None else places
+        self.n_places = len(places)
+        self._numbers: list[list[Complex]] = []
+        for place in places:
+            slopes = _coefficient_slopes(block, values, place, sample_time)
+            self._numbers.append([_complex(*pair) for pair in zip(own, slopes, strict=True)])
+        if not places:
+            self._numbers.append([numbers.astype(np.complex128) for numbers in own])
+        ends = np.cumsum([0, *(call.block.n_states for call in self._layout.calls)])
+        self._states = [slice(*ends[i : i + 2]) for i in range(ends.size - 1)]
+        self._scratch = [np.zeros(c.block.n_scratch, np.complex128) for c in self._layout.calls]
+
+    def start(self, first: Array, initial: Initial | None = None) -> Complex:
+        """Return the states before a first input, with derivatives, shape (k or 1, n_states).
+
+        Parameters
+        ----------
+        first : array, shape (n_inputs,)
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            As of `Block.initial_state`.
+        """
+        rule = initial if initial is None or isinstance(initial, str) else None
+        given = None if initial is rule else self.block.initial_state(first, initial)
+        states = np.zeros((len(self._numbers), self.block.n_states), np.complex128)
+        for numbers, state in zip(self._numbers, states, strict=True):
+            if given is not None:
+                state[:] = given
+            else:
+                self._started(numbers, state, first, rule)
+        return states
+
+    def _started(
+        self, numbers: list[Complex], state: Complex, first: Array, rule: str | None
+    ) -> None:
+        """Start blocks from the first samples that reach them."""
+
+        def begin(call: _Call, index: int, inputs: Complex) -> Complex:
+            own, start = state[self._states[index]], rule or call.block.start
+            if call.state is not None:
+                own[:] = call.state
+            elif not isinstance(start, str):
+                own[:] = call.block.initial_state(inputs[0].real, start)
+            elif own.size:
+                kernel = call.block.c_kernels[1]
+                room = [self._scratch[index]] if in_scratch(kernel) else []
+                twin(kernel)(numbers[index], own, *room, inputs[0], VIRGIN[start])
+            return own.copy()
+
+        self._follow(numbers, begin, first[np.newaxis])
+
+    def over(self, inputs: Array, states: Complex) -> tuple[Array, Array]:
+        """Return outputs, (n, m), and their derivatives, (n, m, k), over a stretch; states go on.
+
+        Parameters
+        ----------
+        inputs : array, shape (n, n_inputs)
+        states : array, shape (k or 1, n_states)
+            As `start` gives them; changed.
+        """
+        slopes = np.empty((len(inputs), len(self.block.outputs), self.n_places))
+        for row, (numbers, state) in enumerate(zip(self._numbers, states, strict=True)):
+            found = self._follow(numbers, self._resumed(state), inputs)
+            if self.n_places:
+                np.divide(found.imag, STEP, out=slopes[:, :, row])
+        return found.real.copy(), slopes
+
+    def _resumed(self, state: Complex) -> Any:
+        return lambda _, index, __: state[self._states[index]]
+
+    def _follow(self, numbers: list[Complex], memory: Any, inputs: Array) -> Complex:
+        """Run all blocks over inputs, each from its memory, ``memory(call, number, its inputs)``."""
+        signals = np.zeros((len(inputs), self._layout.n), np.complex128)
+        signals[:, : inputs.shape[1]] = inputs
+        index = 0
+        for step in self._layout.steps:
+            if not isinstance(step, _Call):
+                signals[:, step[1]] = signals[:, step[0]].sum(axis=1)
+                continue
+            given = np.ascontiguousarray(signals[:, step.given])
+            found = np.empty((len(inputs), len(step.block.outputs)), np.complex128)
+            kernel: Any = step.block.c_kernels[0]
+            room = [self._scratch[index]] if in_scratch(kernel) else []
+            own = memory(step, index, given)
+            twin(kernel.batch)(numbers[index], own, *room, given, found)
+            signals[:, step.first : step.first + found.shape[1]] = found
+            index += 1
+        return signals[:, self._gives]
+
+
+def _complex(real: Array, slopes: Array) -> Complex:
+    found = np.empty(real.shape, np.complex128)
+    found.real, found.imag = real, STEP * slopes
+    return found
+
+
+def _coefficient_slopes(
+    block: Block, values: Array, place: int, sample_time: float | None
+) -> list[Array]:
+    """Return the derivatives of the coefficients of all kernels by a parameter.
+
+    Of ever shorter differences, those that agree best: a gain may have a pole nearby.
+    """
+    sizes = [numbers.size for numbers in _numbers(block, sample_time)]
+
+    def moved(change: float) -> Array:
+        other = values.copy()
+        other[place] += change
+        return np.concatenate(_numbers(_moved(block, iter(other.tolist())), sample_time))
+
+    tried: list[Array] = []
+    found, apart = np.zeros(sum(sizes)), np.full(sum(sizes), np.inf)
+    for share in CHANGES:
+        change = share * (abs(values[place]) or 1.0)
+        slopes = np.zeros(found.size)
+        for times, weight in enumerate(WEIGHTS, 1):
+            above, below = moved(times * change), moved(-times * change)
+            moves = above != below  # infinite ones do not
+            slopes[moves] += weight * (above[moves] - below[moves]) / change
+        if tried:
+            gap = np.abs(slopes - tried[-1])
+            found = np.where(gap < apart, tried[-1], found)
+            apart = np.minimum(gap, apart)
+            if (apart <= AGREEING * np.abs(found)).all():
+                break
+        tried.append(slopes)
+    return np.split(found, np.cumsum(sizes)[:-1])
+
+
+def jacobian(
+    block: Block,
+    inputs: Array,
+    sample_time: float | None = None,
+    initial: Initial | None = None,
+    places: Sequence[int] | None = None,
+) -> Array:
+    """Return the derivatives of a free run by the parameters, shape (n, n_outputs, k).
+
+    Parameters
+    ----------
+    block : Block
+        Any block that is one kernel, or is composed of such.
+    inputs : array, shape (n, n_inputs)
+    sample_time : float, optional
+        Time between samples [s]; needed by blocks that depend on rate.
+    initial : {"first_sample", "virgin"} or sequence of float, optional
+        Memory before the first sample; its derivatives count too, unless it is given itself. Default is
+        the block's own.
+    places : sequence of int, optional
+        Of the k parameters, in `pack`; all by default.
+
+    Raises
+    ------
+    ModelError
+        If a part is not a kernel.
+    """
+    places = range(block.n_parameters) if places is None else places
+    workers = max(min(cores(), len(places)), 1)
+
+    def run(share: Sequence[int]) -> Array:
+        tangents = Tangents(block, sample_time, share)
+        return tangents.over(inputs, tangents.start(inputs[0], initial))[1]
+
+    with ThreadPoolExecutor(workers) as pool:
+        shares = [places[first::workers] for first in range(workers)]
+        found = np.empty((len(inputs), len(block.outputs), len(places)))
+        for first, own in enumerate(pool.map(run, shares)):
+            found[:, :, first::workers] = own
+    return found

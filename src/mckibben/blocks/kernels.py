@@ -1,0 +1,119 @@
+"""How kernels are compiled.
+
+A kernel is a numba function ``kernel(coefficients, state, inputs, outputs)`` on float64 arrays:
+one pass over time, the state changed in place, nothing allocated, nothing global. The same compiled
+kernel serves ``simulate``, ``stream`` and ``simulate_many``, so these agree to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from inspect import signature
+from typing import Any, Protocol, TypeVar, cast
+
+from mckibben.arrays import Array
+from mckibben.system.compiling import deferred
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+SUMS = {"reassoc", "contract"}
+"""Freedom of the compiler in weighted sums."""
+
+
+ROUNDING, BRACKET, SLACK = 1e-14, 1e-15, 1e-9
+"""Relative differences: of rounding, of closed brackets, and by which limits may be passed."""
+
+NOTHING = 1e-300
+"""Weights below do not count."""
+
+SINGLE = {"ROUNDING": 1e-6, "BRACKET": 1e-7, "SLACK": 1e-4, "NOTHING": 1e-37}
+"""What constants are in single precision, where they are of double precision in Python. A module with
+constants of its own of this kind has a table of its own."""
+
+
+def kernel(function: Function) -> Function:
+    """Compile with exact arithmetic, for everything but weighted sums."""
+    return deferred(function)
+
+
+def summing_kernel(function: Function) -> Function:
+    """Compile with the terms of weighted sums free to be reordered, which lets them vectorise.
+
+    Minima, maxima, NaN and infinity keep their meaning.
+    """
+    return deferred(function, fastmath=SUMS)
+
+
+def inlined(function: Function) -> Function:
+    """Compile into each kernel that calls it, for functions that take functions."""
+    return deferred(function, inline="always")
+
+
+@kernel
+def accumulate(total: float, change: float, lost: Array, place: int) -> float:
+    """Return a sum after a change. C of single precision carries what rounding loses, in ``lost``.
+
+    For sums that go on from sample to sample: a million small changes would drift there.
+    """
+    return total + change
+
+
+DERIVED = False
+"""Whether derivatives are taken: true in the twins of `mckibben.blocks.complex_step` alone. What
+``if DERIVED:`` guards is neither compiled nor translated to C."""
+
+
+@inlined
+def improved(evaluate: Any, target: float, u: float, memory: Any) -> float:
+    """Return a root of ``evaluate(u, memory) == target``, in twins with its derivative.
+
+    A search ends on the root to rounding, but not on its derivative, which is that of the last step.
+    """
+    return u
+
+
+class Step(Protocol):
+    """A kernel that advances one sample, ``step(coefficients, state, inputs, outputs)``.
+
+    One that computes in scratch has that behind the state.
+
+    Attributes
+    ----------
+    batch : callable
+        The loop made from it, in which ``inputs`` and ``outputs`` have a row for every sample.
+    """
+
+    batch: Callable[..., None]
+
+    def __call__(self, coefficients: Array, state: Array, *arrays: Array) -> None:
+        """Take the inputs of a sample, and fill its outputs, each of shape (n,)."""
+
+
+def step(function: Callable[..., None], **options: Any) -> Step:
+    """Compile a kernel that advances one sample, and make the loop over samples from it."""
+    one: Any = deferred(function, inline="always", **options)
+
+    def batch(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        for t in range(inputs.shape[0]):
+            one(coefficients, state, inputs[t], outputs[t])
+
+    def batch_in_scratch(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+    ) -> None:
+        for t in range(inputs.shape[0]):
+            one(coefficients, state, scratch, inputs[t], outputs[t])
+
+    loop = batch_in_scratch if "scratch" in signature(function).parameters else batch
+    loop.__qualname__ = f"{function.__module__}.{function.__qualname__}"  # by which it is cached
+    one.batch = deferred(loop, **options)
+    return cast("Step", one)
+
+
+def summing_step(function: Callable[..., None]) -> Step:
+    """Compile a `step` with the freedom of a `summing_kernel`."""
+    return step(function, fastmath=SUMS)
+
+
+def in_scratch(kernel: Callable[..., Any]) -> bool:
+    """Return whether a step or a start computes in scratch that is passed in."""
+    return "scratch" in signature(kernel).parameters

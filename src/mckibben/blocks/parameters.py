@@ -1,0 +1,200 @@
+"""What refuses bad fields and numbers, and has its parameters as a vector in a fixed structure."""
+
+from __future__ import annotations
+
+from abc import ABCMeta
+from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
+from functools import wraps
+from inspect import isfunction
+from itertools import islice
+from typing import Any, ClassVar, Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import ValidationError
+
+from mckibben.arrays import Array
+from mckibben.blocks.notation import Notation
+from mckibben.errors import ModelError
+
+Made = TypeVar("Made")
+
+UNCOMPUTABLE = (ArithmeticError, np.linalg.LinAlgError)
+COMPUTING = {"coefficients", "initial_state", "inverse", "inverse_start", "passes", "reachable"}
+"""Methods in which numbers may be too large or too small to compute with, as where one is made."""
+
+
+def _computing(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a method whose arithmetic errors are told as those of the model's numbers."""
+
+    @wraps(method)
+    def told(self: Any, *given: Any, **named: Any) -> Any:
+        try:
+            return method(self, *given, **named)
+        except UNCOMPUTABLE as error:
+            raise _beyond_sense(type(self), error) from error
+
+    return told
+
+
+def _beyond_sense(cls: type, error: Exception) -> ModelError:
+    return ModelError(
+        f"the numbers of {getattr(cls, 'kind', cls.__name__)!r} cannot be computed with ({error}). "
+        "Remedy: identify the model again; numbers so large or small mean nothing."
+    )
+
+
+class Checked(ABCMeta):
+    """What makes classes that refuse bad fields, and numbers beyond all sense, with a `ModelError`."""
+
+    def __new__(
+        mcs, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **named: Any
+    ) -> Checked:
+        """Return the class, its arithmetic guarded."""
+        for method in COMPUTING & namespace.keys():
+            if isfunction(namespace[method]):
+                namespace[method] = _computing(namespace[method])
+        return super().__new__(mcs, name, bases, namespace, **named)
+
+    def __call__(cls: type[Made], /, *values: Any, **named: Any) -> Made:
+        """Return an instance, its fields validated."""
+        try:
+            return super().__call__(*values, **named)  # type: ignore[misc]
+        except UNCOMPUTABLE as error:
+            raise _beyond_sense(cls, error) from error
+        except ValidationError as error:
+            first = error.errors()[0]
+            names = [field.name for field in fields(cls)]  # type: ignore[arg-type]
+            field, *inside = first["loc"]
+            if isinstance(field, int):
+                field = names[field] if field < len(names) else f"argument {field + 1}"
+            where = ".".join(str(step) for step in (field, *inside))
+            kind = getattr(cls, "kind", cls.__name__)
+            given = "" if first["type"] == "missing" else f", but it is {first['input']!r:.60}"
+            raise ModelError(
+                f"{where} of {kind!r}: {first['msg']}{given}. "
+                f"Remedy: give what {cls.__name__} documents."
+            ) from None
+
+
+class Parametrised(metaclass=Checked):
+    """What has a parameter vector, by default made of fields.
+
+    A field may be a number, a vector, rows, a part that has parameters itself, several of those, or
+    None.
+    """
+
+    kind: ClassVar[str]
+    """Name in the registry and in saved files."""
+
+    parameters: ClassVar[tuple[str, ...]] = ()
+    """Names of the fields, in the order of the vector."""
+
+    notation: ClassVar[Notation] = Notation()
+    """Its equations, and the symbols and units of its numbers."""
+
+    def equations(self) -> tuple[str, ...]:
+        """Return the equations of this structure, in LaTeX; by default those of its class."""
+        return self.notation.equations
+
+    def worked(self) -> tuple[str, ...]:
+        """Return equations with this one's numbers in them, in LaTeX, where they are short; or none."""
+        return ()
+
+    def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
+        """Return the unit of a number of a field, as `Notation` writes it; None if none is declared."""
+        del index
+        return self.notation.unit(field)
+
+    def name_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return what a number of a field is called, for people: the field's name, and its places."""
+        return " ".join([field.replace("_", " "), *(str(place + 1) for place in index)])
+
+    @property
+    def n_parameters(self) -> int:
+        """Length of the parameter vector, `pack`."""
+        return sum(_size(getattr(self, name)) for name in self.parameters)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """What each number of `pack` is called, for people; see `name_of`."""
+        names = [
+            text
+            for field in self.parameters
+            for text in _names(self, field, getattr(self, field), ())
+        ]
+        return tuple(names or (f"{self.kind} {place + 1}" for place in range(self.n_parameters)))
+
+    def pack(self) -> Array:
+        """Return the parameters as a vector, shape (n_parameters,); structure stays outside."""
+        numbers: list[float] = []
+        for name in self.parameters:
+            _gather(getattr(self, name), numbers)
+        return np.array(numbers, dtype=np.float64)
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return the same structure with other parameters, shape (n_parameters,).
+
+        Raises
+        ------
+        ModelError
+            If they are more or fewer.
+        """
+        values = iter(parameter_vector(self, parameters).tolist())
+        fields = {name: _refilled(getattr(self, name), values) for name in self.parameters}
+        return replace(self, **fields)  # type: ignore[type-var]
+
+
+def parameter_vector(part: Parametrised, parameters: ArrayLike) -> Array:
+    """Return a parameter vector after checking its length."""
+    vector = np.asarray(parameters, dtype=np.float64)
+    if vector.shape != (part.n_parameters,):
+        raise ModelError(
+            f"{part.kind!r} of this structure has {part.n_parameters} parameters, got shape "
+            f"{vector.shape}. Remedy: give a vector as pack() returns it."
+        )
+    return vector
+
+
+def _size(value: Any) -> int:
+    if type(value) is float:
+        return 1
+    if type(value) is not tuple:
+        return 0 if value is None else value.n_parameters
+    return len(value) if _is_flat(value) else sum(map(_size, value))
+
+
+def _gather(value: Any, numbers: list[float]) -> None:
+    if type(value) is float:
+        numbers.append(value)
+    elif type(value) is not tuple:
+        numbers.extend(() if value is None else value.pack().tolist())
+    elif _is_flat(value):
+        numbers.extend(value)
+    else:
+        for item in value:
+            _gather(item, numbers)
+
+
+def _refilled(value: Any, numbers: Iterator[float]) -> Any:
+    if type(value) is float:
+        return next(numbers)
+    if type(value) is not tuple:
+        return value and value.unpack(tuple(islice(numbers, value.n_parameters)))
+    if _is_flat(value):
+        return tuple(islice(numbers, len(value)))
+    return tuple(_refilled(item, numbers) for item in value)
+
+
+def _is_flat(values: tuple[Any, ...]) -> bool:
+    return not values or type(values[0]) is float
+
+
+def _names(part: Parametrised, field: str, value: Any, index: tuple[int, ...]) -> list[str]:
+    if isinstance(value, Parametrised):
+        return list(value.parameter_names)
+    if isinstance(value, tuple):
+        items = enumerate(value)
+        return [n for k, item in items for n in _names(part, field, item, (*index, k))]
+    return [] if value is None else [part.name_of(field, index)]

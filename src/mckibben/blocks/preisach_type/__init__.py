@@ -1,1 +1,0 @@
-"""Models made of relays on a grid of thresholds: Preisach and Krasnosel'skii-Pokrovskii."""

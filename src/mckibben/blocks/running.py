@@ -1,0 +1,167 @@
+"""Running blocks: sample by sample, and many at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
+from mckibben.blocks.fields import Initial
+from mckibben.errors import DataError, ModelError
+from mckibben.system.threads import cores
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
+
+
+class Stream:
+    """A block running sample by sample, whatever comes.
+
+    An input that is not finite, and may not be missing, changes nothing, and outputs are always finite:
+    after a bad input, memory is untouched and the outputs are those of the last good step, 0 before the
+    first. Where a huge input gives an output that is not finite, the outputs are those of the last good
+    step too, and memory that is lost with it starts afresh at the next step. Exported C does the same.
+
+    Parameters
+    ----------
+    block : Block
+        What runs.
+    sample_time : float, optional
+        Time between steps [s]; needed by rate-dependent blocks.
+    initial : {"first_sample", "virgin"} or sequence of float, optional
+        Memory before the first step; default is the block's own.
+
+    Attributes
+    ----------
+    state : array, shape (n_states,)
+        Memory; of no meaning before the first step.
+    status : int
+        Of the last step: `GOOD`, `BAD_INPUT` or `BAD_OUTPUT`.
+    """
+
+    GOOD, BAD_INPUT, BAD_OUTPUT = 0, 1, 2
+
+    def __init__(
+        self, block: Block, sample_time: float | None = None, initial: Initial | None = None
+    ) -> None:
+        self.block, self.sample_time, self.initial = block, sample_time, initial
+        inputs, outputs = np.zeros((1, len(block.inputs))), np.zeros((1, len(block.outputs)))
+        self.state = np.zeros(block.n_states)
+        refuse_time(sample_time)
+        block.check_time(sample_time)
+        self._run = block.bind(sample_time, self.state, inputs, outputs)
+        self._input, self._output = inputs[0], outputs[0]
+        # Python's own numbers are faster than arrays so small
+        self._given, self._gives = _scalars(self._input), _scalars(self._output)
+        self._needed = self._input.size - block.n_missable
+        self._one_given, self._one_gives = self._input.size == 1, self._output.size == 1
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the next step is a first one."""
+        self._started = False
+        self._kept: float | list[float] = 0.0
+        self.status = self.GOOD
+
+    def step(self, inputs: float | ArrayLike) -> Array:
+        """Take one sample of every input and return the outputs, shape (n_outputs,).
+
+        The array returned is reused by the next step: copy what you keep.
+
+        Raises
+        ------
+        DataError
+            If the inputs are not as many numbers as the block has inputs.
+        """
+        given, gives = self._given, self._gives
+        # a sum is finite only if all terms are; it may overflow, and infinity less itself is NaN
+        if self._one_given and isinstance(inputs, float):  # also NumPy's
+            given[0] = inputs
+            total = given[0]
+        else:
+            try:
+                self._input[...] = inputs
+            except (TypeError, ValueError, OverflowError) as error:
+                raise self._misfit(error) from None
+            if not self._one_given and np.size(inputs) != self._input.size:  # spread, not given
+                raise self._misfit(ValueError(f"{np.size(inputs)} number(s)"))
+            total = given[0] if self._one_given else sum(given)
+        if total - total and not all(map(isfinite, given[: self._needed])):
+            return self._held(self.BAD_INPUT)
+        if not self._started:
+            self.state[:] = self.block.initial_state(self._input, self.initial)
+            self._started = True
+        self._run()
+        kept: Any = gives[0] if self._one_gives else gives.tolist()
+        total = kept if self._one_gives else sum(kept)
+        if total - total and not all(map(isfinite, gives)):
+            if not np.isfinite(self.state).all():
+                self._started = False
+            return self._held(self.BAD_OUTPUT)
+        self._kept = kept
+        self.status = self.GOOD
+        return self._output
+
+    def _held(self, status: int) -> Array:
+        self.status = status
+        self._output[...] = self._kept
+        return self._output
+
+    def _misfit(self, error: Exception) -> DataError:
+        names = ", ".join(channel.name for channel in self.block.inputs)
+        return DataError(
+            f"a step cannot take these inputs ({error})", remedy=f"give one number each: {names}"
+        )
+
+
+def refuse_time(sample_time: float | None) -> None:
+    """Refuse what cannot be the time between two samples.
+
+    Raises
+    ------
+    ModelError
+        If it is given, and is no finite number of seconds above 0.
+    """
+    if sample_time is not None and not (isfinite(sample_time) and sample_time > 0):
+        raise ModelError(
+            f"the time between samples cannot be {sample_time:g} s. Remedy: give seconds, above 0."
+        )
+
+
+def _scalars(array: Array) -> memoryview[float]:
+    return array.data.cast("B").cast("d")
+
+
+def run_many(
+    blocks: Sequence[Block],
+    inputs: Array,
+    *,
+    sample_time: float | None = None,
+    initial: Initial | None = None,
+) -> Array:
+    """Run several blocks with the same channels over the same inputs, on all cores.
+
+    Returns
+    -------
+    array, shape (len(blocks), n, n_outputs)
+    """
+    refuse_time(sample_time)
+    outputs = np.empty((len(blocks), inputs.shape[0], len(blocks[0].outputs)))
+
+    def run(share: Iterable[int]) -> None:
+        for index in share:
+            state = blocks[index].initial_state(inputs[0], initial)
+            blocks[index].bind(sample_time, state, inputs, outputs[index])()
+
+    workers = min(cores(), len(blocks))
+    if workers == 1:
+        run(range(len(blocks)))
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(run, [range(first, len(blocks), workers) for first in range(workers)]))
+    return outputs

@@ -1,0 +1,171 @@
+"""Blocks as JSON that a person can read: exact to the last bit, and data only, never code.
+
+A file starts with ``format`` and ``version``; every block names its ``kind``, which the registry
+turns into a class. Unknown kinds and fields, numbers that are not finite and values of the wrong type
+are refused.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
+from dataclasses import fields, is_dataclass
+from itertools import count, repeat
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mckibben.errors import DataError, ModelError
+from mckibben.registry import load as load_plugin
+from mckibben.registry import names
+from mckibben.system.atomic import write_text
+from mckibben.system.ordinary import read_text
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
+
+FORMAT = "mckibben-model"
+VERSION = 1
+LARGEST_FILE = 64 * 2**20
+"""Bytes; a longer file is refused before it is parsed."""
+MOST_PARTS = 5000
+"""Blocks and what is in them that a model may describe, so that reading a large file ends soon."""
+
+_described: ContextVar[Iterator[int]] = ContextVar("described")
+
+
+def to_dict(block: Block) -> dict[str, Any]:
+    """Return a block as a JSON-ready dict, with ``format`` and ``version`` first."""
+    return {"format": FORMAT, "version": VERSION, **part_to_dict(block)}
+
+
+def from_dict(content: Mapping[str, Any]) -> Block:
+    """Return the block that `to_dict` described.
+
+    Raises
+    ------
+    ModelError
+        If the dict is of another format or version, or anything in it is not as it should be.
+    """
+    if not isinstance(content, Mapping) or content.get("format") != FORMAT:
+        raise ModelError(
+            f'this is not a saved model (no "format": "{FORMAT}"). '
+            "Remedy: give a file written by 'mckibben fit' or Block.save."
+        )
+    version = content.get("version")
+    if type(version) is not int or version != VERSION:
+        raise ModelError(
+            f"the model has format version {version!r:.60}, this package reads version {VERSION}. "
+            "Remedy: save it again with a matching release of mckibben."
+        )
+    described = {key: value for key, value in content.items() if key not in ("format", "version")}
+    counted = _described.set(count(1))
+    try:
+        block: Block = part_from_dict(described)
+    except RecursionError:
+        raise ModelError("nested too deeply. Remedy: compose fewer blocks in each other.") from None
+    finally:
+        _described.reset(counted)
+    return block
+
+
+def part_to_dict(part: Any) -> Any:
+    """Return a block, or anything in one, as JSON-ready values."""
+    if is_dataclass(part) and not isinstance(part, type):
+        named = {"kind": part.kind} if hasattr(part, "kind") else {}
+        return named | {f.name: part_to_dict(getattr(part, f.name)) for f in fields(part)}
+    if isinstance(part, tuple):
+        return [part_to_dict(item) for item in part]
+    return part
+
+
+def part_from_dict(content: Any, group: str = "blocks") -> Any:
+    """Return the block (or other plug-in of ``group``) that `part_to_dict` described."""
+    if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
+        raise ModelError('a block without a "kind". Remedy: save the model again.')
+    if next(_described.get(repeat(1))) > MOST_PARTS:
+        raise ModelError(f"more than {MOST_PARTS} parts. Remedy: compose fewer blocks.")
+    kind = _present(content["kind"], group)
+    cls = load_plugin(group, kind)
+    values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
+    unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
+    if unknown:
+        raise ModelError(f"{kind!r} has no field {unknown[0]!r}. Remedy: save the model again.")
+    return cls(**values)
+
+
+def _present(kind: str, group: str) -> str:
+    """Return what a kind of an older file is called now: every inverse had a kind of its own."""
+    known = names(group)
+    undone = kind.removesuffix("-inverse")
+    return "inverse" if group == "blocks" and kind not in known and undone in known else kind
+
+
+def nested(content: Any) -> Any:
+    """Turn the dict of a block inside another into that block; for fields of compositions."""
+    return part_from_dict(content) if isinstance(content, Mapping) else content
+
+
+def to_text(block: Block) -> str:
+    """Return a block as the text of its file."""
+    return json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n"
+
+
+def save(block: Block, path: str | Path) -> None:
+    """Write a block as JSON, by a temporary file that is then renamed, over what had the name."""
+    write_text(path, to_text(block))
+
+
+def load(path: str | Path) -> Block:
+    """Read a block saved as JSON.
+
+    Parameters
+    ----------
+    path : str or Path
+        File that `Block.save` or a command wrote.
+
+    Raises
+    ------
+    ModelError
+        If the file is absent, unreadable, too large, truncated, or anything but a saved model.
+    """
+    path = Path(path)
+    try:
+        text = read_text(path, most=LARGEST_FILE)
+        return from_dict(json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique))
+    except DataError as error:
+        raise ModelError(_recording(path) or str(error)) from None
+    except (ValueError, RecursionError) as error:
+        if told := _recording(path):
+            raise ModelError(told) from None
+        raise ModelError(
+            f"{path}: not readable as a model ({str(error)[:200]}). Remedy: save the model again."
+        ) from None
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
+
+
+def _recording(path: Path) -> str:
+    """Return what to say of a file that is no JSON, if it is there and named as a recording."""
+    from mckibben.files.formats import SOUGHT
+
+    if path.suffix.casefold() not in SOUGHT or not path.is_file():
+        return ""
+    return f"{path}: this is a recording. Remedy: the model comes first, then recordings."
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
+
+
+def _refuse(constant: str) -> None:
+    raise ModelError(
+        f"the file holds {constant}, which no model has. Remedy: save the model again."
+    )
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        raise ModelError("a field stands twice in the file. Remedy: save the model again.")
+    return content

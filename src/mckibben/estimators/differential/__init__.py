@@ -1,1 +1,0 @@
-"""Identification of hysteresis as a differential equation in the input."""

@@ -1,0 +1,363 @@
+"""ARX, ARMAX, output-error and Box-Jenkins models of any order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from annotated_types import Interval, Len
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Parallel
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
+from mckibben.blocks.fields import vector
+from mckibben.errors import DataError, ModelError
+from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.estimator import Grid, resting
+from mckibben.estimators.core.uncertainty import inverted, simulate_all, told_by_runs, unknown
+from mckibben.estimators.coupled.base import schedules
+from mckibben.estimators.dynamics.linear_polynomials import Orders, Polynomials, Start
+from mckibben.estimators.dynamics.linear_starts import LinearEstimator
+from mckibben.estimators.dynamics.prediction_error import (
+    arx,
+    evaluate,
+    minimise,
+    starting_points,
+)
+from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
+from mckibben.recording import Recording, listed
+
+Order = Annotated[int, Interval(ge=0, le=20)]
+Lag = Annotated[int, Interval(ge=0, le=120)]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise model of a prediction-error fit: C / D and the standard deviation of e."""
+
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+    deviation: float
+    covariance: Array = field(repr=False)
+    """Of all coefficients: B, A or F, C, D, leading ones left out; constants not."""
+
+    @property
+    def standard_errors(self) -> tuple[float, ...]:
+        """Of the same."""
+        return vector(np.sqrt(np.diag(self.covariance)))
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class PredictionErrorEstimator(LinearEstimator):
+    """An estimator of a linear model by one-step prediction errors, run free ever after.
+
+    After `fit`, ``noise_`` holds the noise model, the one-step error, and the covariance of all
+    coefficients. Covariances are those of Ljung, chapter 9, and take the noise to be what the model says
+    it is; output-error models say nothing of it, and theirs hold under coloured noise too.
+
+    Parameters
+    ----------
+    n_zeros : int
+        Coefficients of B, at least 1.
+    n_poles : int
+        Order of A or F.
+    shared_poles : bool
+        Whether the poles are the noise's too, A y = B u + C e, of which ARX is solved for at once; or of
+        the way from the input alone, y = B / F u + C / D e.
+    n_noise, n_noise_poles : int
+        Orders of C and D.
+    delay : int
+        Samples before B's first coefficient.
+    lags : sequence of int, optional
+        Samples by which the input of each coefficient of B lies back, instead of n_zeros from the delay
+        on. The Box-Jenkins model of "Analysis and modeling of a pneumatic artificial muscle system",
+        Eq. (5), has terms in q^0 and q^-2 only in its printed B, Eq. (6): ``lags=(0, 2)``.
+    n_starts : int
+        Starting points.
+    input, output : str or sequence of str
+        Channels to learn from. Of several inputs, A is common to all, and every input has an F of its
+        own; several outputs are identified one after another. Runs then start at rest at their first
+        inputs, where `initial` is "fitted" too.
+    beside : sequence of str, optional
+        Further inputs, such as a load. Default: of several inputs or outputs ``pressure_extensor`` and
+        ``force``, where there are any.
+    """
+
+    purpose = "rate"
+    inverse_kind = "exact where stable"
+    param_grid: ClassVar[Grid] = {
+        "n_poles": (1, 2, 3),
+        "n_zeros": (1, 2, 3),
+    }
+    needs_time: ClassVar[bool] = True
+
+    input: str | tuple[str, ...] = "pressure"  # type: ignore[assignment]
+    output: str | tuple[str, ...] = "displacement"  # type: ignore[assignment]
+    beside: tuple[str, ...] | None = None
+    n_zeros: Annotated[int, Interval(ge=1, le=20)] = 2
+    n_poles: Order = 2
+    shared_poles: bool = True
+    n_noise: Order = 0
+    n_noise_poles: Order = 0
+    delay: Annotated[int, Interval(ge=0, le=100)] = 0
+    lags: Annotated[Sequence[Lag], Len(1)] | None = None
+    n_starts: Annotated[int, Interval(ge=1, le=1000)] = 12
+
+    rises: ClassVar[bool] = False
+    effort: ClassVar[float] = 0.02
+
+    @property
+    def orders(self) -> Orders:
+        """How many coefficients each polynomial has."""
+        lags = None if self.lags is None else tuple(sorted(set(self.lags)))
+        poles = {"a" if self.shared_poles else "f": self.n_poles}
+        return Orders(
+            b=len(lags) if lags else self.n_zeros,
+            c=self.n_noise,
+            d=self.n_noise_poles,
+            delay=self.delay,
+            lags=lags,
+            **poles,
+        )
+
+    def check_settings(self) -> None:
+        """Refuse settings that are not as they are declared, and poles of the noise in two places."""
+        super().check_settings()
+        if self.shared_poles and self.n_noise_poles:
+            raise ModelError(
+                f"the noise shares the model's poles, and has {self.n_noise_poles} of its own. "
+                "Remedy: use n_noise_poles=0, or shared_poles=false."
+            )
+
+    @property
+    def single(self) -> bool:
+        """Whether it is of one input and one output."""
+        return isinstance(self.input, str) and isinstance(self.output, str) and not self.beside
+
+    @classmethod
+    def objection(
+        cls,
+        recordings: Sequence[Recording],
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        scheduling: Sequence[str] | None = None,
+    ) -> str | None:
+        if not inputs or not outputs:
+            return "it needs an input and an output"
+        beside = scheduling or ()
+        if scheduling is None and len((*inputs, *outputs)) > 2:
+            beside = schedules(recordings, (*inputs, *outputs))
+        for name in beside:
+            if absent := [each.name for each in recordings if name not in each]:
+                return f"it needs the channel {name!r}, which {absent[0]} lacks"
+        return resting(recordings, inputs)
+
+    @classmethod
+    def channel_settings(
+        cls,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        scheduling: Sequence[str] | None = None,
+    ) -> dict[str, Any]:
+        if len(inputs) == len(outputs) == 1 and scheduling is None:
+            return {"input": inputs[0], "output": outputs[0]}
+        beside = None if scheduling is None else tuple(scheduling)
+        return {"input": tuple(inputs), "output": tuple(outputs), "beside": beside}
+
+    def data(
+        self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
+    ) -> TrainingData:
+        """Return what is learned from recordings; of several inputs, from all that drive."""
+        if self.single:
+            return super().data(recordings, rows)
+        driving, given = ((of,) if isinstance(of, str) else of for of in (self.input, self.output))
+        every = listed(recordings)
+        beside = self.beside
+        if beside is None:
+            beside = schedules(every, (*driving, *given))
+        moving = [name for name in beside if any(name in r and np.ptp(r[name]) > 0 for r in every)]
+        whole = replace(self, input=(*driving, *moving), output=tuple(given))
+        return super(PredictionErrorEstimator, whole).data(recordings, rows)
+
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the block found: of several channels, the sum of one for every input, by output."""
+        parts: list[Block] = []
+        share = 1.0 / len(data.outputs)
+        for place, output in enumerate(data.outputs):
+            runs = tuple(replace(run, outputs=run.outputs[:, [place]]) for run in data.runs)
+            own = tracker.part(place * share, (place + 1) * share)
+            parts += self._of_output(replace(data, runs=runs, outputs=(output,)), own)
+            tracker.saw_all(own)
+        return (parts[0] if self.single else Parallel(tuple(parts))), data
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the transfer function found, and the data."""
+        return self.find(data, tracker)
+
+    def _of_output(self, data: TrainingData, tracker: Tracker) -> tuple[TransferFunction, ...]:
+        """Return the transfer function from every input to the output."""
+        step = data.timed(instead=", or use gpi")
+        orders = replace(self.orders, inputs=len(data.inputs))
+        start = self.starting
+        if data.target.size <= orders.size + orders.poles * len(data.runs):
+            raise DataError(
+                f"{data.target.size} samples are too few for {orders.size} parameters",
+                remedy="give longer recordings, or lower orders",
+            )
+        centre = np.mean(data.stacked("driven"), axis=0)
+        middle = float(np.mean(data.target))
+        given, wanted = np.ptp(data.stacked("driven"), axis=0), float(np.ptp(data.target))
+        known, runs = (
+            [
+                replace(
+                    run,
+                    driven=(run.driven - centre) / given,
+                    outputs=(run.outputs - middle) / wanted,
+                )
+                for run in pieces
+            ]
+            for pieces in (data.stretches(orders.size).runs, data.runs)
+        )
+        if orders.a or orders.c or orders.d:
+            if not known:
+                raise DataError(
+                    f"no {orders.size + 1} samples in a row count, which {orders.size} parameters take",
+                    remedy="give longer recordings, or lower orders",
+                )
+            runs = known  # a free run needs no outputs, so it alone goes on where they do not count
+        if orders.c == orders.d == orders.f == 0:
+            theta = arx(runs, orders)
+            tracker.saw(theta, evaluate(theta, orders, runs, start)[2])
+        else:
+            starts = starting_points(runs, known, orders, self.n_starts, self.seed)
+            theta = minimise(runs, orders, starts, tracker, start)
+        theta[: orders.zeros] *= np.repeat(wanted / given, orders.b)
+        theta[-1] *= wanted
+        runs = [
+            replace(run, driven=given * run.driven, outputs=wanted * run.outputs) for run in runs
+        ]
+        p = Polynomials.of(theta, orders)
+        self._constant = p.constant
+        e, slopes, deviation = evaluate(theta, orders, runs, start)
+        size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+        self._condition, inverse = inverted(slopes / size)
+        freedom = max(e.size - orders.size - orders.poles * len(runs), 1)
+        self._covariance = float(e @ e) / freedom * inverse / np.outer(size, size)
+        if orders.f and not orders.c + orders.d:
+            coloured = told_by_runs(slopes / size, e, runs)[1]
+            self._covariance = coloured / np.outer(size, size)
+        noise = (vector(p.c), vector(p.poles[0] if orders.a else p.d), deviation)
+        self.noise_ = Noise(
+            (1.0, *noise[0]), (1.0, *noise[1]), deviation, self._covariance[:-1, :-1]
+        )
+        constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
+        found = []
+        for place, (channel, b) in enumerate(zip(data.inputs, p.b, strict=True)):
+            poles = p.poles[min(place, len(p.poles) - 1)]
+            numerator = np.zeros(1 + max(orders.input_lags))
+            numerator[[*orders.input_lags]] = b
+            block = TransferFunction(
+                vector(numerator),
+                vector(poles),
+                step,
+                float(centre[place]),
+                0.0 if place else middle + constant,
+                start,
+                channel,
+                data.outputs[0],
+                *(() if place else noise),
+            )
+            if not block.is_stable:
+                radius = float(np.abs(block.poles).max())
+                raise ModelError(
+                    f"the model found is unstable (a pole at |z| = {radius:.4g}). "
+                    "Remedy: use other orders, or output-error (oe), which is kept stable."
+                )
+            found.append(block)
+        return tuple(found)
+
+    @property
+    def starting(self) -> Start:
+        """The state before the first sample; of several inputs none is fitted."""
+        return "first_sample" if self.initial == "fitted" and not self.single else self.initial
+
+    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
+        """Return the free-running outputs of blocks where samples count, started by their rule."""
+        return super().free_runs(blocks, data) if self.single else simulate_all(blocks, data)
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return the condition and covariance from the prediction errors; the input's offset is set.
+
+        Of several inputs or outputs neither is known.
+        """
+        if not self.single:
+            return np.nan, unknown(block)
+        orders = self.orders
+        n, poles = block.n_parameters, orders.poles
+        turned = np.zeros((n, orders.size))
+        turned[[*orders.input_lags], : orders.b] = np.eye(orders.b)
+        first = 1 + max(orders.input_lags)
+        turned[first : first + poles, orders.b : orders.b + poles] = np.eye(poles)
+        turned[-1, -1] = 1.0
+        if orders.a:  # the offset of the output is the constant over the sum of A
+            assert isinstance(block, TransferFunction)
+            whole = 1.0 + sum(block.denominator)
+            turned[-1, -1] = 1.0 / whole
+            turned[-1, orders.b : orders.b + poles] = -self._constant / whole**2
+        used = np.any(turned != 0, axis=1)
+        covariance = np.full((n, n), np.nan)
+        covariance[np.ix_(used, used)] = (turned @ self._covariance @ turned.T)[np.ix_(used, used)]
+        return self._condition, covariance
+
+
+ARMAX = preset(
+    PredictionErrorEstimator,
+    "ARMAX model, A y = B u + C e.",
+    title="ARMAX model, linear",
+    can="Linear dynamics with a model of the noise; fast to fit.",
+    cannot="Has no hysteresis: rising and falling branches coincide at rest.",
+    param_grid={"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3), "n_noise": (1, 2)},
+    n_noise=2,
+    effort=1.0,
+)
+
+ARX = preset(
+    PredictionErrorEstimator,
+    "ARX model, A y = B u + e, by linear least squares.",
+    title="ARX model, linear",
+    can="Linear dynamics, in closed form.",
+    cannot=(
+        "No hysteresis; biased by noise in the output, so its free run drifts from what one "
+        "step ahead promises."
+    ),
+    quick=True,
+    param_grid={"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
+)
+
+BJ = preset(
+    PredictionErrorEstimator,
+    "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
+    title="Box–Jenkins model (BJ), linear",
+    can="Linear dynamics with noise described apart from them.",
+    cannot="No hysteresis.",
+    shared_poles=False,
+    n_noise=2,
+    n_noise_poles=2,
+    effort=1.0,
+)
+
+OE = preset(
+    PredictionErrorEstimator,
+    "Output-error model, y = B / F u + e: the best free run of its orders.",
+    title="Output-error model (OE), linear",
+    can="Linear dynamics, identified on free runs.",
+    cannot="No hysteresis.",
+    shared_poles=False,
+    effort=0.8,
+)

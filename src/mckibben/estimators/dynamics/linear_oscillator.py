@@ -1,0 +1,78 @@
+"""The linear oscillator nearest to recordings, from which others start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mckibben.blocks.dynamics.process_model import ProcessModel
+from mckibben.errors import DataError
+from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.dynamics.process_model import ProcessModelEstimator
+from mckibben.estimators.optimisers.tracker import Tracker
+
+FORGOTTEN = 3 * np.log(1e8)
+"""Times the decay after which a start counts as forgotten.
+
+Thrice what a hundred-millionth takes, for with hysteresis smaller motion decays slower.
+"""
+
+MOST_SUBSTEPS = 1000
+
+MOST_PERIODS = 20
+"""Of the longest run, after which it does in any case."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """An oscillator without hysteresis: mass [kg], damping [N s/mm] and stiffness [N/mm]."""
+
+    mass: float
+    damping: float
+    stiffness: float
+
+    @property
+    def frequency(self) -> float:
+        """Angular frequency without damping [rad/s]."""
+        return float(np.sqrt(1e3 * self.stiffness / self.mass))
+
+    @property
+    def decay(self) -> float:
+        """How fast its free motion dies away [1/s]: the slower of two lags, where overdamped."""
+        half = 500.0 * self.damping / self.mass
+        return half - float(np.sqrt(max(half**2 - self.frequency**2, 0.0)))
+
+    def forgets(self, data: TrainingData) -> int:
+        """Return after how many samples starts no longer count."""
+        longest = MOST_PERIODS * max(run.u.size for run in data.runs)
+        return int(min(np.ceil(FORGOTTEN / max(self.decay * data.timed(), 1e-9)), longest))
+
+    def substeps(self, step: float, angle: float) -> int:
+        """Return steps from sample to sample in each of which it turns by at most an angle [rad]."""
+        return int(np.clip(np.ceil(self.frequency * step / angle), 1, MOST_SUBSTEPS))
+
+
+def linear_oscillator(data: TrainingData, channels: dict[str, Any]) -> Linear:
+    """Return the linear oscillator with the least free-run error, each run from a start of its own.
+
+    Raises
+    ------
+    DataError
+        If the displacement falls while the force rises slowly.
+    """
+    estimator = ProcessModelEstimator(
+        structure="P2U", input=channels["input"].name, output=channels["output"].name, n_refined=1
+    )
+    model, _ = estimator.find(data, Tracker())
+    assert isinstance(model, ProcessModel)
+    assert model.damping is not None
+    if not model.gain > 0:
+        raise DataError(
+            "the displacement falls while the force rises slowly",
+            channel=channels["output"].name,
+            remedy="turn the sign of one of them",
+        )
+    (time,), stiffness = model.time_constants, 1.0 / model.gain
+    return Linear(1e3 * stiffness * time**2, 2.0 * model.damping * time * stiffness, stiffness)

@@ -1,0 +1,376 @@
+"""Prediction-error minimisation: Gauss-Newton with damping, from many starts, stable at every step.
+
+The start of every run is linear in the errors and solved for in each evaluation, so the search
+runs in the polynomials alone, in coordinates that no step can take out of the stable region. Several
+starts guard against local minima: the high-order ARX model reduced by Steiglitz and McBride's
+iteration, slow and fast lags, and random stable poles, each with the noise model that its residuals
+ask for; the best of all is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import combinations_with_replacement, islice
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.dynamics.linear_start import known_starts
+from mckibben.estimators.core.data import Run
+from mckibben.estimators.dynamics.linear_polynomials import Orders, Polynomials, Start, errors
+from mckibben.estimators.dynamics.linear_stability import (
+    free_coordinates,
+    inside,
+    polynomial,
+    spectral_radius,
+)
+from mckibben.estimators.optimisers.descent import Damping, damped, descend
+from mckibben.estimators.optimisers.multi_start import follow_best
+from mckibben.estimators.optimisers.tracker import Tracker
+
+STABLE = 1.0 - 1e-7
+"""Largest pole."""
+
+INVERTIBLE = 1.0 - 1e-7
+"""Largest root of C."""
+
+FIRST_STEPS, FOLLOWED, STEPS = 8, 3, 60
+"""Steps taken from every start; how many of the best, at different places, are followed; how far."""
+
+HEAVIEST = 1e9
+"""Damping at which no step is left."""
+
+ALTERNATIONS = 2
+"""Times that noise model and B are solved for in turn, for a start."""
+
+NOISE_SAMPLES = 2000
+"""Of every run, of which the noise model of a start is made."""
+
+REPLANTED = 4
+"""Starts, the best, whose noise model is used to find the plant anew."""
+
+SAME = 1e-6
+"""Relative difference of errors that is none."""
+
+FELT = 1e-13
+"""Share of a start's response that is left where samples count, for it to be solved for."""
+
+LEAST_GAIN = 2e-9
+"""Share of the squared error that a step gains, or the descent has arrived."""
+
+
+def admissible(theta: Array, orders: Orders) -> bool:
+    """Tell whether poles, and the roots of C and D, lie where they may."""
+    p = Polynomials.of(theta, orders)
+    return (
+        bool(np.isfinite(theta).all())
+        and all(spectral_radius(tail) < STABLE for tail in p.poles)
+        and spectral_radius(p.c) < INVERTIBLE
+        and spectral_radius(p.d) <= 1.0 + 1e-9
+    )
+
+
+def loosened(theta: Array, orders: Orders) -> Array:
+    """Return the coordinates of parameters in which no step leaves what is stable."""
+    p = Polynomials.of(theta, orders)
+    free = [free_coordinates(tail) for tail in p.monic]
+    return np.concatenate([p.b.ravel(), *free, [p.constant]])
+
+
+def tightened(coordinates: Array, orders: Orders) -> tuple[Array, Array]:
+    """Return the parameters of such coordinates, and their derivatives by them."""
+    p = Polynomials.of(coordinates, orders)
+    theta, slopes, place = coordinates.copy(), np.eye(coordinates.size), orders.zeros
+    for tail in p.monic:
+        own = slice(place, place + tail.size)
+        theta[own], slopes[own, own] = polynomial(tail)
+        place += tail.size
+    return theta, slopes
+
+
+def evaluate(
+    theta: Array, orders: Orders, runs: Sequence[Run], start: Start = "fitted"
+) -> tuple[Array, Array, float]:
+    """Return errors, derivatives with every start solved for, and the RMSE, where samples count."""
+    found, slopes = [], []
+    for run in runs:
+        # how the start's own response moves with theta counts too: slopes are taken at the start found
+        e, starts = errors(theta, orders, run, start, only_starts=True)
+        if not starts.shape[1]:
+            e, jacobian = errors(theta, orders, run, start)
+            e, own = e[run.counts], jacobian[run.counts]
+        else:
+            states, seen = known_starts(starts, run.counts, FELT)
+            e, jacobian = errors(theta, orders, run, start, -states @ (seen.T @ e[run.counts]))
+            e, own = e[run.counts], jacobian[run.counts, : orders.size]
+            e = e - seen @ (seen.T @ e)
+            own = own - seen @ (seen.T @ own)
+        found.append(e)
+        slopes.append(own)
+    e = np.concatenate(found)
+    return e, np.concatenate(slopes), float(np.sqrt(np.mean(e**2)))
+
+
+def minimise(
+    runs: Sequence[Run],
+    orders: Orders,
+    starts: Sequence[Array],
+    tracker: Tracker,
+    start: Start = "fitted",
+) -> Array:
+    """Return the best parameters found from all starts."""
+    tracker.budget = len(starts) * FIRST_STEPS + FOLLOWED * STEPS
+
+    def followed(theta: Array, steps: int) -> tuple[Array, float]:
+        here = At(orders, runs, start, tracker)
+        trust = Damping(1e-4, HEAVIEST, steps=partial(_steps, orders))
+        path = descend(here.errors, here.slopes, theta, trust, least_gain=LEAST_GAIN)
+        *_, (found, squares) = islice(path, steps + 1)
+        return found, float(np.sqrt(squares))
+
+    with tracker.searching():
+        follow_best(
+            (theta for theta in starts if admissible(theta, orders)),
+            partial(followed, steps=FIRST_STEPS),
+            partial(followed, steps=STEPS),
+            FOLLOWED,
+            SAME,
+        )
+    assert tracker.best is not None
+    return tracker.best
+
+
+class At:
+    """Errors at parameters, and their derivatives, which are computed with them."""
+
+    def __init__(self, orders: Orders, runs: Sequence[Run], start: Start, tracker: Tracker) -> None:
+        self.orders, self.runs, self.start, self.tracker = orders, runs, start, tracker
+
+    def errors(self, theta: Array) -> Array:
+        """Return the errors."""
+        e, self._slopes, cost = evaluate(theta, self.orders, self.runs, self.start)
+        self.tracker.saw(theta, cost)
+        return e
+
+    def slopes(self, theta: Array) -> Array:
+        """Return the derivatives where errors were last asked for."""
+        return self._slopes
+
+
+def _steps(
+    orders: Orders, theta: Array, jacobian: Array, e: Array, damping: float
+) -> Iterator[Array]:
+    """Yield where a damped step leads: in the coefficients, then in coordinates without bounds.
+
+    In the coefficients the valley of a root held near the unit circle is straight; they have bounds,
+    at which the others would stop too.
+    """
+    tried = theta + damped(jacobian, e, damping)
+    if admissible(tried, orders):
+        yield tried
+    here = loosened(theta, orders)
+    moved = here + damped(jacobian @ tightened(here, orders)[1], e, damping)
+    tried = tightened(moved, orders)[0]
+    if admissible(tried, orders):
+        yield tried
+
+
+def arx(runs: Sequence[Run], orders: Orders) -> Array:
+    """Return the least-squares ARX model: linear, so found at once."""
+    theta = np.zeros(orders.size)
+    e, jacobian, _ = evaluate(theta, orders, runs)
+    return np.asarray(theta - np.linalg.lstsq(jacobian, e, rcond=1e-12)[0])
+
+
+def filtered(run: Run, numerator: Sequence[float], denominator: Sequence[float]) -> Run:
+    """Return a run whose inputs and outputs have passed a filter."""
+    from scipy.signal import lfilter
+
+    driven, outputs = (
+        np.asarray(lfilter(numerator, denominator, x, axis=0)) for x in (run.driven, run.outputs)
+    )
+    return replace(run, driven=driven, outputs=outputs)
+
+
+def starting_points(
+    runs: Sequence[Run], known: Sequence[Run], orders: Orders, n_starts: int, seed: int
+) -> list[Array]:
+    """Return parameters to start from: reduced ARX, lags of a few speeds, random stable poles.
+
+    ARX looks at past outputs, so it is found on what is known: stretches whose samples all count.
+
+    Under coloured noise poles are also found on data whitened by ARX models of high order, which
+    give plant and noise alike without bias, and once more on data whitened by the noise models that
+    follow from all these.
+    """
+    rng = np.random.default_rng(seed)
+    n = orders.a + orders.f
+    coloured = orders.c + orders.d > 0
+    white = _whitened(runs, orders) if coloured else []
+    candidates: list[tuple[Array, Sequence[Run]]]
+    candidates = [(_steiglitz_mcbride(data, orders, k), data) for data in white for k in (1, 10)]
+    if known:
+        candidates += [(_steiglitz_mcbride(known, orders, k), runs) for k in (0, 1, 3, 10)]
+    plain = white[0] if white else runs
+    for speed in ([0.2], [0.9], [0.99, 0.9], [0.9995, 0.97]):
+        spread = np.resize(np.array(speed), n) * (1 - 1e-3 * np.arange(n))
+        candidates.append((np.asarray(np.poly(spread)[1:], dtype=np.float64), plain))
+    while len(candidates) < n_starts:
+        poles = 1 - 10 ** rng.uniform(-4, 0, n)
+        candidates.append((np.asarray(np.poly(poles)[1:], dtype=np.float64), plain))
+    stable = [(poles, data) for poles, data in candidates if spectral_radius(poles) < STABLE]
+    found = [_complete(poles, data, runs, orders) for poles, data in stable]
+    if not coloured:
+        return found
+    found.sort(key=lambda theta: evaluate(theta, orders, runs)[2])
+    return found + [_with_plant(theta, runs, orders) for theta in found[:REPLANTED]]
+
+
+def _with_plant(theta: Array, runs: Sequence[Run], orders: Orders) -> Array:
+    """Return parameters whose plant is found on data whitened by the noise model given."""
+    p = Polynomials.of(theta, orders)
+    top, below = ([1.0, *p.d], [1.0, *p.c]) if not orders.a else ([1.0], [1.0, *p.c])
+    moved = (
+        replace(run, driven=run.driven - run.driven[0], outputs=run.outputs - run.outputs[0])
+        for run in runs
+    )
+    white = [filtered(run, top, below) for run in moved]
+    poles = _steiglitz_mcbride(white, orders, 10)
+    return _complete(poles, white, runs, orders)
+
+
+def _complete(poles: Array, white: Sequence[Run], runs: Sequence[Run], orders: Orders) -> Array:
+    """Return parameters with these poles for every input, and the B, constant, C and D that suit them.
+
+    B is solved for on data in which the noise is white, or taken to be; its residuals on the data as
+    they are give C and D; under these B and the constant are solved for again, and so on.
+    """
+    theta = np.zeros(orders.size)
+    theta[orders.zeros : orders.zeros + orders.poles] = np.tile(poles, orders.recursions)
+    if orders.c + orders.d == 0:
+        return _linear_solved(theta, orders, runs)
+    plant = replace(orders, c=0, d=0)
+    simple = _linear_solved(np.append(theta[: plant.size - 1], 0.0), plant, white)
+    theta[: orders.zeros] = simple[: orders.zeros]
+    for _ in range(ALTERNATIONS):
+        noise = [_noise(theta, orders, run) for run in runs]
+        theta[orders.zeros + orders.poles : -1] = arma(noise, orders.c, orders.d)
+        theta = _linear_solved(theta, orders, runs)
+    return theta
+
+
+def _noise(theta: Array, orders: Orders, run: Run) -> Array:
+    """Return what plant, constant and start leave, which are the best under the noise model."""
+    from scipy.signal import lfilter
+
+    p = Polynomials.of(theta, orders)
+    e, jacobian = errors(theta, orders, run)
+    columns = jacobian[:, orders.size - 1 :]
+    e = e - columns @ np.linalg.lstsq(columns, e, rcond=1e-10)[0]
+    return np.asarray(lfilter([1.0, *p.c], [1.0, *p.d], e))
+
+
+def _linear_solved(theta: Array, orders: Orders, runs: Sequence[Run]) -> Array:
+    """Return the parameters with the best B and constant, the others held."""
+    places = [*range(orders.zeros), orders.size - 1]
+    e, jacobian, _ = evaluate(theta, orders, runs)
+    solved = theta.copy()
+    solved[places] -= np.linalg.lstsq(jacobian[:, places], e, rcond=1e-12)[0]
+    return solved
+
+
+def arma(series: Sequence[Array], n_c: int, n_d: int) -> Array:
+    """Return C and D, without leading ones, of noise C / D e: the best of many C, each with its D.
+
+    One is Hannan and Rissanen's, by regression on the residuals of a long autoregression; it misses
+    roots near the unit circle, whose memory is longer than any regression's, so roots are tried too.
+
+    Source: Hannan and Rissanen, "Recursive estimation of mixed autoregressive-moving average order",
+    1982.
+    """
+    from scipy.signal import lfilter
+
+    short = [v[:NOISE_SAMPLES] for v in series]
+    best, found = np.inf, np.zeros(n_c + n_d)
+    for c in [_hannan_rissanen(short, n_c, n_d), *_tried(n_c)]:
+        filtered = [np.asarray(lfilter([1.0], [1.0, *c], v)) for v in short]
+        now = np.concatenate(filtered)
+        past = np.concatenate([lagged(v, n_d, 0) for v in filtered])
+        d = inside(-np.linalg.lstsq(past.T @ past, past.T @ now, rcond=1e-14)[0], 1.0)
+        cost = float(np.mean((now + past @ d) ** 2))
+        if cost < best:
+            best, found = cost, np.concatenate([c, d])
+    return found
+
+
+def _tried(order: int) -> list[Array]:
+    """Return polynomials with one or two roots other than zero, spread over the unit disc."""
+    radii = (-0.999, -0.97, -0.8, -0.4, 0.4, 0.8, 0.97, 0.999)
+    roots: list[list[complex]] = [[]]
+    if order >= 1:
+        roots += [[r] for r in radii]
+    if order >= 2:
+        roots += [list(pair) for pair in combinations_with_replacement(radii, 2)]
+        turns = np.exp(1j * np.array([0.1, 0.5, 1.0, 1.6, 2.2, 2.7]))
+        roots += [[r * z, r * z.conj()] for r in (0.6, 0.9, 0.99) for z in turns]
+    padded = [np.append(given, np.zeros(order - len(given))) for given in roots]
+    return [np.asarray(np.real(np.poly(given))[1:], dtype=np.float64) for given in padded]
+
+
+def _hannan_rissanen(series: Sequence[Array], n_c: int, n_d: int) -> Array:
+    """Return C by regression of the noise on its past and the past of what drives it."""
+    from scipy.signal import lfilter
+
+    total = sum(v.size for v in series)
+    long = max(min(int(np.sqrt(total)), total // 20), n_c + n_d, 1)
+    kept = [v for v in series if v.size > 4 * long]
+    if n_c == 0 or not kept:
+        return np.zeros(n_c)
+    now = np.concatenate([v[long:] for v in kept])
+    past = np.concatenate([lagged(v, long, long) for v in kept])
+    slopes = np.linalg.lstsq(past, now, rcond=1e-10)[0]
+    driving = [np.asarray(lfilter([1.0, *-slopes], [1.0], v)) for v in kept]
+    columns = [
+        np.column_stack([lagged(e, n_c, long), lagged(v, n_d, long)])
+        for e, v in zip(driving, kept, strict=True)
+    ]
+    found = np.linalg.lstsq(np.concatenate(columns), now, rcond=1e-10)[0]
+    return inside(found[:n_c], INVERTIBLE)
+
+
+def lagged(x: Array, lags: int, first: int) -> Array:
+    """Return x one to so many samples before, from a first sample on, shape (n - first, lags)."""
+    padded = np.concatenate([np.zeros(lags), x])
+    columns = [padded[lags - k : padded.size - k] for k in range(1, lags + 1)]
+    return np.column_stack([np.empty((x.size, 0)), *columns])[first:]
+
+
+def _whitened(runs: Sequence[Run], orders: Orders) -> list[list[Run]]:
+    """Return the data filtered by the A of ARX models of a few high orders, under which noise is white.
+
+    Source: Zhu and Hjalmarsson, "The Box-Jenkins Steiglitz-McBride algorithm", Automatica, 2016.
+    """
+    total = sum(run.u.size for run in runs)
+    found = []
+    for long in (8, 20, 50):
+        order = max(min(long, total // 10), orders.poles + orders.d)
+        enough = [run for run in runs if run.u.size > 3 * order]
+        if not enough:
+            continue
+        simple = Orders(b=order + 1, a=order, delay=orders.delay, inputs=orders.inputs)
+        a = [1.0, *Polynomials.of(arx(enough, simple), simple).poles[0]]
+        # the first samples, which have too few before them, are left out
+        found.append([filtered(run, a, [1.0]).cut(order) for run in enough])
+    return found
+
+
+def _steiglitz_mcbride(runs: Sequence[Run], orders: Orders, rounds: int) -> Array:
+    """Return the poles of one recursion by ARX, iterated on data filtered by the poles found before."""
+    simple = replace(orders, a=orders.a + orders.f, f=0, c=0, d=0)
+    poles = np.zeros(simple.a)
+    for _ in range(rounds + 1):
+        found = arx([filtered(run, [1.0], [1.0, *poles]) for run in runs], simple)
+        poles = inside(Polynomials.of(found, simple).poles[0], STABLE * (1 - 1e-4))
+    return poles

@@ -1,0 +1,220 @@
+"""Identification of continuous-time process models P1 to P3, by free-run errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from annotated_types import Ge
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.dynamics.process_model import LONGEST_DELAY, ProcessModel
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.dynamics.linear_starts import LinearEstimator
+from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
+
+Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
+    """Process model by variable projection: gain and zero are solved for, the poles searched.
+
+    P2UZ is Eq. (11) of "Analysis and modeling of a pneumatic artificial muscle system".
+
+    Parameters
+    ----------
+    structure : {"P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"}
+        MATLAB's name: how many poles, whether two of them may oscillate (U), and a zero (Z).
+    fit_delay : bool
+        Whether a delay of up to a quarter of the longest run is searched too.
+    hold : {"first", "zero"}
+        What the input does between samples.
+    """
+
+    purpose = "rate"
+    cannot = "No hysteresis; no inverse."
+    needs_time: ClassVar[bool] = True
+
+    effort: ClassVar[float] = 0.3
+
+    structure: Structure = "P1"
+    fit_delay: bool = False
+    hold: Literal["first", "zero"] = "first"
+    nonnegative: bool = False
+    n_starts: Annotated[int, Ge(1)] = 16
+    n_refined: Annotated[int, Ge(1)] = 4
+
+    rises: ClassVar[bool] = False
+    searches_condensed: ClassVar[bool] = False
+    typical: ClassVar[int] = 1
+    fits_peaks: ClassVar[bool] = False
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        data.timed(instead=", or use gpi")
+        return super().identify(data, tracker)
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return the condition and covariance from free-run errors; the input's offset is set."""
+        return self.free_run_covariance(block, data, [*at_bounds, block.n_parameters - 2])
+
+    def undetermined(self) -> tuple[int, ...]:
+        """Return also a gain, a time constant or a zero within two standard errors of 0.
+
+        A zero that all but cancels a pole leaves them so, and what depends on them uncertain too.
+        """
+        values, errors = self.fitted.pack(), self.diagnostics_.standard_errors
+        names = self.fitted.parameter_names
+        vague = {
+            place
+            for place, (value, error) in enumerate(zip(values, errors, strict=True))
+            if abs(value) < 2 * error and "offset" not in names[place]
+        }
+        return tuple(sorted({*super().undetermined(), *vague}))
+
+    @property
+    def n_times(self) -> int:
+        """Time constants searched."""
+        return 1 if "U" in self.structure else int(self.structure[1])
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of [log time constants, log damping, delay]."""
+        step = data.sample_time or 1.0
+        longest = max(run.u.size for run in data.runs) * step
+        lower, upper = [np.log(step)] * self.n_times, [np.log(10 * longest)] * self.n_times
+        if "U" in self.structure:
+            lower.append(np.log(0.02))
+            upper.append(np.log(100.0))
+        if self.fit_delay:
+            lower.append(0.0)
+            upper.append(min(0.25 * longest, (LONGEST_DELAY - 1) * step))
+        return np.array(lower), np.array(upper)
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return lags of a few speeds; of several, none alike, which no derivative would part."""
+        lower, upper = self.bounds(data)
+        apart = np.where(np.arange(lower.size) < self.n_times, 0.05 * np.arange(lower.size), 0.0)
+        return [lower + (share - apart) * (upper - lower) for share in (0.2, 0.4, 0.6, 0.8)]
+
+    def unit(self, theta: Array, data: TrainingData, gain: float = 1.0) -> ProcessModel:
+        """Return the model without zero and offsets."""
+        n = self.n_times
+        damping = float(np.exp(theta[n])) if "U" in self.structure else None
+        times = np.sort(np.exp(theta[:n]))[::-1]
+        return ProcessModel(
+            gain,
+            tuple(times.tolist()),
+            damping,
+            None,
+            float(theta[-1]) if self.fit_delay else 0.0,
+            data.input_range[0],
+            0.0,
+            self.hold,
+            self.initial,
+            **self.channels(data),
+        )
+
+    def _units(self, theta: Array, data: TrainingData) -> tuple[ProcessModel, ProcessModel]:
+        """Return the model without zero, and with one."""
+        unit = self.unit(theta, data)
+        return unit, replace(unit, zero_time=1.0)
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the response to the input, and, with a zero, to its derivative."""
+        unit, with_zero = data.latest("units", theta, lambda: self._units(theta, data))
+        step = run.sample_time
+        columns = [unit.simulate(run.history, sample_time=step)]
+        if "Z" in self.structure:
+            whole = with_zero.simulate(run.history, sample_time=step)
+            columns.append(whole - columns[0])
+        return np.column_stack(columns)
+
+    def matrix(self, theta: Array, data: TrainingData) -> Array:
+        """Return the basis and, where starts are fitted, what the lags of every run start with."""
+        from scipy.linalg import block_diag
+
+        columns = super().matrix(theta, data)
+        if self.initial != "fitted":
+            return columns
+        unit = self._units(theta, data)[0]
+        starts = [unit.free_responses(run.u.size, run.sample_time)[run.counts] for run in data.runs]
+        return np.column_stack([columns, block_diag(*starts)])
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> ProcessModel:
+        gain = float(linear[0])
+        zero = float(linear[1] / gain) if "Z" in self.structure and gain != 0 else None
+        if "Z" in self.structure and zero is None:
+            zero = 0.0
+        return replace(self.unit(theta, data, gain), zero_time=zero, output_offset=offset)
+
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return the model solved for, and bounds by factors of ten or more about its times."""
+        template, *_ = super().parameter_bounds(data)
+        values = template.pack()
+        span = 2 * np.maximum(np.abs(values), 1.0)
+        lower, upper = values - span, values + span
+        n = self.n_times + ("U" in self.structure)
+        lower[1 : 1 + n], upper[1 : 1 + n] = 0.05 * values[1 : 1 + n], 20 * values[1 : 1 + n]
+        if self.fit_delay:
+            place = 1 + n + ("Z" in self.structure)
+            lower[place], upper[place] = 1e-6, self.bounds(data)[1][-1]
+        return template, lower, upper
+
+
+P1 = preset(
+    ProcessModelEstimator,
+    "One lag.",
+    title="Process model: one lag (P1)",
+    structure="P1",
+)
+
+P1Z = preset(
+    ProcessModelEstimator,
+    "One lag and a zero.",
+    title="Process model: one lag and a zero (P1Z)",
+    structure="P1Z",
+)
+
+P2 = preset(
+    ProcessModelEstimator,
+    "Two lags.",
+    title="Process model: two lags (P2)",
+    structure="P2",
+)
+
+P2U = preset(
+    ProcessModelEstimator,
+    "Two poles that may oscillate.",
+    title="Process model: oscillating poles (P2U)",
+    structure="P2U",
+)
+
+P2UZ = preset(
+    ProcessModelEstimator,
+    "Two poles that may oscillate, and a zero.",
+    title="Process model: oscillating poles and a zero (P2UZ)",
+    can="Two poles that may oscillate, and a zero: best of the linear ones on coiled muscles.",
+    quick=True,
+    structure="P2UZ",
+)
+
+P2Z = preset(
+    ProcessModelEstimator,
+    "Two lags and a zero.",
+    title="Process model: two lags and a zero (P2Z)",
+    structure="P2Z",
+)
+
+P3 = preset(
+    ProcessModelEstimator,
+    "Three lags.",
+    title="Process model: three lags (P3)",
+    structure="P3",
+)

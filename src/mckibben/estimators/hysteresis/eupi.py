@@ -1,0 +1,112 @@
+"""Identification of the extended unparallel Prandtl-Ishlinskii model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from annotated_types import Ge
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
+from mckibben.blocks.hysteresis.eupi import EUPI, eupi_matrix
+from mckibben.blocks.hysteresis.play_operators import started
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Operators
+from mckibben.estimators.core.output_maps import PolynomialMap
+from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.hysteresis.thresholds import spread
+
+CUBIC = PolynomialMap(3)
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class EUPIEstimator(SeparableEstimator):
+    """Extended unparallel Prandtl-Ishlinskii model by variable projection.
+
+    The slope and the threshold ratio of the falling edge are searched; the weights and an increasing
+    cubic without memory are solved for.
+
+    Parameters
+    ----------
+    n_operators : int
+        Unparallel play operators.
+    spacing : {"even", "dense"}
+        How thresholds spread over half the input range.
+    """
+
+    title = "Extended unparallel Prandtl–Ishlinskii model (EUPI)"
+    purpose = "memory"
+    can = "Asymmetric loops by edges of different slope and threshold."
+    cannot = "One asymmetry for all operators; the inverse wants weights that are not negative."
+    inverse_kind = "solved"
+    makes = ("eupi",)
+    effort: ClassVar[float] = 0.3
+
+    n_operators: Operators = 10
+    spacing: Literal["even", "dense"] = "even"
+    n_starts: Annotated[int, Ge(1)] = 16
+
+    def radii(self, data: TrainingData) -> Array:
+        """Return the thresholds, shape (n_operators,)."""
+        low, high = data.input_range
+        return spread(self.n_operators, high - low, self.spacing)
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of the falling edge's slope and threshold ratio."""
+        return np.array([0.3, 0.0]), np.array([3.0, 3.0])
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return parallel edges, and ones a little apart."""
+        return [np.array(edges) for edges in ([1.0, 1.0], [1.2, 0.8], [0.8, 1.2])]
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the pieces of the cubic, then the operators, over the run's history."""
+        low, high = data.input_range
+        x = np.ascontiguousarray(run.history - low)
+        radii = self.radii(data)
+        operators = np.empty((x.size, radii.size))
+        state = started(radii, x[0], x[0], self.starting_rule)
+        eupi_matrix(x, theta[0], theta[1], radii, state, operators)
+        return np.column_stack([CUBIC.pieces(x / (high - low)), operators])
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        """Return a little of every piece of the cubic, so that it increases."""
+        floor = np.zeros(matrix.shape[1])
+        span = data.output_range[1] - data.output_range[0]
+        floor[: CUBIC.size] = 1e-3 * span
+        return floor
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> EUPI:
+        low, high = data.input_range
+        cubic = CUBIC.powers(linear[: CUBIC.size])[1:] / (high - low) ** np.arange(1, 4)
+        return EUPI(
+            vector(self.radii(data)),
+            vector(linear[CUBIC.size :]),
+            float(theta[0]),
+            float(theta[1]),
+            (float(cubic[0]), float(cubic[1]), float(cubic[2])),
+            offset,
+            data.input_range,
+            self.starting_rule,
+            **self.channels(data),
+        )
+
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return an EUPI model, with weights up to the mean slope of the data."""
+        radii = self.radii(data)
+        low, high = data.output_range
+        span, reach = high - low, data.input_range[1] - data.input_range[0]
+        linear = np.full(CUBIC.size + radii.size, span / radii.size)
+        template = self.build(np.ones(2), linear, low, data)
+        lower = [*np.zeros(radii.size), 0.3, 0.0, *(-span / reach ** np.arange(1, 4)), low - span]
+        upper = [
+            *np.full(radii.size, span / reach),
+            3.0,
+            3.0,
+            *(span / reach ** np.arange(1, 4)),
+            high,
+        ]
+        return template, np.array(lower), np.array(upper)

@@ -1,0 +1,204 @@
+"""Identification of the modified Prandtl-Ishlinskii model: PI, then a memoryless map."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from annotated_types import Ge, Interval
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Series
+from mckibben.blocks.fields import vector
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Operators
+from mckibben.estimators.core.output_maps import OutputMap, output_map
+from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
+from mckibben.estimators.hysteresis.pi import play_operators
+from mckibben.estimators.hysteresis.thresholds import spread
+from mckibben.estimators.optimisers.linear import solve_linear
+
+LEAST_PIECE = 1e-6
+"""Least share of the output's range that a piece of an increasing map gives."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class MappedPIEstimator(SeparableEstimator):
+    """Prandtl-Ishlinskii operators and a memoryless map behind them, by variable projection.
+
+    The weights of the operators are searched, scaled so that the PI part spans the output's range; the
+    map behind them is solved for.
+
+    Parameters
+    ----------
+    n_operators : int
+        Play operators, the one without dead zone included.
+    spacing : {"even", "dense"}
+        How thresholds spread over half the input range.
+    output_map : {"piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"}
+        Map behind the operators. The first two increase, and so have an inverse, whatever the data;
+        the last two are the papers' and may not.
+    map_size : int
+        Straight lines of the map, or degree of the polynomial.
+    """
+
+    n_operators: Operators = 10
+    spacing: Literal["even", "dense"] = "even"
+    output_map: Literal["piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"] = (
+        "polynomial"
+    )
+    map_size: Annotated[int, Interval(ge=1, le=50)] = 5
+    n_starts: Annotated[int, Ge(1)] = 8
+    n_refined: Annotated[int, Ge(1)] = 3
+
+    # Operators are computed once a fit, so there is nothing to gain from fewer inputs.
+    searches_condensed: ClassVar[bool] = False
+
+    @property
+    def map(self) -> OutputMap:
+        """The family of maps."""
+        return output_map(self.output_map, self.map_size)
+
+    def radii(self, data: TrainingData) -> Array:
+        """Return the thresholds, shape (n_operators,)."""
+        low, high = data.input_range
+        return spread(self.n_operators, high - low, self.spacing)
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of the relative weights."""
+        lower = np.zeros(self.n_operators)
+        lower[0] = LEAST_REVERSIBLE
+        return lower, np.ones(self.n_operators)
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return the weights of the best PI model, and two even distributions."""
+        low, high = data.input_range
+        radii = self.radii(data)
+        matrix = counting(data, lambda run: play_operators(run.history, radii, self.starting_rule))
+        weights, _ = solve_linear(matrix, data.target, nonnegative=True)
+        top = weights.max() if weights.max() > 0 else 1.0
+        fading = np.exp(-3 * radii / (high - low))
+        reversible = np.where(radii == 0, 1.0, 0.1)
+        return [weights / top, fading, reversible]
+
+    def operators(self, run: Run, data: TrainingData) -> Array:
+        """Return what the searched weights multiply, over the run's history."""
+        return play_operators(run.history, self.radii(data), self.starting_rule)
+
+    def level(self, theta: Array, data: TrainingData) -> tuple[float, float]:
+        """Return the lowest and highest value that the weighted operators take when static."""
+        lowest, highest = self._ends(data)
+        return float(theta @ lowest), float(theta @ highest)
+
+    def _ends(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return the operators when the input has only risen, at both ends of its range."""
+        low, high = data.input_range
+        radii = self.radii(data)
+        if self.starting_rule == "first_sample":
+            return low - radii, high - radii
+        return np.clip(0.0, low - radii, low + radii), np.clip(0.0, high - radii, high + radii)
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the pieces of the map over the run's history."""
+        return self._pieces(theta, self.operators(run, data), data)
+
+    def matrix(self, theta: Array, data: TrainingData) -> Array:
+        """Return the basis at the samples that count; the operators are computed only once."""
+        operators = data.once(self.operators_key, lambda: counting(data, self._operators_of(data)))
+        return self._pieces(theta, operators, data)
+
+    @property
+    def operators_key(self) -> tuple[object, ...]:
+        """What the operators depend on beside the data."""
+        return ("operators", self.n_operators, self.spacing, self.initial)
+
+    def _operators_of(self, data: TrainingData) -> Callable[[Run], Array]:
+        return lambda run: self.operators(run, data)
+
+    def _pieces(self, theta: Array, operators: Array, data: TrainingData) -> Array:
+        low, high = self.level(theta, data)
+        return self.map.pieces((operators @ theta - low) / (high - low))
+
+    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+        """Return the derivative of the map's argument times the slope of the map."""
+        operators = data.once(self.operators_key, lambda: counting(data, self._operators_of(data)))
+        lowest, highest = self._ends(data)
+        low, high = float(theta @ lowest), float(theta @ highest)
+        x = (operators @ theta - low) / (high - low)
+        moved = (operators - lowest - np.outer(x, highest - lowest)) / (high - low)
+        return np.asarray((self.map.slopes(x) @ linear)[:, np.newaxis] * moved)
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        """Return a little of every piece, so that the map increases everywhere."""
+        span = data.output_range[1] - data.output_range[0]
+        return np.full(matrix.shape[1], LEAST_PIECE * span)
+
+    @property
+    def solves_nonnegative(self) -> bool:
+        """Whether the linear parameters may not be negative: for increasing maps only."""
+        return self.nonnegative and self.output_map in ("piecewise-linear", "polynomial")
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
+        """Return the series, its PI part scaled to the output's range."""
+        low, high = self.level(theta, data)
+        bottom, top = data.output_range
+        scale = (top - bottom) / (high - low)
+        first = self.first_part(theta * scale, bottom - low * scale, data)
+        channel = data.outputs[0]
+        return Series((first, self.map.build(linear, offset, bottom, top, channel)))
+
+    @abstractmethod
+    def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
+        """Return the hysteresis part."""
+
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return a series, with a PI part within twice the output's range and a map of like size."""
+        theta = self.guesses(data)[1]
+        low, high = data.output_range
+        span = high - low
+        size = self.basis(theta, data.runs[0], data).shape[1]
+        template = self.build(theta, np.full(size, span / size), low, data)
+        n_first = template.parts[0].n_parameters
+        slope = span / (data.input_range[1] - data.input_range[0])
+        lower, upper = np.zeros(template.n_parameters), np.empty(template.n_parameters)
+        upper[:n_first] = slope
+        lower[n_first - 1], upper[n_first - 1] = low - span, high
+        values = template.pack()[n_first:]
+        lower[n_first:], upper[n_first:] = values - span / size, values + span / size
+        return template, lower, upper
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class MPIEstimator(MappedPIEstimator):
+    """Modified Prandtl-Ishlinskii model by variable projection."""
+
+    title = "Modified Prandtl–Ishlinskii model (MPI)"
+    purpose = "memory"
+    can = (
+        "Prandtl-Ishlinskii memory behind an increasing map: asymmetric by saturation; small "
+        "and quick."
+    )
+    cannot = (
+        "Loops that are narrow at one end and wide at the other for other reasons than the "
+        "map; no rate, no creep."
+    )
+    inverse_kind = "exact"
+    quick = True
+    default_for = "load"
+    makes = ("pi polynomial",)
+    effort: ClassVar[float] = 0.2
+
+    def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
+        return PI(
+            vector(self.radii(data)),
+            vector(weights),
+            offset,
+            data.input_range,
+            self.starting_rule,
+            **self.channels(data),
+        )

@@ -1,0 +1,161 @@
+"""Identification of the classical Prandtl-Ishlinskii model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from annotated_types import Len
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.hysteresis.play import play_matrix
+from mckibben.blocks.hysteresis.play_operators import started
+from mckibben.errors import ModelError
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Grid, Operators
+from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.core.uncertainty import simulate_all
+from mckibben.estimators.hysteresis.thresholds import spread
+from mckibben.estimators.optimisers.tracker import Tracker
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class PIEstimator(SeparableEstimator):
+    """Classical Prandtl-Ishlinskii model by (non-negative) least squares.
+
+    Everything is linear once thresholds are set, so the fit is a single exact solution. With
+    ``method="slopes"`` the weights follow the rule of "Analysis and modeling of a pneumatic artificial
+    muscle system", Eqs. (14), (15): the slope of every segment of a loop is the sum of the weights of
+    the operators that move in it. The paper does not say on which branch; here it is over the longest
+    rise and the longest fall on which operators begin to move in turn.
+
+    Parameters
+    ----------
+    n_operators : int
+        Play operators, the one without dead zone included.
+    spacing : {"even", "dense"}
+        How thresholds spread over half the input range.
+    thresholds : sequence of float, optional
+        Thresholds themselves, instead.
+    """
+
+    title = "Prandtl–Ishlinskii model (PI)"
+    purpose = "memory"
+    can = "Symmetric loops with nonlocal memory, by least squares; the smallest code."
+    cannot = "No asymmetry, no saturation, no rate, no creep."
+    inverse_kind = "exact"
+    quick = True
+    param_grid: ClassVar[Grid] = {"n_operators": (5, 10, 20)}
+    makes = ("pi",)
+    effort: ClassVar[float] = 0.01
+
+    method: Literal["ls", "pso-ls", "pso", "slopes"] = "ls"  # type: ignore[assignment]
+    n_operators: Operators = 10
+    spacing: Literal["even", "dense"] = "even"
+    thresholds: Annotated[Sequence[float], Len(1)] | None = None
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        if self.method == "slopes":
+            return self._by_slopes(data), data
+        return super().identify(data, tracker)
+
+    def radii(self, data: TrainingData) -> Array:
+        """Return the thresholds to use, shape (number of operators,)."""
+        if self.thresholds is not None:
+            return np.asarray(self.thresholds, dtype=np.float64)
+        low, high = data.input_range
+        return spread(self.n_operators, high - low, self.spacing)
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the play operators over the run's history, shape (n, N)."""
+        return play_operators(run.history, self.radii(data), self.starting_rule)
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> PI:
+        return PI(
+            vector(self.radii(data)),
+            vector(linear),
+            offset,
+            data.input_range,
+            self.starting_rule,
+            **self.channels(data),
+        )
+
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return a PI model, and weights up to twice the mean slope of the data."""
+        radii = self.radii(data)
+        template = self.build(np.empty(0), np.zeros(radii.size), 0.0, data)
+        low, high = data.output_range
+        span = high - low
+        slope = span / (data.input_range[1] - data.input_range[0])
+        lower = np.array([*([0.0] * radii.size), low - span])
+        return template, lower, np.array([*([slope] * radii.size), high])
+
+    def _by_slopes(self, data: TrainingData) -> PI:
+        """Cut the widest loop where its operators begin to move, and difference slopes.
+
+        A segment lasts from one operator's beginning to the next one's: the printed Delta r on a rise
+        from rest, twice that after a reversal, where a play closes over 2 r. Printed weights are
+        positive, and a loop that flattens would want others: its slopes are pooled until none is
+        below the one before, which is their least-squares fit (isotonic regression).
+        """
+        from scipy.optimize import isotonic_regression
+
+        radii = self.radii(data)
+        lengths, rises = _segments(data, radii, self.starting_rule)
+        slopes = rises / lengths
+        if self.nonnegative:
+            slopes = np.maximum(isotonic_regression(slopes, weights=lengths).x, 0.0)
+        weights = np.diff(slopes, prepend=0.0)
+        model = self.build(np.empty(0), weights, 0.0, data)
+        outputs = simulate_all([model], data)[0]
+        return self.build(np.empty(0), weights, float(np.mean(data.target - outputs)), data)
+
+
+SHORTEST = 0.02
+"""Segment whose slope is more than noise, relative to the longest branch."""
+
+
+def play_operators(u: Array, radii: Array, rule: str) -> Array:
+    """Return play operators side by side over an input, shape (n, N)."""
+    operators = np.empty((u.size, radii.size))
+    play_matrix(np.ascontiguousarray(u), radii, started(radii, u[0], u[0], rule), operators)
+    return operators
+
+
+def _segments(data: TrainingData, radii: Array, rule: str) -> tuple[Array, Array]:
+    """Return how far input and output go in each segment of the widest loop, each of shape (N,).
+
+    Of the longest rise and the longest fall together, among those on which operators begin to move one
+    after the other, each from where it stood.
+    """
+    from mckibben.signals import branches
+
+    longest = {1: 0.0, -1: 0.0}
+    cut = {1: np.zeros((2, radii.size)), -1: np.zeros((2, radii.size))}
+    for run in data.runs:
+        states = run.trim(play_operators(run.history, radii, rule))
+        for start, stop, way in branches(run.u):
+            if way == 0 or not run.counts[start:stop].all():
+                continue
+            travel = way * (run.u[start:stop] - run.u[start])
+            begins = way * (states[start] - run.u[start]) + radii
+            if travel.max() > longest[way] and np.all(np.diff(begins) > 0):
+                longest[way] = float(travel.max())
+                order = np.argsort(travel, kind="stable")
+                edges = np.minimum([*begins, longest[way]], longest[way])
+                rise = np.interp(edges, travel[order], way * run.y[start:stop][order])
+                cut[way] = np.diff([edges, rise])
+    lengths, rises = cut[1] + cut[-1]
+    if not np.all(lengths > SHORTEST * max(longest.values())):
+        raise ModelError(
+            f"on no branch do operators with thresholds up to {radii[-1]:.3g} {data.input_unit} begin "
+            f"to move in turn: the longest goes {max(longest.values()):.3g} {data.input_unit}, and "
+            "after a reversal it takes twice a threshold. Remedy: use fewer operators, smaller "
+            "thresholds, or method=ls."
+        )
+    return lengths, rises

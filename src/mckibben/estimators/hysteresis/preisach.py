@@ -1,0 +1,103 @@
+"""Identification of the Preisach and Krasnosel'skii-Pokrovskii models: weights on a triangular grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from annotated_types import Interval
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
+from mckibben.blocks.hysteresis.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
+from mckibben.blocks.hysteresis.preisach import Preisach
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Grid
+from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.presets import preset
+
+LEAST_REVERSIBLE = 1e-4
+"""Least share of the output's range that each operator on the diagonal gives."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class GridEstimator(SeparableEstimator):
+    """An estimator of weights on a triangular grid of thresholds, by (non-negative) least squares.
+
+    Parameters
+    ----------
+    relays : {"sudden", "gradual"}
+        What the weights are of: Preisach's relays, or Krasnosel'skii and Pokrovskii's, which take a
+        level to switch.
+    n_levels : int
+        Intervals that the input range is cut into.
+    """
+
+    purpose = "memory"
+    param_grid: ClassVar[Grid] = {"n_levels": (6, 10, 15)}
+    cannot = (
+        "Weights that no reversal has excited are not determined; nothing beyond the largest "
+        "input seen."
+    )
+    effort: ClassVar[float] = 0.15
+
+    relays: Literal["sudden", "gradual"] = "sudden"
+    n_levels: Annotated[int, Interval(ge=1, le=60)] = 10
+
+    def grid(self, data: TrainingData) -> Preisach | KrasnoselskiiPokrovskii:
+        """Return the model of these levels, without weights."""
+        block = Preisach if self.relays == "sudden" else KrasnoselskiiPokrovskii
+        n = self.n_levels * (self.n_levels + 1) // 2
+        return block(self.levels(data), (0.0,) * n, 0.0, self.starting_rule, **self.channels(data))
+
+    def levels(self, data: TrainingData) -> tuple[float, ...]:
+        """Return the levels: evenly spread over the input range."""
+        return vector(np.linspace(*data.input_range, self.n_levels + 1))
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the output of every cell alone, over the run's history."""
+        grid = self.grid(data)
+        n = len(grid.weights)
+        alone = np.column_stack([np.eye(n), np.zeros(n)])
+        return grid.simulate_many(alone, run.history, initial=self.starting_rule).T
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        """Return a little of every cell on the diagonal: without, there is no inverse."""
+        floor = np.zeros(matrix.shape[1])
+        low, high = data.output_range
+        diagonal = np.cumsum(np.arange(1, self.n_levels + 1)) - 1
+        floor[diagonal] = LEAST_REVERSIBLE * (high - low)
+        return floor
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        return self.grid(data).unpack([*linear, offset])
+
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return the model without weights, and weights up to a share of the output's range."""
+        template = self.grid(data)
+        low, high = data.output_range
+        n = template.n_parameters - 1
+        most = 2 * (high - low) / n
+        return template, np.array([*np.zeros(n), low - most]), np.array([*np.full(n, most), high])
+
+
+KP = preset(
+    GridEstimator,
+    "Krasnosel'skii-Pokrovskii model by (non-negative) least squares on its operators.",
+    title="Krasnosel'skii–Pokrovskii model (KP)",
+    can="Loops of any shape whose minor loops are congruent, with ridges of finite slope.",
+    inverse_kind="solved",
+    quick=True,
+    relays="gradual",
+)
+
+PREISACH = preset(
+    GridEstimator,
+    "Preisach model by (non-negative) least squares on its cells.",
+    title="Preisach model",
+    can="Loops of any shape whose minor loops are congruent.",
+    inverse_kind="exact",
+    relays="sudden",
+)

@@ -1,1 +1,0 @@
-"""NARX models: terms chosen on one-step errors, everything refined on free-running ones."""

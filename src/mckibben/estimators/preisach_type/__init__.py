@@ -1,1 +1,0 @@
-"""Identification of models made of relays."""

@@ -140,7 +140,8 @@ def _loaded_network() -> Block:
 
 def _filters() -> Block:
     """Return a filter of either pressure for one displacement, and of the second for another."""
-    (first, second), (one, other) = _numbered("pressure")[:2], _numbered("displacement")[:2]
+    first, second = (Channel(f"pressure_{k}", "bar") for k in (1, 2))
+    one, other = _numbered("displacement", 2)
     return Parallel(
         (
             block(

@@ -104,7 +104,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "bouc-wen-oscillator": (
             "mckibben.estimators.hysteresis.bouc_wen_oscillator:BoucWenOscillatorEstimator"
         ),
-        "coupled-memory": "mckibben.estimators.coupled.memory:CoupledMemoryEstimator",
+        "coupled-memory": "mckibben.estimators.coupled.play_ridge:COUPLED_MEMORY",
         "coupled-pi": "mckibben.estimators.coupled.sdchm:COUPLED_PI",
         "cpi": "mckibben.estimators.hysteresis.creep_pi:CreepPIEstimator",
         "duhem": "mckibben.estimators.hysteresis.duhem:DuhemEstimator",
@@ -140,6 +140,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "p2z": "mckibben.estimators.dynamics.process_model:P2Z",
         "p3": "mckibben.estimators.dynamics.process_model:P3",
         "pi": "mckibben.estimators.hysteresis.pi:PIEstimator",
+        "play-ridge": "mckibben.estimators.coupled.play_ridge:PlayRidgeEstimator",
         "preisach": "mckibben.estimators.hysteresis.preisach:PREISACH",
         "rdpi": "mckibben.estimators.hysteresis.rdpi:RDPIEstimator",
         "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -20,6 +22,7 @@ from mckibben import (
 )
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import DISPLACEMENT
 from tests.blocks.strategies import paths, pi_models
 
@@ -44,6 +47,34 @@ def test_series_are_one_after_another_and_parallels_a_sum(model: PI, u: Array) -
     parts = (model, Play(0.7), Play(0.2))
     expected = model.simulate(u) + Play(0.7).simulate(u) + Play(0.2).simulate(u)
     np.testing.assert_allclose(Parallel(parts).simulate(u), expected, rtol=1e-14, atol=1e-14)
+
+
+def test_blocks_in_parallel_take_their_inputs_by_name_and_add_outputs_of_one_name() -> None:
+    rng = np.random.default_rng(3)
+    u = rng.uniform(0.0, 4.0, (60, 2))
+    pressures = [Channel(f"pressure_{k}", "bar") for k in (1, 2)]
+    moved = [Channel(f"displacement_{k}", "mm") for k in (1, 2)]
+    made = {
+        (j, k): TransferFunction((0.3 + j, 0.1 * k), (-0.5 - 0.2 * j,), 0.1, input=p, output=y)
+        for j, y in enumerate(moved)
+        for k, p in enumerate(pressures)
+    }
+    whole = Parallel(tuple(made.values()))
+    assert [c.name for c in whole.inputs] == ["pressure_1", "pressure_2"]
+    expected = np.column_stack(
+        [sum(made[j, k].simulate(u[:, k], sample_time=0.1) for k in (0, 1)) for j in (0, 1)]
+    )
+    np.testing.assert_allclose(whole.simulate(u, sample_time=0.1), expected, rtol=1e-13)
+    stream = whole.stream(0.1)
+    streamed = [np.array(stream.step(row)) for row in u]
+    np.testing.assert_array_equal(streamed, whole.simulate(u, sample_time=0.1))
+    system = whole.linear_system(0.1)
+    x = np.linalg.solve(np.eye(len(system.a)) - system.a, system.b @ u[0])
+    for row in u:  # from rest at the first inputs
+        np.testing.assert_allclose(system.c @ x + system.d @ row, expected[0], rtol=1e-12)
+        x, expected = system.a @ x + system.b @ row, expected[1:]
+    with pytest.raises(ModelError, match="pressure_1"):
+        Parallel((made[0, 0], replace(made[0, 0], input=Channel("pressure_1", "psi"))))
 
 
 def test_a_recording_is_wired_by_name_not_by_order() -> None:

@@ -78,7 +78,10 @@ def test_impossible_settings_are_refused(setting: str, value: object) -> None:
 # -- data ------------------------------------------------------------------------------------------
 
 
-OF_ANY_RATES = ("balance", "coupled-memory", "coupled-pi", "sdchm", "sdchm-published", "tsfnn")
+OF_ANY_RATES = (
+    *("balance", "coupled-memory", "coupled-pi", "play-ridge"),
+    *("sdchm", "sdchm-published", "tsfnn"),
+)
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -50,17 +50,21 @@ def recorded(
         Orders(b=2, f=3),
         Orders(b=2, f=2, c=2, d=2, delay=2),
         Orders(b=2, f=2, c=2, d=2, lags=(0, 2)),
+        Orders(b=2, a=2, c=1, inputs=2),
+        Orders(b=2, f=2, c=1, d=1, inputs=2),
     ],
 )
-def test_derivatives_of_prediction_errors(orders: Orders) -> None:
+@pytest.mark.parametrize("start", ["fitted", "first_sample"])
+def test_derivatives_of_prediction_errors(orders: Orders, start: Any) -> None:
     run = training_data(recorded(1, 200), "pressure", "displacement").runs[0]
+    run = replace(run, driven=np.column_stack([run.u, 0.5 * run.u[::-1] ** 2])[:, : orders.inputs])
     rng = np.random.default_rng(2)
     theta = 0.2 * rng.standard_normal(orders.size)
     weights = rng.standard_normal(200)
-    _, jacobian = errors(theta, orders, run)
+    _, jacobian = errors(theta, orders, run, start)
 
     def weighted(point: Array) -> float:
-        return float(weights @ errors(point, orders, run)[0])
+        return float(weights @ errors(point, orders, run, start)[0])
 
     numeric = approx_fprime(theta, weighted, 1e-7)
     np.testing.assert_allclose(weights @ jacobian[:, : orders.size], numeric, rtol=1e-4, atol=1e-4)
@@ -102,6 +106,60 @@ def test_arx_is_ordinary_least_squares() -> None:
     # the start of the run is estimated too, so the first two samples tell nothing
     np.testing.assert_allclose(model.numerator, expected[:2], rtol=1e-6)
     np.testing.assert_allclose(model.denominator, -expected[2:4], rtol=1e-6)
+
+
+PRESSURES, MOVED = ("pressure_1", "pressure_2"), ("displacement_1", "displacement_2")
+TOPS = (((0.5, 0.3), (0.2, 0.1)), ((0.1, -0.05), (0.4, 0.2)))
+BELOW = (((-1.5, 0.7), (-0.9, 0.1)), ((-0.6, 0.2), (-1.2, 0.5)))
+"""B and F from every input to every output."""
+
+
+def several(noise: float, n: int = 1500) -> Recording:
+    """Return two outputs, each the sum of a filter of its own for either input, from rest."""
+    rng = np.random.default_rng(8)
+    u = np.repeat(rng.uniform(0, 5, (2, n // 10)), 10, axis=1)
+    u[:, :20] = 0.0
+    channels = dict(zip(PRESSURES, u, strict=True))
+    for name, tops, below in zip(MOVED, TOPS, BELOW, strict=True):
+        parts = [lfilter(b, [1.0, *f], x) for b, f, x in zip(tops, below, u, strict=True)]
+        channels[name] = 3.0 + sum(parts) + noise * rng.standard_normal(n)
+    return Recording(channels, STEP)
+
+
+def test_output_error_of_several_inputs_finds_every_filter() -> None:
+    recording = several(0.02)
+    fit = load("estimators", "oe")(input=PRESSURES, output=MOVED).fit(recording)
+    parts = iter(fit.model_.parts)
+    for tops, below in zip(TOPS, BELOW, strict=True):
+        for b, f in zip(tops, below, strict=True):
+            part = next(parts)
+            np.testing.assert_allclose(part.numerator, b, atol=0.02)
+            np.testing.assert_allclose(part.denominator, f, atol=0.05)
+    assert fit.diagnostics_.rmse == pytest.approx(0.02, rel=0.05)
+    (modelled,) = fit.predict(recording)
+    u = recording.matrix(PRESSURES)
+    for place, name in enumerate(MOVED):
+        own = fit.model_.parts[2 * place : 2 * place + 2]
+        expected = sum(
+            part.output_offset
+            + lfilter(part.numerator, [1.0, *part.denominator], u[:, k])
+            - part.input_offset * part.gain
+            for k, part in enumerate(own)
+        )
+        np.testing.assert_allclose(modelled[:, place], expected, atol=1e-9, err_msg=name)
+
+
+def test_arx_of_several_inputs_is_ordinary_least_squares() -> None:
+    recording, rows = several(0.3), np.arange(2, 1500)
+    a, b = (recording[name] for name in PRESSURES)
+    y = recording[MOVED[0]]
+    columns = [a[rows], a[rows - 1], b[rows], b[rows - 1], y[rows - 1], y[rows - 2], np.ones(1498)]
+    expected = np.linalg.lstsq(np.column_stack(columns), y[rows], rcond=None)[0]
+    made = load("estimators", "arx")(input=PRESSURES, output=MOVED)
+    first, second, *_ = made.fit(recording).model_.parts
+    np.testing.assert_allclose([*first.numerator, *second.numerator], expected[:4], rtol=1e-6)
+    assert first.denominator == second.denominator
+    np.testing.assert_allclose(first.denominator, -expected[4:6], rtol=1e-6)
 
 
 def test_bad_data_and_settings_are_refused() -> None:

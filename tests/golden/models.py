@@ -14,7 +14,7 @@ import numpy as np
 
 from mckibben import GPI, PI, Block, Channel, Parallel, PerChannel, Series
 from mckibben.registry import load, names
-from tests.golden.running import Array
+from tests.golden.running import SAMPLE_TIME, Array
 
 N_SAMPLES = 180
 
@@ -138,6 +138,38 @@ def _loaded_network() -> Block:
     return Series((example("pi", output=network.driven[0]), network))
 
 
+def _filters() -> Block:
+    """Return a filter of either pressure for one displacement, and of the second for another."""
+    first, second = (Channel(f"pressure_{k}", "bar") for k in (1, 2))
+    one, other = _numbered("displacement", 2)
+    return Parallel(
+        (
+            block(
+                "transfer-function", (0.2, -0.05), (-0.7, 0.1), SAMPLE_TIME, input=first, output=one
+            ),
+            block(
+                "transfer-function",
+                (0.0, 0.4),
+                (-0.5,),
+                SAMPLE_TIME,
+                1.0,
+                2.0,
+                input=second,
+                output=one,
+            ),
+            block(
+                "transfer-function",
+                (0.3,),
+                (-0.9,),
+                SAMPLE_TIME,
+                initial="virgin",
+                input=second,
+                output=other,
+            ),
+        )
+    )
+
+
 def _compositions() -> dict[str, Block]:
     balance = example("balance")
     feedforward = example("force-feedforward")
@@ -145,6 +177,7 @@ def _compositions() -> dict[str, Block]:
     return {
         "creeping muscle": Series((pi, creep)),
         "muscles in parallel": Parallel((pi, gpi)),
+        "filters of several channels": _filters(),
         "air and muscle": Series((example("air"), pi)),
         "muscle behind contact": Series((example("contact"), gpi)),
         "SDCHM": _manipulator(),
@@ -246,6 +279,7 @@ def _variants() -> dict[str, Block]:
         "coupled-memory of degree 3": replace(
             memory, degree=3, readout=((*memory.readout[0], *products),)
         ),
+        "coupled-memory of the input itself": replace(memory, lags=(0.0, 0.5)),
         "multistate-friction each way": pulling,
         "force-feedforward by chou-hannaford": block(
             "force-feedforward", example("chou-hannaford"), pulling

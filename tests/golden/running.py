@@ -24,7 +24,7 @@ def simulated(model: Block, inputs: Array, initial: Any = None) -> Array:
     """Return outputs, shape (n, n_outputs); warnings of what was clipped are not looked at."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        return model.simulate(inputs, initial=initial, sample_time=SAMPLE_TIME)
+        return model.simulate(inputs, initial=initial, sample_time=model.sample_time or SAMPLE_TIME)
 
 
 def streamed(model: Block, inputs: Array) -> Array:

@@ -283,12 +283,12 @@ class Series(Composition):
 
 @dataclass(frozen=True, config=STRICT)
 class Parallel(Composition):
-    """Blocks with the same inputs, whose outputs are added.
+    """Blocks side by side, whose outputs of the same name are added.
 
     Parameters
     ----------
     parts : sequence of Block
-        At least one, all with the same number of outputs and the same inputs.
+        At least one. Each takes its inputs, by their names, from those of all.
     """
 
     kind: ClassVar[str] = "parallel"
@@ -297,55 +297,89 @@ class Parallel(Composition):
 
     def __post_init__(self) -> None:
         self.check_parts()
-        for part in self.parts[1:]:
-            if part.inputs != self.parts[0].inputs or part.outputs != self.parts[0].outputs:
-                raise ModelError(
-                    f"{part.kind!r} and {self.parts[0].kind!r} differ in their channels. "
-                    "Remedy: put blocks in parallel that have the same inputs and outputs."
-                )
+        for side in ("inputs", "outputs"):
+            units: dict[str, str] = {}
+            for channel in (c for part in self.parts for c in getattr(part, side)):
+                if units.setdefault(channel.name, channel.unit) != channel.unit:
+                    raise ModelError(
+                        f"parts of {self.kind!r} have {channel.name} in {units[channel.name]!r} and "
+                        f"{channel.unit!r}. Remedy: put blocks in parallel whose units agree."
+                    )
 
-    @property
+    @cached_property
     def inputs(self) -> tuple[Channel, ...]:
-        """Those of every part."""
-        return self.parts[0].inputs
+        """Those that drive any part, then those that only schedule."""
+        every = {channel.name: channel for part in self.parts for channel in part.inputs}
+        return tuple(sorted(every.values(), key=lambda channel: channel.name not in self._driving))
 
     @property
     def scheduling(self) -> tuple[str, ...]:
-        """Those of the first part."""
-        return self.parts[0].scheduling
+        """Names of inputs that drive no part."""
+        return tuple(c.name for c in self.inputs if c.name not in self._driving)
 
-    @property
+    @cached_property
+    def _driving(self) -> set[str]:
+        return {c.name for part in self.parts for c in part.inputs if c.name not in part.scheduling}
+
+    @cached_property
     def outputs(self) -> tuple[Channel, ...]:
-        """Those of every part."""
-        return self.parts[0].outputs
+        """Those of all parts."""
+        return tuple({c.name: c for part in self.parts for c in part.outputs}.values())
+
+    def _places(self, part: Block) -> tuple[list[int], list[int]]:
+        """Return where the inputs and outputs of a part are among those of all."""
+        names = [channel.name for channel in self.inputs]
+        given = [channel.name for channel in self.outputs]
+        taken = [names.index(channel.name) for channel in part.inputs]
+        return taken, [given.index(channel.name) for channel in part.outputs]
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the parts' states."""
         shared = zip(self.parts, self._shared_initial(initial), strict=True)
-        return np.concatenate([part.initial_state(first, own) for part, own in shared])
+        return np.concatenate(
+            [part.initial_state(first[self._places(part)[0]], own) for part, own in shared]
+        )
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs every part and adds the outputs."""
-        own = [np.empty_like(outputs) for _ in self.parts]
-        shares = zip(self.parts, self._states(state), own, strict=True)
-        runs = [part.bind(sample_time, share, inputs, into) for part, share, into in shares]
+        runs = []
+        for part, share in zip(self.parts, self._states(state), strict=True):
+            taken, given = self._places(part)
+            whole = taken == [*range(inputs.shape[1])]
+            own = inputs if whole else np.empty((len(inputs), len(taken)))
+            into = np.empty((len(inputs), len(given)))
+            copies = [] if whole else [(own[:, k], inputs[:, at]) for k, at in enumerate(taken)]
+            sums = [(outputs[:, at], into[:, k]) for k, at in enumerate(given)]
+            runs.append((copies, part.bind(sample_time, share, own, into), sums))
 
         def run() -> None:
             outputs[:] = 0.0
-            for step, result in zip(runs, own, strict=True):
+            for copies, step, sums in runs:
+                for own, given in copies:
+                    own[:] = given
                 step()
-                np.add(outputs, result, out=outputs)
+                for total, result in sums:
+                    np.add(total, result, out=total)
 
         return run
 
     def wired(self, board: Board, given: Sequence[str]) -> list[str]:
-        """Lay out the parts on the same signals, and add what they give."""
-        all_given = [part.wired(board, given) for part in self.parts]
-        return [board.add(terms) for terms in zip(*all_given, strict=True)]
+        """Lay out the parts on the signals, and add what they give."""
+        terms: list[list[str]] = [[] for _ in self.outputs]
+        for part in self.parts:
+            taken, places = self._places(part)
+            signals = part.wired(board, [given[place] for place in taken])
+            for place, signal in zip(places, signals, strict=True):
+                terms[place].append(signal)
+        return [board.add(own) for own in terms]
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the sum of the parts."""
-        return reduce(LinearSystem.beside, [part.linear_system(sample_time) for part in self.parts])
+        n, m = len(self.inputs), len(self.outputs)
+        systems = [
+            part.linear_system(sample_time).among(*self._places(part), n, m) for part in self.parts
+        ]
+        return reduce(LinearSystem.beside, systems)
 
     def joined(self, parts: Sequence[str]) -> str:
         """Return their sum."""

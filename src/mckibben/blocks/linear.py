@@ -78,6 +78,16 @@ class LinearSystem:
         step = self.sample_time if other.sample_time is None else other.sample_time
         return LinearSystem(a, b, c, self.d + other.d, step, self.input_offset, at_rest)
 
+    def among(self, taken: list[int], given: list[int], k: int, m: int) -> LinearSystem:
+        """Return it among k inputs, of which it takes some, and m outputs, of which it gives some."""
+        if (taken, given) == ([*range(k)], [*range(m)]):
+            return self
+        b, c, d = np.zeros((len(self.a), k)), np.zeros((m, len(self.a))), np.zeros((m, k))
+        b[:, taken], c[given], d[np.ix_(given, taken)] = self.b, self.c, self.d
+        u, y = np.zeros(k), np.zeros(m)
+        u[taken], y[given] = self.input_offset, self.output_offset
+        return LinearSystem(self.a, b, c, d, self.sample_time, u, y)
+
     def rests(self, inputs: Array) -> Array:
         """Return the outputs at which it rests where the inputs are held, shape (m,)."""
         held = self.d

@@ -51,6 +51,7 @@ SINGLE: Mapping[str, Mapping[str, Any]] = {
     "p2z": {},
     "p3": {},
     "pi": {"n_operators": 4},
+    "play-ridge": ONE,
     "preisach": {"n_levels": 5},
     "rdpi": SMALL,
 }
@@ -70,6 +71,7 @@ OF_ARM: Mapping[str, Mapping[str, Any]] = {
     "balance": STOPS,
     "coupled-memory": {},
     "coupled-pi": {},
+    "play-ridge": {},
     "sdchm": MEMORY,
     "sdchm-published": SWARM,
     "tsfnn": {"n_sets": 2},
@@ -167,7 +169,7 @@ def determined(case: str, model: str, settings: Mapping[str, Any], plant: str) -
 def _same(one: Any, other: Any) -> bool:
     if isinstance(one, float) and isinstance(other, float):
         return bool(abs(one - other) <= DETERMINED * abs(one))
-    return bool(one == other)
+    return np.array_equal(one, other)
 
 
 def run(case: str, model: str, settings: Mapping[str, Any], plant: str, folder: Path) -> Tree:

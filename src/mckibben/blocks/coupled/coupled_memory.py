@@ -1,14 +1,16 @@
 """Lags and play operators of several inputs, read out by a polynomial: many inputs to many outputs.
 
 Every input passes first-order lags, every lagged input play operators; outputs are linear in those, and
-in products of the first lag's inputs up to a degree. Made for arms whose displacements are not one to a
-muscle, such as the place of a tip, and whose motion is dynamic.
+in products of the first lag's inputs up to a degree. A lag of 0 is the input itself. Nothing is fed back
+from outputs to states, so the model is stable whatever its readout. Displacements need not be one to a
+muscle, as the place of an arm's tip is not, and motion may be dynamic.
 
 The form is this package's own; it is linear in its parameters but for lags and thresholds.
 """
 
 from __future__ import annotations
 
+import math
 from itertools import combinations_with_replacement
 from typing import Annotated, ClassVar, Self
 
@@ -87,7 +89,7 @@ class CoupledMemory(Block):
     Parameters
     ----------
     lags : sequence of float
-        Time constants [s], positive; at least one. Products are of the first.
+        Time constants [s], at least one; 0 for the input itself. Products are of the first.
     thresholds : sequence of n sequences of float
         Of the play operators of every input, in its unit; as many for each, maybe none.
     readout : sequence of sequences of float
@@ -103,7 +105,6 @@ class CoupledMemory(Block):
     ports: ClassVar[Ports] = SEVERAL
     kernel: ClassVar[Kernel] = coupled_memory_step
     start_kernel: ClassVar[Start] = coupled_memory_start
-    rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("readout",)
     notation: ClassVar[Notation] = Notation(
         r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
@@ -126,9 +127,9 @@ class CoupledMemory(Block):
     def __post_init__(self) -> None:
         self.check_channels()
         n = len(self.inputs)
-        if not self.lags or any(not tau > 0 for tau in self.lags):
+        if not self.lags or min(self.lags) < 0:
             raise ModelError(
-                f"lags of {self.kind!r} are {self.lags}. Remedy: give positive time constants."
+                f"lags of {self.kind!r} are {self.lags}. Remedy: give time constants, none negative."
             )
         if len(self.thresholds) != n or len({len(row) for row in self.thresholds}) > 1:
             raise ModelError(
@@ -145,16 +146,22 @@ class CoupledMemory(Block):
             )
 
     @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether any lag takes time."""
+        return any(self.lags)
+
+    @property
     def n_states(self) -> int:
         """Every lag of every input, and the plays of each."""
         return len(self.lags) * len(self.inputs) * (1 + len(self.thresholds[0]))
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return sizes, decays over a sample, thresholds and readout."""
-        step = needs_sample_time(self.kind, sample_time)
+        step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else 1.0
         head = [len(self.lags), len(self.thresholds[0]), self.degree]
+        decays = [math.exp(-step / tau) if tau else 0.0 for tau in self.lags]
         radii = np.array(self.thresholds).ravel()
-        return np.concatenate([head, np.exp(-step / np.array(self.lags)), radii, self.pack()])
+        return np.concatenate([head, decays, radii, self.pack()])
 
     def inverse(self) -> Block:
         """Refuse: lags cannot be undone at once, and outputs need not be as many as inputs.

@@ -152,6 +152,7 @@ class BalanceEstimator(CoupledEstimator):
     makes = ("balance", "balance-inverse", "contact balance-inverse")
     effort: ClassVar[float] = 1.0
     alone: ClassVar[bool] = True
+    unmeasured: ClassVar[bool] = True
     fewer_outputs: ClassVar[bool] = True
     through: ClassVar[bool] = True
 

@@ -57,6 +57,9 @@ class CoupledEstimator(Estimator):
     alone: ClassVar[bool] = False
     """Whether it is a model of one muscle under no measured load, too."""
 
+    unmeasured: ClassVar[bool] = False
+    """Whether recordings may lack a channel that schedules and that others have."""
+
     through: ClassVar[bool] = False
     """Whether it runs through what does not count, so that memory there is right; else stretches of
     what counts each begin with a memory of their own."""
@@ -85,7 +88,7 @@ class CoupledEstimator(Estimator):
             scheduled = schedules(recordings, (*inputs, *outputs))
         for name in scheduled:
             lacking = [recording.name for recording in recordings if name not in recording]
-            if lacking and not cls.alone:
+            if lacking and not cls.unmeasured:
                 return (
                     f"it is told {name}, which {lacking[0]} lacks: give it there, or leave it out"
                 )

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Annotated, ClassVar
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import Interval, Len
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Parallel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.estimator import Grid, SearchEstimator
-from mckibben.estimators.core.uncertainty import inverted, told_by_runs
-from mckibben.estimators.dynamics.linear_polynomials import Orders, Polynomials
+from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.estimator import Grid, resting
+from mckibben.estimators.core.uncertainty import inverted, simulate_all, told_by_runs, unknown
+from mckibben.estimators.coupled.base import schedules
+from mckibben.estimators.dynamics.linear_polynomials import Orders, Polynomials, Start
 from mckibben.estimators.dynamics.linear_starts import LinearEstimator
 from mckibben.estimators.dynamics.prediction_error import (
     arx,
@@ -27,6 +29,7 @@ from mckibben.estimators.dynamics.prediction_error import (
 )
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
+from mckibben.recording import Recording, listed
 
 Order = Annotated[int, Interval(ge=0, le=20)]
 Lag = Annotated[int, Interval(ge=0, le=120)]
@@ -49,7 +52,7 @@ class Noise:
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class PredictionErrorEstimator(LinearEstimator, SearchEstimator):
+class PredictionErrorEstimator(LinearEstimator):
     """An estimator of a linear model by one-step prediction errors, run free ever after.
 
     After `fit`, ``noise_`` holds the noise model, the one-step error, and the covariance of all
@@ -75,6 +78,13 @@ class PredictionErrorEstimator(LinearEstimator, SearchEstimator):
         Eq. (5), has terms in q^0 and q^-2 only in its printed B, Eq. (6): ``lags=(0, 2)``.
     n_starts : int
         Starting points.
+    input, output : str or sequence of str
+        Channels to learn from. Of several inputs, A is common to all, and every input has an F of its
+        own; several outputs are identified one after another. Runs then start at rest at their first
+        inputs, where `initial` is "fitted" too.
+    beside : sequence of str, optional
+        Further inputs, such as a load. Default: of several inputs or outputs ``pressure_extensor`` and
+        ``force``, where there are any.
     """
 
     purpose = "rate"
@@ -85,6 +95,9 @@ class PredictionErrorEstimator(LinearEstimator, SearchEstimator):
     }
     needs_time: ClassVar[bool] = True
 
+    input: str | tuple[str, ...] = "pressure"  # type: ignore[assignment]
+    output: str | tuple[str, ...] = "displacement"  # type: ignore[assignment]
+    beside: tuple[str, ...] | None = None
     n_zeros: Annotated[int, Interval(ge=1, le=20)] = 2
     n_poles: Order = 2
     shared_poles: bool = True
@@ -119,20 +132,89 @@ class PredictionErrorEstimator(LinearEstimator, SearchEstimator):
                 "Remedy: use n_noise_poles=0, or shared_poles=false."
             )
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the transfer function found, and the data."""
+    @property
+    def single(self) -> bool:
+        """Whether it is of one input and one output."""
+        return isinstance(self.input, str) and isinstance(self.output, str) and not self.beside
+
+    @classmethod
+    def objection(
+        cls,
+        recordings: Sequence[Recording],
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        scheduling: Sequence[str] | None = None,
+    ) -> str | None:
+        if not inputs or not outputs:
+            return "it needs an input and an output"
+        beside = scheduling or ()
+        if scheduling is None and len((*inputs, *outputs)) > 2:
+            beside = schedules(recordings, (*inputs, *outputs))
+        for name in beside:
+            if absent := [each.name for each in recordings if name not in each]:
+                return f"it needs the channel {name!r}, which {absent[0]} lacks"
+        return resting(recordings, inputs)
+
+    @classmethod
+    def channel_settings(
+        cls,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        scheduling: Sequence[str] | None = None,
+    ) -> dict[str, Any]:
+        if len(inputs) == len(outputs) == 1 and scheduling is None:
+            return {"input": inputs[0], "output": outputs[0]}
+        beside = None if scheduling is None else tuple(scheduling)
+        return {"input": tuple(inputs), "output": tuple(outputs), "beside": beside}
+
+    def data(
+        self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
+    ) -> TrainingData:
+        """Return what is learned from recordings; of several inputs, from all that drive."""
+        if self.single:
+            return super().data(recordings, rows)
+        driving, given = ((of,) if isinstance(of, str) else of for of in (self.input, self.output))
+        every = listed(recordings)
+        beside = self.beside
+        if beside is None:
+            beside = schedules(every, (*driving, *given))
+        moving = [name for name in beside if any(name in r and np.ptp(r[name]) > 0 for r in every)]
+        whole = replace(self, input=(*driving, *moving), output=tuple(given))
+        return super(PredictionErrorEstimator, whole).data(recordings, rows)
+
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the block found: of several channels, the sum of one for every input, by output."""
+        parts: list[Block] = []
+        share = 1.0 / len(data.outputs)
+        for place, output in enumerate(data.outputs):
+            runs = tuple(replace(run, outputs=run.outputs[:, [place]]) for run in data.runs)
+            own = tracker.part(place * share, (place + 1) * share)
+            parts += self._of_output(replace(data, runs=runs, outputs=(output,)), own)
+            tracker.saw_all(own)
+        return (parts[0] if self.single else Parallel(tuple(parts))), data
+
+    def _of_output(self, data: TrainingData, tracker: Tracker) -> tuple[TransferFunction, ...]:
+        """Return the transfer function from every input to the output."""
         step = data.timed(instead=", or use gpi")
-        orders = self.orders
+        orders = replace(self.orders, inputs=len(data.inputs))
+        start = self.starting
         if data.target.size <= orders.size + orders.poles * len(data.runs):
             raise DataError(
                 f"{data.target.size} samples are too few for {orders.size} parameters",
                 remedy="give longer recordings, or lower orders",
             )
-        centre = float(np.mean(np.concatenate([run.u for run in data.runs])))
+        centre = np.mean(data.stacked("driven"), axis=0)
         middle = float(np.mean(data.target))
-        given, wanted = (float(np.ptp(span)) for span in (data.input_range, data.output_range))
+        given, wanted = np.ptp(data.stacked("driven"), axis=0), float(np.ptp(data.target))
         known, runs = (
-            [run.carrying((run.u - centre) / given, (run.y - middle) / wanted) for run in pieces]
+            [
+                replace(
+                    run,
+                    driven=(run.driven - centre) / given,
+                    outputs=(run.outputs - middle) / wanted,
+                )
+                for run in pieces
+            ]
             for pieces in (data.stretches(orders.size).runs, data.runs)
         )
         if orders.a or orders.c or orders.d:
@@ -144,16 +226,18 @@ class PredictionErrorEstimator(LinearEstimator, SearchEstimator):
             runs = known  # a free run needs no outputs, so it alone goes on where they do not count
         if orders.c == orders.d == orders.f == 0:
             theta = arx(runs, orders)
-            tracker.saw(theta, evaluate(theta, orders, runs, self.initial)[2])
+            tracker.saw(theta, evaluate(theta, orders, runs, start)[2])
         else:
             starts = starting_points(runs, known, orders, self.n_starts, self.seed)
-            theta = minimise(runs, orders, starts, tracker, self.initial)
-        theta[: orders.b] *= wanted / given
+            theta = minimise(runs, orders, starts, tracker, start)
+        theta[: orders.zeros] *= np.repeat(wanted / given, orders.b)
         theta[-1] *= wanted
-        runs = [run.carrying(given * run.u, wanted * run.y) for run in runs]
+        runs = [
+            replace(run, driven=given * run.driven, outputs=wanted * run.outputs) for run in runs
+        ]
         p = Polynomials.of(theta, orders)
         self._constant = p.constant
-        e, slopes, deviation = evaluate(theta, orders, runs, self.initial)
+        e, slopes, deviation = evaluate(theta, orders, runs, start)
         size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
         self._condition, inverse = inverted(slopes / size)
         freedom = max(e.size - orders.size - orders.poles * len(runs), 1)
@@ -161,39 +245,54 @@ class PredictionErrorEstimator(LinearEstimator, SearchEstimator):
         if orders.f and not orders.c + orders.d:
             coloured = told_by_runs(slopes / size, e, runs)[1]
             self._covariance = coloured / np.outer(size, size)
+        noise = (vector(p.c), vector(p.poles[0] if orders.a else p.d), deviation)
         self.noise_ = Noise(
-            (1.0, *vector(p.c)),
-            (1.0, *vector(p.poles if orders.a else p.d)),
-            deviation,
-            self._covariance[:-1, :-1],
+            (1.0, *noise[0]), (1.0, *noise[1]), deviation, self._covariance[:-1, :-1]
         )
         constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
-        numerator = np.zeros(1 + max(orders.input_lags))
-        numerator[[*orders.input_lags]] = p.b
-        block = TransferFunction(
-            vector(numerator),
-            vector(p.poles),
-            step,
-            centre,
-            middle + constant,
-            self.initial,
-            noise_numerator=vector(p.c),
-            noise_denominator=vector(p.poles if orders.a else p.d),
-            noise_deviation=deviation,
-            **self.channels(data),
-        )
-        if not block.is_stable:
-            radius = float(np.abs(block.poles).max())
-            raise ModelError(
-                f"the model found is unstable (a pole at |z| = {radius:.4g}). "
-                "Remedy: use other orders, or output-error (oe), which is kept stable."
+        found = []
+        for place, (channel, b) in enumerate(zip(data.inputs, p.b, strict=True)):
+            poles = p.poles[min(place, len(p.poles) - 1)]
+            numerator = np.zeros(1 + max(orders.input_lags))
+            numerator[[*orders.input_lags]] = b
+            block = TransferFunction(
+                vector(numerator),
+                vector(poles),
+                step,
+                float(centre[place]),
+                0.0 if place else middle + constant,
+                start,
+                channel,
+                data.outputs[0],
+                *(() if place else noise),
             )
-        return block, data
+            if not block.is_stable:
+                radius = float(np.abs(block.poles).max())
+                raise ModelError(
+                    f"the model found is unstable (a pole at |z| = {radius:.4g}). "
+                    "Remedy: use other orders, or output-error (oe), which is kept stable."
+                )
+            found.append(block)
+        return tuple(found)
+
+    @property
+    def starting(self) -> Start:
+        """The state before the first sample; of several inputs none is fitted."""
+        return "first_sample" if self.initial == "fitted" and not self.single else self.initial
+
+    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
+        """Return the free-running outputs of blocks where samples count, started by their rule."""
+        return super().free_runs(blocks, data) if self.single else simulate_all(blocks, data)
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
-        """Return the condition and covariance from the prediction errors; the input's offset is set."""
+        """Return the condition and covariance from the prediction errors; the input's offset is set.
+
+        Of several inputs or outputs neither is known.
+        """
+        if not self.single:
+            return np.nan, unknown(block)
         orders = self.orders
         n, poles = block.n_parameters, orders.poles
         turned = np.zeros((n, orders.size))
@@ -232,6 +331,7 @@ ARX = preset(
         "No hysteresis; biased by noise in the output, so its free run drifts from what one "
         "step ahead promises."
     ),
+    quick=True,
     param_grid={"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
 )
 

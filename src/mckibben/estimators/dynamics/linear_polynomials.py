@@ -1,10 +1,10 @@
 """Prediction errors of linear models, and their derivatives.
 
-A(q) y = B(q) / F(q) u + C(q) / D(q) e. Residuals are one-step prediction errors
-e = D / C (A y - B / F u - start), where the start is what the state before the first sample adds:
-nothing, a rest at the first input, or, as a rule, a free response estimated with the rest, one to each
-run. The input is taken to have been at its first value before. The noise starts from nothing. ARX has A
-and B, ARMAX A, B and C, output-error B and F, Box-Jenkins B, F, C and D.
+A(q) y = B(q) / F(q) u + C(q) / D(q) e; of several inputs, the sum of B_i / F_i u_i. Residuals are
+one-step prediction errors e = D / C (A y - B / F u - start), where the start is what the state before
+the first sample adds: nothing, a rest at the first input, or, as a rule, a free response estimated with
+the rest, one to each run. The input is taken to have been at its first value before. The noise starts
+from nothing. ARX has A and B, ARMAX A, B and C, output-error B and F, Box-Jenkins B, F, C and D.
 
 Source: Ljung, "System Identification", 1999, chapters 4 and 7.
 """
@@ -34,13 +34,15 @@ class Orders:
     Parameters
     ----------
     b : int
-        Coefficients of B, at least 1.
+        Coefficients of the B of every input, at least 1.
     a, f, c, d : int
-        Orders of the others.
+        Orders of the others; of F, for every input.
     delay : int
         Samples before B's first coefficient.
     lags : tuple of int, optional
         Of B's coefficients, in samples, instead of the next ones after the delay.
+    inputs : int
+        How many there are.
     """
 
     b: int
@@ -50,6 +52,7 @@ class Orders:
     d: int = 0
     delay: int = 0
     lags: tuple[int, ...] | None = None
+    inputs: int = 1
 
     @property
     def input_lags(self) -> tuple[int, ...]:
@@ -57,19 +60,32 @@ class Orders:
         return self.lags or tuple(range(self.delay, self.delay + self.b))
 
     @property
+    def zeros(self) -> int:
+        """Coefficients of the B of all inputs."""
+        return self.inputs * self.b
+
+    @property
+    def recursions(self) -> int:
+        """Recursions from inputs to output: the one of A, or the F of every input."""
+        return 1 if self.a else self.inputs
+
+    @property
     def poles(self) -> int:
-        """Order of the recursion from input to output: A or F, of which a model has one."""
-        return self.a + self.f
+        """Coefficients of all recursions."""
+        return self.a + self.inputs * self.f
 
     @property
     def size(self) -> int:
         """Parameters: B, poles, C, D and a constant."""
-        return self.b + self.poles + self.c + self.d + 1
+        return self.zeros + self.poles + self.c + self.d + 1
 
 
 @dataclass(frozen=True)
 class Polynomials:
-    """The coefficients, those after the leading 1 where there is one, and the constant."""
+    """The coefficients, those after the leading 1 where there is one, and the constant.
+
+    ``b`` has a row for every input, ``poles`` for every recursion.
+    """
 
     b: Array
     poles: Array
@@ -80,9 +96,15 @@ class Polynomials:
     @classmethod
     def of(cls, theta: Array, orders: Orders) -> Polynomials:
         """Return the polynomials of a parameter vector."""
-        sizes = np.cumsum([orders.b, orders.poles, orders.c, orders.d])
+        sizes = np.cumsum([orders.zeros, orders.poles, orders.c, orders.d])
         b, poles, c, d, rest = np.split(theta, sizes)
-        return cls(b, poles, c, d, float(rest[0]))
+        n = orders.recursions
+        return cls(b.reshape(orders.inputs, -1), poles.reshape(n, -1), c, d, float(rest[0]))
+
+    @property
+    def monic(self) -> tuple[Array, ...]:
+        """All that have a leading 1, without it: every recursion, C and D."""
+        return (*self.poles, self.c, self.d)
 
 
 def errors(
@@ -114,11 +136,9 @@ def errors(
     from scipy.signal import lfilter
 
     p = Polynomials.of(theta, orders)
-    poles, c, d = np.array([1.0, *p.poles]), np.array([1.0, *p.c]), np.array([1.0, *p.d])
+    c, d = np.array([1.0, *p.c]), np.array([1.0, *p.d])
     n = run.u.size
     estimated = start == "fitted" or orders.a > 0
-    rest = 0.0 if start == "virgin" else float(run.u[0])
-    u = run.u - rest
 
     def later(x: Array, samples: int) -> Array:
         moved = np.zeros_like(x)
@@ -132,38 +152,51 @@ def errors(
         return np.asarray(lfilter([1.0], denominator, x))
 
     # a filter at rest answers what comes later as much later, so each is run only once
-    lags = orders.input_lags
-    driven = sum((b * later(u, lag) for lag, b in zip(lags, p.b, strict=True)), np.zeros(n))
+    lags, order = orders.input_lags, p.poles.shape[1]
     impulse, ones = np.eye(1, n)[0], np.ones(n)
     by_constant = -by_noise(ones)
-    held = float(p.b.sum()) * rest
-    if state is not None:
-        driven[: state.size] += state[:n]
+    states = None if state is None else state.reshape(-1, order)
+    by_b: list[Array] = []
+    by_poles: list[Array] = []
+    starts: list[Array] = []
+    # equation error: the recursion is taken on measured outputs
+    gap = np.asarray(lfilter([1.0, *p.poles[0]], [1.0], run.y)) if orders.a else run.y
     if orders.a:
-        # equation error: the recursion is taken on measured outputs
-        gap = np.asarray(lfilter(poles, [1.0], run.y)) - driven - held - p.constant
-        by_input, by_start, by_rest = -by_noise(u), -by_noise(impulse), by_constant
         behind = by_noise(run.y)
-    elif estimated:
-        free = alone(poles, driven + held)
-        gap = run.y - free - p.constant
-        by_input, by_start = -by_noise(alone(poles, u)), -by_noise(alone(poles, impulse))
-        by_rest = -by_noise(alone(poles, ones))
-        behind = by_noise(alone(poles, free))
-    else:
-        moved, whole = alone(poles, driven), float(poles.sum())
-        gap = run.y - moved - held / whole - p.constant
-        by_input, by_start = -by_noise(alone(poles, u)), impulse
-        by_rest = by_constant / whole
-        behind = by_noise(alone(poles, moved))
+        by_poles = [later(behind, i + 1) for i in range(order)]
+        starts = [later(-by_noise(impulse), k) for k in range(order)]
+    for place, b in enumerate(p.b):
+        poles = np.array([1.0, *p.poles[min(place, len(p.poles) - 1)]])
+        whole = run.driven[:, place]
+        rest = 0.0 if start == "virgin" else float(whole[0])
+        u = whole - rest
+        driven = sum((one * later(u, lag) for lag, one in zip(lags, b, strict=True)), np.zeros(n))
+        held = float(b.sum()) * rest
+        if states is not None and place < len(states):
+            driven[:order] += states[place, :n]
+        if orders.a:
+            gap = gap - driven - held
+            by_input, by_rest = -by_noise(u), by_constant
+        elif estimated:
+            free = alone(poles, driven + held)
+            gap = gap - free
+            by_input, by_start = -by_noise(alone(poles, u)), -by_noise(alone(poles, impulse))
+            by_rest = -by_noise(alone(poles, ones))
+            behind = by_noise(alone(poles, free))
+            by_poles += [later(behind, i + 1) for i in range(order)]
+            starts += [later(by_start, k) for k in range(order)]
+        else:
+            moved, total = alone(poles, driven), float(poles.sum())
+            gap = gap - moved - held / total
+            by_input = -by_noise(alone(poles, u))
+            by_rest = by_constant / total
+            behind = by_noise(alone(poles, moved))
+            by_poles += [later(behind, i + 1) - held / total * by_rest for i in range(order)]
+        by_b += [later(by_input, lag) + rest * by_rest for lag in lags]
+    gap = gap - p.constant
     e = by_noise(gap)
-    starts = [later(by_start, k) for k in range(orders.poles if estimated else 0)]
     if only_starts:
         return e, np.column_stack([np.empty((n, 0)), *starts])
-    by_b = [later(by_input, lag) + rest * by_rest for lag in lags]
-    by_poles = [later(behind, i + 1) for i in range(orders.poles)]
-    if not estimated:
-        by_poles = [column - held / whole * by_rest for column in by_poles]
     whitened_e, whitened_gap = alone(c, e), alone(c, gap)
     by_c = [-later(whitened_e, i + 1) for i in range(orders.c)]
     by_d = [later(whitened_gap, i + 1) for i in range(orders.d)]

@@ -62,7 +62,7 @@ def admissible(theta: Array, orders: Orders) -> bool:
     p = Polynomials.of(theta, orders)
     return (
         bool(np.isfinite(theta).all())
-        and spectral_radius(p.poles) < STABLE
+        and all(spectral_radius(tail) < STABLE for tail in p.poles)
         and spectral_radius(p.c) < INVERTIBLE
         and spectral_radius(p.d) <= 1.0 + 1e-9
     )
@@ -71,15 +71,15 @@ def admissible(theta: Array, orders: Orders) -> bool:
 def loosened(theta: Array, orders: Orders) -> Array:
     """Return the coordinates of parameters in which no step leaves what is stable."""
     p = Polynomials.of(theta, orders)
-    free = [free_coordinates(tail) for tail in (p.poles, p.c, p.d)]
-    return np.concatenate([p.b, *free, [p.constant]])
+    free = [free_coordinates(tail) for tail in p.monic]
+    return np.concatenate([p.b.ravel(), *free, [p.constant]])
 
 
 def tightened(coordinates: Array, orders: Orders) -> tuple[Array, Array]:
     """Return the parameters of such coordinates, and their derivatives by them."""
     p = Polynomials.of(coordinates, orders)
-    theta, slopes, place = coordinates.copy(), np.eye(coordinates.size), orders.b
-    for tail in (p.poles, p.c, p.d):
+    theta, slopes, place = coordinates.copy(), np.eye(coordinates.size), orders.zeros
+    for tail in p.monic:
         own = slice(place, place + tail.size)
         theta[own], slopes[own, own] = polynomial(tail)
         place += tail.size
@@ -170,6 +170,16 @@ def arx(runs: Sequence[Run], orders: Orders) -> Array:
     return np.asarray(theta - np.linalg.lstsq(jacobian, e, rcond=1e-12)[0])
 
 
+def filtered(run: Run, numerator: Sequence[float], denominator: Sequence[float]) -> Run:
+    """Return a run whose inputs and outputs have passed a filter."""
+    from scipy.signal import lfilter
+
+    driven, outputs = (
+        np.asarray(lfilter(numerator, denominator, x, axis=0)) for x in (run.driven, run.outputs)
+    )
+    return replace(run, driven=driven, outputs=outputs)
+
+
 def starting_points(
     runs: Sequence[Run], known: Sequence[Run], orders: Orders, n_starts: int, seed: int
 ) -> list[Array]:
@@ -182,7 +192,7 @@ def starting_points(
     follow from all these.
     """
     rng = np.random.default_rng(seed)
-    n = orders.poles
+    n = orders.a + orders.f
     coloured = orders.c + orders.d > 0
     white = _whitened(runs, orders) if coloured else []
     candidates: list[tuple[Array, Sequence[Run]]]
@@ -206,37 +216,33 @@ def starting_points(
 
 def _with_plant(theta: Array, runs: Sequence[Run], orders: Orders) -> Array:
     """Return parameters whose plant is found on data whitened by the noise model given."""
-    from scipy.signal import lfilter
-
     p = Polynomials.of(theta, orders)
     top, below = ([1.0, *p.d], [1.0, *p.c]) if not orders.a else ([1.0], [1.0, *p.c])
-    white = [
-        run.carrying(
-            np.asarray(lfilter(top, below, run.u - run.u[0])),
-            np.asarray(lfilter(top, below, run.y - run.y[0])),
-        )
+    moved = (
+        replace(run, driven=run.driven - run.driven[0], outputs=run.outputs - run.outputs[0])
         for run in runs
-    ]
+    )
+    white = [filtered(run, top, below) for run in moved]
     poles = _steiglitz_mcbride(white, orders, 10)
     return _complete(poles, white, runs, orders)
 
 
 def _complete(poles: Array, white: Sequence[Run], runs: Sequence[Run], orders: Orders) -> Array:
-    """Return parameters with these poles, and the B, constant, C and D that suit them.
+    """Return parameters with these poles for every input, and the B, constant, C and D that suit them.
 
     B is solved for on data in which the noise is white, or taken to be; its residuals on the data as
     they are give C and D; under these B and the constant are solved for again, and so on.
     """
     theta = np.zeros(orders.size)
-    theta[orders.b : orders.b + orders.poles] = poles
+    theta[orders.zeros : orders.zeros + orders.poles] = np.tile(poles, orders.recursions)
     if orders.c + orders.d == 0:
         return _linear_solved(theta, orders, runs)
     plant = replace(orders, c=0, d=0)
     simple = _linear_solved(np.append(theta[: plant.size - 1], 0.0), plant, white)
-    theta[: orders.b] = simple[: orders.b]
+    theta[: orders.zeros] = simple[: orders.zeros]
     for _ in range(ALTERNATIONS):
         noise = [_noise(theta, orders, run) for run in runs]
-        theta[orders.b + orders.poles : -1] = arma(noise, orders.c, orders.d)
+        theta[orders.zeros + orders.poles : -1] = arma(noise, orders.c, orders.d)
         theta = _linear_solved(theta, orders, runs)
     return theta
 
@@ -254,7 +260,7 @@ def _noise(theta: Array, orders: Orders, run: Run) -> Array:
 
 def _linear_solved(theta: Array, orders: Orders, runs: Sequence[Run]) -> Array:
     """Return the parameters with the best B and constant, the others held."""
-    places = [*range(orders.b), orders.size - 1]
+    places = [*range(orders.zeros), orders.size - 1]
     e, jacobian, _ = evaluate(theta, orders, runs)
     solved = theta.copy()
     solved[places] -= np.linalg.lstsq(jacobian[:, places], e, rcond=1e-12)[0]
@@ -332,8 +338,6 @@ def _whitened(runs: Sequence[Run], orders: Orders) -> list[list[Run]]:
 
     Source: Zhu and Hjalmarsson, "The Box-Jenkins Steiglitz-McBride algorithm", Automatica, 2016.
     """
-    from scipy.signal import lfilter
-
     total = sum(run.u.size for run in runs)
     found = []
     for long in (8, 20, 50):
@@ -341,35 +345,18 @@ def _whitened(runs: Sequence[Run], orders: Orders) -> list[list[Run]]:
         enough = [run for run in runs if run.u.size > 3 * order]
         if not enough:
             continue
-        simple = Orders(b=order + 1, a=order, delay=orders.delay)
-        a = [1.0, *arx(enough, simple)[order + 1 : 2 * order + 1]]
+        simple = Orders(b=order + 1, a=order, delay=orders.delay, inputs=orders.inputs)
+        a = [1.0, *Polynomials.of(arx(enough, simple), simple).poles[0]]
         # the first samples, which have too few before them, are left out
-        found.append(
-            [
-                run.carrying(
-                    np.asarray(lfilter(a, [1.0], run.u)), np.asarray(lfilter(a, [1.0], run.y))
-                ).cut(order)
-                for run in enough
-            ]
-        )
+        found.append([filtered(run, a, [1.0]).cut(order) for run in enough])
     return found
 
 
 def _steiglitz_mcbride(runs: Sequence[Run], orders: Orders, rounds: int) -> Array:
-    """Return poles by ARX, iterated on data filtered by the poles found before."""
-    from scipy.signal import lfilter
-
-    simple = replace(orders, a=orders.poles, f=0, c=0, d=0)
-    poles = np.zeros(orders.poles)
+    """Return the poles of one recursion by ARX, iterated on data filtered by the poles found before."""
+    simple = replace(orders, a=orders.a + orders.f, f=0, c=0, d=0)
+    poles = np.zeros(simple.a)
     for _ in range(rounds + 1):
-        filtered = [
-            run.carrying(
-                np.asarray(lfilter([1.0], [1.0, *poles], run.u)),
-                np.asarray(lfilter([1.0], [1.0, *poles], run.y)),
-            )
-            for run in runs
-        ]
-        poles = inside(
-            arx(filtered, simple)[orders.b : orders.b + orders.poles], STABLE * (1 - 1e-4)
-        )
+        found = arx([filtered(run, [1.0], [1.0, *poles]) for run in runs], simple)
+        poles = inside(Polynomials.of(found, simple).poles[0], STABLE * (1 - 1e-4))
     return poles

@@ -1,0 +1,182 @@
+"""Ridge regression on play operators, lags and products of all inputs.
+
+Linear in the readout: least squares on what a block with a unit readout gives, with a penalty that is
+chosen for every output by leaving out blocks of time. A fit to all but one block is a fit to the sum of
+the others' normal equations, so no block is simulated twice. Samples that follow one another are alike,
+which generalised cross-validation, of one sample left out at a time, takes for evidence; where whole
+blocks are left out they are none.
+
+Source: Hoerl and Kennard, "Ridge regression", Technometrics, 1970; Burman, Chow and Nolan, "A
+cross-validatory method for dependent data", Biometrika, 1994.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from typing import Annotated, ClassVar
+
+import numpy as np
+from annotated_types import Ge, Gt, Interval, Len
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
+from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.coupled.base import CoupledEstimator
+from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
+
+PENALTIES = np.geomspace(1e-8, 10.0, 28)
+"""Tried, relative to the size of what is read out."""
+
+N_BLOCKS = 10
+"""Left out in turn, at least; as many of every run."""
+
+LEAST = 1e-12
+"""Penalty that is always there, relative to the same, so that equations can be solved."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class PlayRidgeEstimator(CoupledEstimator):
+    """Ridge regression on play operators, lags and products of all inputs; any number of outputs.
+
+    After `fit`, ``penalties_`` holds the penalty of every output.
+
+    Parameters
+    ----------
+    lags : sequence of float
+        Time constants [s], 0 for the input itself; products are of the first. Of recordings without
+        time, the inputs themselves are taken.
+    thresholds : sequence of float
+        Of the play operators of every lagged input, relative to the range of the input.
+    degree : int
+        Highest degree of products of inputs, 1 for none.
+    ridge : float, optional
+        Penalty of the readout, its constant excepted, relative to the root mean square of what is read
+        out. Default: for every output the largest whose error on blocks left out is within a standard
+        error of the least.
+    """
+
+    title = "Ridge regression on play operators and lags"
+    purpose = "several"
+    can = (
+        "One muscle or several, under loads too, any number of outputs: lags, play operators "
+        "and products of all inputs, in closed form; always stable."
+    )
+    cannot = (
+        "No inverse; beyond the inputs recorded its products go on as polynomials; no dynamics "
+        "that oscillate."
+    )
+    quick = True
+    alone: ClassVar[bool] = True
+    through: ClassVar[bool] = True
+    paired: ClassVar[bool] = False
+
+    lags: Annotated[tuple[Annotated[float, Ge(0)], ...], Len(1)] = (0.0, 0.1, 0.6, 4.0)
+    thresholds: tuple[Annotated[float, Gt(0)], ...] = (0.04, 0.11, 0.23)
+    degree: Annotated[int, Interval(ge=1, le=3)] = 3
+    ridge: Annotated[float, Gt(0)] | None = None
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+        lags = self.lags if data.sample_time is not None else (0.0,)
+        spans = np.ptp(np.concatenate([run.inputs for run in data.runs]), axis=0)
+        width = readout_width(spans.size, len(lags), len(self.thresholds), self.degree)
+        template = CoupledMemory(
+            vector(lags),
+            rows(np.where(spans > 0, spans, 1.0)[:, np.newaxis] * np.array(self.thresholds)),
+            rows(np.zeros((len(data.outputs), width))),
+            self.degree,
+            data.inputs,
+            data.scheduled,
+            data.outputs,
+        )
+        blocks = []
+        for place, run in enumerate(data.runs):
+            tracker.reached(place / len(data.runs))
+            whole = np.hstack([features(template, run), run.outputs])[run.counts]
+            blocks += [one.T @ one for one in np.array_split(whole, -(-N_BLOCKS // len(data.runs)))]
+        readout, self.penalties_ = solved(np.array(blocks), width, self.ridge)
+        return template.unpack(readout.ravel())
+
+
+def solved(blocks: Array, width: int, ridge: float | None) -> tuple[Array, tuple[float, ...]]:
+    """Return the readout of every output, shape (m, width), and its penalty.
+
+    Parameters
+    ----------
+    blocks : array, shape (n_blocks, width + m, width + m)
+        Sums of products of what is read out, a constant first, and of the outputs, of every block.
+    width : int
+    ridge : float or None
+        Penalty, None to choose it.
+    """
+    size = np.sqrt(np.maximum(np.diag(blocks.sum(axis=0)), 1e-300))
+    blocks = blocks / np.outer(size, size)
+    total = blocks.sum(axis=0)
+    given, m = slice(width), total.shape[0] - width
+
+    def fit(sums: Array, penalty: float) -> Array:
+        damping = np.full(width, penalty + LEAST)
+        damping[0] = LEAST
+        return np.asarray(
+            np.linalg.solve(sums[given, given] + np.diag(damping), sums[given, width:])
+        )
+
+    def missed(block: Array, penalty: float) -> Array:
+        """Return the squared error of every output on a block left out, relative to its own."""
+        w = np.vstack([fit(total - block, penalty), -np.eye(m)])
+        return np.asarray(np.einsum("ij,ik,kj->j", w, block, w))
+
+    if ridge is not None:
+        penalties = [ridge] * m
+    else:
+        errors = np.array([[missed(block, one) for one in PENALTIES] for block in blocks])
+        least = errors.sum(axis=0).argmin(axis=0)
+        more = errors - errors[:, least, range(m)][:, np.newaxis]
+        spread = more.std(axis=0, ddof=1) * np.sqrt(len(blocks))
+        within = more.sum(axis=0) <= spread
+        penalties = [float(PENALTIES[within[:, j]].max()) for j in range(m)]
+    readout = [fit(total, one)[:, j] * size[width + j] for j, one in enumerate(penalties)]
+    return np.array(readout) / size[given], tuple(penalties)
+
+
+def features(block: CoupledMemory, run: Run) -> Array:
+    """Return what the readout multiplies over a run, shape (n, width)."""
+    inputs = run.inputs
+    n, width = inputs.shape[1], len(block.readout[0])
+    many = CoupledMemory(
+        block.lags,
+        block.thresholds,
+        rows(np.eye(width)[: block.n_states + 1]),
+        block.degree,
+        block.driven,
+        block.scheduled,
+        tuple(Channel(f"feature_{k}", "") for k in range(block.n_states + 1)),
+    )
+    linear = many.simulate(inputs, sample_time=run.sample_time)
+    first = linear[:, 1 : 1 + n]
+    products = [
+        np.prod(first[:, list(chosen)], axis=1)
+        for power in range(2, block.degree + 1)
+        for chosen in combinations_with_replacement(range(n), power)
+    ]
+    return np.column_stack([linear, *products])
+
+
+COUPLED_MEMORY = preset(
+    PlayRidgeEstimator,
+    "Lags and play operators of several muscles, with one penalty that is given.",
+    title="Coupled lags and play operators",
+    can=(
+        "Any number of outputs from lags, play operators and products of all inputs; in "
+        "closed form."
+    ),
+    cannot="No inverse; products know nothing of inputs larger than those recorded.",
+    makes=("coupled-memory",),
+    alone=False,
+    needs_time=True,
+    lags=(0.3, 1.0, 8.0),
+    ridge=1e-4,
+)

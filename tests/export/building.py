@@ -89,7 +89,7 @@ def build(blocks: Mapping[str, Block], precision: Precision, folder: Path) -> di
     """
     single, project = precision == "float32", folder / "project"
     project.mkdir(parents=True)
-    # functions of the primitives keep their names, as all models share them
+    # without names of their own for each model's shared functions
     (project / "mck_config.h").write_text("#define MCK_FLOAT32\n" if single else "")
     loops = []
     for place, block in enumerate(blocks.values()):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -363,8 +363,8 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
         if now:
             validate(block, fold)
     outputs = outputs_of(block, data)
-    diagnostics = asdict(estimator.diagnostics_)
-    diagnostics.pop("covariance")
+    diagnostics = dict(vars(estimator.diagnostics_))
+    diagnostics.pop("uncertainty")  # it holds the recordings
     train, test, by_output = scores_of(outputs, data)
     row = Row(
         model=part.name,

@@ -203,14 +203,8 @@ class TrainingData:
 
     @property
     def input_range(self) -> tuple[float, float]:
-        """Lowest and highest input of all runs."""
-        low, high = self.once(
-            "input range",
-            lambda: np.array(
-                [min(run.u.min() for run in self.runs), max(run.u.max() for run in self.runs)]
-            ),
-        ).tolist()
-        return low, high
+        """Lowest and highest value of the first input over all runs."""
+        return float(self.lowest[0]), float(self.highest[0])
 
     @property
     def output_range(self) -> tuple[float, float]:

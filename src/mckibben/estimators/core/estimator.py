@@ -5,8 +5,10 @@ from __future__ import annotations
 import time
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, partial
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -75,20 +77,14 @@ class Diagnostics:
         Wall time.
     interrupted : bool
         Whether the user stopped the search; the model is then the best found until there.
-    condition : float
-        Condition number of the sensitivity of the output to the free parameters, each scaled by its
-        own size.
     at_bounds : tuple of int
         Parameters, by their place in ``model_.pack()``, that ended at a bound.
-    standard_errors : tuple of float
-        One a parameter, for residuals that remember; NaN for those at bounds or that the data do
-        not determine.
-    covariance : array, shape (n_parameters, n_parameters)
-        The same, NaN likewise.
     peaks : tuple of float or None
         For every recording, the input from which it was taken to have come before its first sample.
     notes : tuple of str
         What the user should know.
+    uncertainty : callable
+        Gives `condition` and `covariance`, which are computed when first asked for.
     """
 
     rmse: float
@@ -98,12 +94,36 @@ class Diagnostics:
     n_evaluations: int
     seconds: float
     interrupted: bool
-    condition: float
     at_bounds: tuple[int, ...]
-    standard_errors: tuple[float, ...]
-    covariance: Array = field(repr=False)
     peaks: tuple[float | None, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...]
+    uncertainty: Callable[[], tuple[float, Array]] = field(repr=False)
+
+    @cached_property
+    def _uncertainty(self) -> tuple[float, Array]:
+        with one_blas_thread():
+            return self.uncertainty()
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the sensitivity of the output to the free parameters.
+
+        Each parameter is scaled by its own size.
+        """
+        return self._uncertainty[0]
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the parameters for autocorrelated residuals, shape (n_parameters, n_parameters).
+
+        NaN for parameters at bounds or that the data do not determine.
+        """
+        return self._uncertainty[1]
+
+    @property
+    def standard_errors(self) -> tuple[float, ...]:
+        """Standard error of every parameter, NaN as in `covariance`."""
+        return tuple(np.sqrt(np.diag(self.covariance)).tolist())
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -398,11 +418,6 @@ class Estimator(ABC):
             residual = data.target - self.free_runs([block], data)[0]
             from_rest = data.target - simulate_all([block], data.unstarted())[0]
         notes = dict.fromkeys([*tracker.notes, *sorted({str(one.message) for one in caught})])
-        try:
-            condition, covariance = self.uncertainty(block, data, residual, at_bounds)
-        except KeyboardInterrupt:  # the model is found; only what is known about it is cut short
-            tracker.interrupted = True
-            condition, covariance = np.nan, unknown(block)
         by_output = _rms(residual.reshape(-1, len(data.outputs)))
         return Diagnostics(
             rmse=float(by_output.mean()),
@@ -412,12 +427,11 @@ class Estimator(ABC):
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
             interrupted=tracker.interrupted,
-            condition=condition,
             at_bounds=at_bounds,
-            standard_errors=tuple(np.sqrt(np.diag(covariance)).tolist()),
-            covariance=covariance,
             peaks=tuple(run.peak for run in data.runs),
             notes=tuple(notes),
+            # of the estimator as it is now: it may be changed or fitted again
+            uncertainty=partial(copy(self).uncertainty, block, data, residual, at_bounds),
         )
 
     def undetermined(self) -> tuple[int, ...]:

@@ -88,19 +88,18 @@ def told_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[f
     residual : array, shape (n,)
         Likewise.
     """
-    moves, left, place = [], [], 0
-    for run in runs:
-        n_outputs = run.outputs.shape[1]
-        stop = place + int(run.counts.sum()) * n_outputs
-        wide = np.zeros((run.counts.size, n_outputs, slopes.shape[1]))
-        wide[run.counts] = slopes[place:stop].reshape(-1, n_outputs, slopes.shape[1])
-        own = np.full((run.counts.size, n_outputs), np.nan)
-        own[run.counts] = residual[place:stop].reshape(-1, n_outputs)
-        moves.append(wide)
-        left.append(own)
-        place = stop
     if not (np.isfinite(slopes).all() and np.isfinite(residual).all()):
         return np.inf, np.full(2 * slopes.shape[1:], np.nan)
+    ends = np.cumsum([run.outputs[run.counts].size for run in runs])[:-1]
+    moves, left = [], []
+    for run, by_run, own in zip(
+        runs, np.split(slopes, ends), np.split(residual, ends), strict=True
+    ):
+        shape = run.outputs.shape
+        moves.append(np.zeros((*shape, slopes.shape[1])))
+        moves[-1][run.counts] = by_run.reshape(-1, *moves[-1].shape[1:])
+        left.append(np.full(shape, np.nan))
+        left[-1][run.counts] = own.reshape(-1, shape[1])
     models = autoregressions(left)
     condition, covariance, told = sandwich(moves, left, models)
     return condition, blanked(covariance, told)

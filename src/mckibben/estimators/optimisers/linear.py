@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 
@@ -52,37 +51,12 @@ def solve_linear(
     scaled[:, scale <= CONSTANT * np.sqrt(len(basis)) * np.abs(means)] = 0.0
     if nonnegative:
         floor = np.zeros(m) if least is None else least
-        if (either := np.isneginf(floor)).any():
-            return _with_either(basis, target, floor, either, with_offset)
-        x = floor + nnls(scaled, right - triangle[:, :m] @ floor, maxiter=30 * m)[0] / scale
+        either = np.isneginf(floor)  # of either sign: the difference of two that are not negative
+        floor = np.where(either, 0.0, floor)
+        both = np.hstack([scaled, -scaled[:, either]])
+        found = nnls(both, right - triangle[:, :m] @ floor, maxiter=30 * both.shape[1])[0]
+        found[:m][either] -= found[m:]
+        x = floor + found[:m] / scale
     else:
         x = np.linalg.lstsq(scaled, right, rcond=1e-12)[0] / scale
     return x, mean - float(means @ x)
-
-
-def _with_either(
-    basis: Array, target: Array, least: Array, either: NDArray[np.bool_], with_offset: bool
-) -> tuple[Array, float]:
-    """Solve where some columns may have either sign: without what these take up, then for them."""
-    from scipy.linalg import qr, solve_triangular
-
-    offset = np.ones((len(basis), int(with_offset)))
-    free, bound = np.column_stack([offset, basis[:, either]]), basis[:, ~either]
-    scale = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
-    directions, triangle, order = qr(free / scale, mode="economic", pivoting=True)
-    sizes = np.abs(np.diag(triangle))
-    rank = int(np.count_nonzero(sizes > 1e-12 * sizes[0]))
-    directions, triangle, order = directions[:, :rank], triangle[:rank, :rank], order[:rank]
-
-    def left(columns: Array) -> Array:
-        return np.asarray(columns - directions @ (directions.T @ columns))
-
-    x = np.empty(either.size)
-    x[~either], _ = solve_linear(
-        left(bound), left(target), nonnegative=True, least=least[~either], with_offset=False
-    )
-    found = np.zeros(scale.size)
-    found[order] = solve_triangular(triangle, directions.T @ (target - bound @ x[~either]))
-    found /= scale
-    x[either] = found[int(with_offset) :]
-    return x, float(found[0]) if with_offset else 0.0

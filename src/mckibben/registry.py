@@ -88,12 +88,8 @@ PLUGINS: dict[str, dict[str, str]] = {
         "tanh": "mckibben.blocks.hysteresis.envelopes.tanh:Tanh",
     },
     "estimators": {
-        "activation-memory": (
-            "mckibben.estimators.force.activation_memory:ActivationMemoryEstimator"
-        ),
-        "activation-pressure": (
-            "mckibben.estimators.force.activation_pressure:ActivationPressureEstimator"
-        ),
+        "activation-memory": ("mckibben.estimators.force.activation:ActivationMemoryEstimator"),
+        "activation-pressure": ("mckibben.estimators.force.activation:ActivationPressureEstimator"),
         "air": "mckibben.estimators.dynamics.air:AirEstimator",
         "armax": "mckibben.estimators.dynamics.linear_models:ARMAX",
         "arx": "mckibben.estimators.dynamics.linear_models:ARX",
@@ -112,12 +108,12 @@ PLUGINS: dict[str, dict[str, str]] = {
             "mckibben.estimators.hysteresis.duhem_oscillator:DuhemOscillatorEstimator"
         ),
         "eupi": "mckibben.estimators.hysteresis.eupi:EUPIEstimator",
-        "force-bilinear": "mckibben.estimators.force.static:FORCE_BILINEAR",
-        "force-chou": "mckibben.estimators.force.static:ChouHannafordEstimator",
-        "force-minh": "mckibben.estimators.force.static:FORCE_MINH",
-        "force-petrovic": "mckibben.estimators.force.static:FORCE_PETROVIC",
-        "force-schindele": "mckibben.estimators.force.static:FORCE_SCHINDELE",
-        "force-tondu": "mckibben.estimators.force.static:TonduLopezEstimator",
+        "force-bilinear": "mckibben.estimators.force.laws:FORCE_BILINEAR",
+        "force-chou": "mckibben.estimators.force.laws:ChouHannafordEstimator",
+        "force-minh": "mckibben.estimators.force.laws:FORCE_MINH",
+        "force-petrovic": "mckibben.estimators.force.laws:FORCE_PETROVIC",
+        "force-schindele": "mckibben.estimators.force.laws:FORCE_SCHINDELE",
+        "force-tondu": "mckibben.estimators.force.laws:TonduLopezEstimator",
         "gbw": "mckibben.estimators.hysteresis.generalized_bouc_wen:GeneralizedBoucWenEstimator",
         "gpi": "mckibben.estimators.hysteresis.gpi:GPIEstimator",
         "kp": "mckibben.estimators.hysteresis.preisach:KP",

@@ -34,7 +34,13 @@ def kernels_in(module: str) -> list[str]:
 
 
 EXAMPLES = examples()
-WITHOUT_TWIN = {"force-balance", "force-balance-inverse", "pi-adaptive", "force-feedforward"}
+WITHOUT_TWIN = {
+    "feedforward-feedback",
+    "force-balance",
+    "force-balance-inverse",
+    "pi-adaptive",
+    "force-feedforward",
+}
 """What old files alone hold, a learner, whose laws are its own, and what is made of kernels with twins;
 golden cases pin their numbers."""
 

@@ -12,13 +12,13 @@ from mckibben import DataError, Recording
 from mckibben.blocks.force.laws import ChouHannaford, TonduLopez
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.estimators.coupled.balance_force import BalanceForceEstimator
-from mckibben.estimators.force.activation_pressure import ActivationPressureEstimator
-from mckibben.estimators.force.multistate import MultistateEstimator, extract_hysteresis
-from mckibben.estimators.force.static import (
+from mckibben.estimators.force.activation import ActivationPressureEstimator
+from mckibben.estimators.force.laws import (
     ChouHannafordEstimator,
     PolynomialForceEstimator,
     TonduLopezEstimator,
 )
+from mckibben.estimators.force.multistate import MultistateEstimator, extract_hysteresis
 from mckibben.papers.activation_pressure.published import activation_pressure
 from mckibben.papers.multistate_friction.published import static_force
 from tests.estimators.test_balance import recording

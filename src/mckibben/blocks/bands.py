@@ -59,23 +59,11 @@ def look(
     the input just turned), and how far it is from its own past (lags of several times). Every modelled
     output gives its level. All is known at the sample itself, so that a stream knows it, too.
 
-    Parameters
-    ----------
-    x : array, shape (n_x,)
-        Inputs, of which there are ``n_driving``, then modelled outputs.
-    ends : array, shape (2 n_x,)
-        Lowest of each, then highest.
-    widths, keeps : array
-        Of plays, as shares of the range; and what lags keep of themselves from sample to sample.
-    state : array, shape (n_driving (widths + keeps),)
-        Plays and lags of the first input, then of the next, in shares of its range.
-    seen : array, shape (n_x + n_driving (widths + keeps),)
-        State of motion that is found.
-
-    Returns
-    -------
-    float
-        The largest distance beyond an end, in shares of that channel's range.
+    ``x`` are ``n_driving`` inputs, then modelled outputs, of the lowest, then highest ``ends``;
+    ``widths`` are of plays, as shares of the range, and ``keeps`` what lags keep of themselves from
+    sample to sample. The state has plays and lags of the first input, then of the next, as shares of
+    its range. How far a sample is beyond an end is a share of that channel's range, the largest of
+    all.
     """
     beyond, place, slot = 0.0, 0, 0
     for j in range(x.size):

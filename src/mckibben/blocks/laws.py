@@ -181,16 +181,8 @@ def wander(
 ) -> Array:
     """Return a path between random turning points, shape (n, n_channels), with a hold at each.
 
-    Parameters
-    ----------
-    lowest, highest : array, shape (n_channels,)
-        Range of the turning points.
-    rng : Generator
-        Where chance comes from.
-    pace : int
-        Samples from one turning point to the next, on average.
-    n_turns : int
-        Number of turning points.
+    Turning points are within ``lowest`` and ``highest``, shape (n_channels,), ``pace`` samples from each
+    other on average.
     """
     turns = rng.uniform(lowest, highest, (n_turns, lowest.size))
     return through(turns, rng.integers(pace // 2, pace * 3 // 2 + 1, n_turns - 1))

@@ -25,7 +25,7 @@ from mckibben.blocks.fields import (
     Vector,
 )
 from mckibben.blocks.inverse import Invertible, check_input_range, nothing_clipped
-from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
+from mckibben.blocks.kernels import DERIVED, SLACK, improved, inlined, kernel, step
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation, summed
 from mckibben.blocks.solving import newton
@@ -211,12 +211,27 @@ class PiecewiseLinear(Block):
 
 
 @kernel
+def horner(x: float, c: Array) -> float:
+    """Return the polynomial with ascending coefficients ``c`` at ``x``."""
+    y = 0.0
+    for k in range(c.size - 1, -1, -1):
+        y = y * x + c[k]
+    return y
+
+
+@inlined
+def horner_slope(x: float, value: float, c: Array) -> float:
+    """Return its derivative."""
+    slope = 0.0
+    for k in range(c.size - 1, 0, -1):
+        slope = slope * x + k * c[k]
+    return slope
+
+
+@kernel
 def polynomial_at(x: float, coefficients: Array, first: int, size: int) -> float:
     """Return the polynomial whose ascending coefficients start at ``first``."""
-    y = 0.0
-    for k in range(first + size - 1, first - 1, -1):
-        y = y * x + coefficients[k]
-    return y
+    return horner(x, coefficients[first : first + size])
 
 
 def least_slope(
@@ -233,46 +248,29 @@ def least_slope(
 @step
 def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Evaluate; coefficients are [centre, scale, ascending polynomial coefficients]."""
-    x = (inputs[0] - coefficients[0]) / coefficients[1]
-    outputs[0] = polynomial_at(x, coefficients, 2, coefficients.size - 2)
-
-
-@kernel
-def value_at(x: float, c: Array) -> float:
-    """Return the polynomial of the inverse's coefficients."""
-    return polynomial_at(x, c, 4, c.size - 4)
-
-
-@kernel
-def slope_at(x: float, value: float, c: Array) -> float:
-    """Return its derivative."""
-    slope = 0.0
-    for k in range(c.size - 5, 0, -1):
-        slope = slope * x + k * c[4 + k]
-    return slope
+    outputs[0] = horner((inputs[0] - coefficients[0]) / coefficients[1], coefficients[2:])
 
 
 @step
 def polynomial_inverse_step(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Invert an increasing polynomial by Newton's method kept inside a shrinking bracket.
+    """Invert an increasing polynomial; the state is the count of samples clipped.
 
-    Coefficients are [centre, scale, lowest, highest argument, ascending coefficients]; the state is
-    the count of samples clipped. Ends when the bracket or the step cannot shrink any further.
+    Coefficients are [centre, scale, lowest, highest argument, ascending coefficients].
     """
-    c = coefficients
-    y, low, high = inputs[0], c[2], c[3]
-    bottom, top = value_at(low, c), value_at(high, c)
-    slack = SLACK * (top - bottom)
-    if y < bottom - slack or y > top + slack:
-        state[0] += 1.0
-    x = low if y <= bottom else high
-    if bottom < y < top:
-        x = newton(value_at, slope_at, y, low, high, 0.5 * (low + high), 0.0, c)
-        if DERIVED:
-            x = improved(value_at, y, x, c)
-    outputs[0] = c[0] + c[1] * x
+    low, high, c = coefficients[2], coefficients[3], coefficients[4:]
+    bottom, top = horner(low, c), horner(high, c)
+    y, slack = inputs[0], SLACK * (top - bottom)
+    if not bottom < y < top:
+        if y < bottom - slack or y > top + slack:
+            state[0] += 1.0
+        outputs[0] = coefficients[0] + coefficients[1] * (low if y <= bottom else high)
+        return
+    x = newton(horner, horner_slope, y, low, high, 0.5 * (low + high), 0.0, c)
+    if DERIVED:
+        x = improved(horner, y, x, c)
+    outputs[0] = coefficients[0] + coefficients[1] * x
 
 
 @dataclass(frozen=True, config=STRICT)

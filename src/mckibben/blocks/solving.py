@@ -228,7 +228,7 @@ def newton(
     high: float,
     start: float,
     least_step: float,
-    memory: Any,
+    memory: Array,
 ) -> float:
     """Return where a rising ``evaluate(x, memory)`` is the target, between two ends that bracket it.
 

@@ -18,13 +18,14 @@ from mckibben.blocks.force.multistate_friction import (
     EACH_WAY,
     EIGHTEEN,
     ELEVEN,
+    PLACES,
     SIZES,
     Direction,
     MultistateFriction,
 )
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.force.static import ORDERS, Law, force_columns, force_law
+from mckibben.estimators.force.laws import ORDERS, Law, force_columns, force_law
 from mckibben.estimators.optimisers.multi_start import Choice
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
@@ -38,6 +39,10 @@ LEAST_SHARE = 1e-5
 LENGTHS = np.geomspace(0.02, 1.0, 8)
 TIMES = (0.1, 10.0)
 """Break-away lengths that elements are tried with, relative to the range, and times, in samples."""
+
+
+GAINS = (-0.5, 1.0)
+"""Bounds of the pressure gain [1/bar]."""
 
 
 def extract_hysteresis(
@@ -143,15 +148,11 @@ class MultistateEstimator(SeparableEstimator):
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the logarithms, then of the gain."""
         low, high = data.input_range
-        step = data.sample_time or 1.0
         lengths = np.log((high - low) * np.array([0.005, 2.0]))
-        times = np.log(step * np.array([1e-2, 20.0]))
-        n = sum(self._pairs())
-        lower, upper = [lengths[0], times[0]] * n, [lengths[1], times[1]] * n
-        if self.fit_pressure_gain:
-            lower.append(-0.5)
-            upper.append(1.0)
-        return np.array(lower), np.array(upper)
+        times = np.log((data.sample_time or 1.0) * np.array([1e-2, 20.0]))
+        pairs = np.tile([lengths, times], (sum(self._pairs()), 1))
+        rows = np.vstack([pairs, *[GAINS] * self.fit_pressure_gain])
+        return rows[:, 0], rows[:, 1]
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return elements that slip early and late, without delay."""
@@ -188,15 +189,13 @@ class MultistateEstimator(SeparableEstimator):
 
     def _unit(self, place: int, theta: Array) -> MultistateFriction:
         """Return one element with stiffnesses of 1."""
-        first = 2 * sum(self._pairs()[:place])
-        element = self.directions[place]
-        own = np.exp(theta[first : first + 2 * self._pairs()[place]]).tolist()
-        values = [1.0, own[1], own[0]]
-        if element == "both":
-            values += [1.0, own[3], own[2]]
-        elif element == "shared":
-            values += [own[3], own[2]]
-        return MultistateFriction((element,), tuple(values), initial=self.starting_rule)
+        pairs = self._pairs()
+        first, element = 2 * sum(pairs[:place]), self.directions[place]
+        ways = np.exp(theta[first : first + 2 * pairs[place]]).reshape(-1, 2).tolist()
+        (length, time), (other, later) = ways[0], ways[-1]
+        six = (1.0, time, length, 1.0, later, other)
+        values = tuple(six[value] for value in PLACES[element])
+        return MultistateFriction((element,), values, initial=self.starting_rule)
 
     def _forces(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the force of every element by each of its stiffnesses, over the run's history."""
@@ -226,16 +225,11 @@ class MultistateEstimator(SeparableEstimator):
 
     def friction(self, theta: Array, stiffnesses: Array, data: TrainingData) -> MultistateFriction:
         """Return the friction."""
-        values: list[float] = []
-        given = iter(stiffnesses.tolist())
+        values, given = [], iter(stiffnesses.tolist())
         for place, element in enumerate(self.directions):
-            unit = self._unit(place, theta).values
-            k = next(given)
-            if element == "both":
-                other = next(given)
-                values += [k * value for value in unit[:3]] + [other * value for value in unit[3:]]
-            else:
-                values += [k * value for value in unit]
+            ways = [next(given) for _ in range(2 if element == "both" else 1)] * 2
+            unit = zip(PLACES[element], self._unit(place, theta).values, strict=True)
+            values += [ways[slot // 3] * value for slot, value in unit]
         return MultistateFriction(
             self.directions,
             tuple(values),

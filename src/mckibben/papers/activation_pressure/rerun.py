@@ -15,8 +15,10 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.force.activation import ActivationMemory, ActivationPressure
 from mckibben.comparison.kept import Kept
-from mckibben.estimators.force.activation_memory import ActivationMemoryEstimator
-from mckibben.estimators.force.activation_pressure import ActivationPressureEstimator
+from mckibben.estimators.force.activation import (
+    ActivationMemoryEstimator,
+    ActivationPressureEstimator,
+)
 from mckibben.papers.activation_pressure.protocol import FORCES, FREQUENCIES
 from mckibben.papers.activation_pressure.published import activation_pressure as printed_profile
 from mckibben.papers.keeping import fitted, recorded

@@ -1,4 +1,4 @@
-"""Identification of static force laws, from isometric runs: force by length and pressure."""
+"""Identification of static force laws from isometric runs, solved for by least squares."""
 
 from __future__ import annotations
 
@@ -33,30 +33,7 @@ ORDERS: dict[Law, tuple[int, int]] = {
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class ForceLawEstimator(SeparableEstimator):
-    """An estimator of a static force law.
-
-    Parameters
-    ----------
-    pressure : str
-        Channel of the pressure.
-    """
-
-    purpose = "force"
-
-    input: str = "length"
-    output: str = "force"
-    pressure: str = "pressure"
-    nonnegative: bool = False
-
-    made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
-    told: ClassVar[tuple[str, ...]] = ("pressure",)
-    rises: ClassVar[bool] = False
-    searches_condensed: ClassVar[bool] = False
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class PolynomialForceEstimator(ForceLawEstimator):
+class PolynomialForceEstimator(SeparableEstimator):
     """Force linear in pressure and polynomial in length, by least squares.
 
     Source of the bilinear-quadratic law: "A Multistate Friction Model for the Compensation of the
@@ -64,13 +41,23 @@ class PolynomialForceEstimator(ForceLawEstimator):
 
     Parameters
     ----------
+    pressure : str
+        Channel of the pressure.
     law : {"bilinear", "petrovic", "minh", "schindele"}
         Whose orders in length.
     """
 
-    inverse_kind = "exact"
+    purpose = "force"
     cannot = "No hysteresis."
+    inverse_kind = "exact"
+    made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
+    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    rises: ClassVar[bool] = False
 
+    input: str = "length"
+    output: str = "force"
+    pressure: str = "pressure"
+    nonnegative: bool = False
     law: Law = "bilinear"
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
@@ -110,16 +97,28 @@ def force_law(
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class ChouHannafordEstimator(ForceLawEstimator):
-    """Chou and Hannaford's law: thread length, turns and a constant, by least squares."""
+class ChouHannafordEstimator(SeparableEstimator):
+    """Chou and Hannaford's law: thread length, turns and a constant, by least squares.
+
+    Parameters
+    ----------
+    pressure : str
+        Channel of the pressure.
+    """
 
     title = "Force law of Chou and Hannaford"
+    purpose = "force"
     can = "Static force of an ideal braid, three numbers."
     cannot = "No end effects, no bladder, no hysteresis."
     inverse_kind = "exact"
     quick = True
+    made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
+    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    rises: ClassVar[bool] = False
 
-    nonnegative: bool = True
+    input: str = "length"
+    output: str = "force"
+    pressure: str = "pressure"
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return pressure times the square of the length, less its least, and whole.
@@ -145,11 +144,13 @@ class ChouHannafordEstimator(ForceLawEstimator):
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class TonduLopezEstimator(ForceLawEstimator):
+class TonduLopezEstimator(SeparableEstimator):
     """Tondu and Lopez's law with Kerscher's corrections: angle and kappa searched, mu solved for.
 
     Parameters
     ----------
+    pressure : str
+        Channel of the pressure.
     rest_length : float, optional
         Of the muscle [mm]; default the longest in the data.
     diameter : float
@@ -157,9 +158,18 @@ class TonduLopezEstimator(ForceLawEstimator):
     """
 
     title = "Force law of Tondu and Lopez"
+    purpose = "force"
     can = "Static force of a cylinder with end and pressure corrections."
     cannot = "No hysteresis; bends less than data often do."
+    made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
+    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    rises: ClassVar[bool] = False
+    searches_condensed: ClassVar[bool] = False
 
+    input: str = "length"
+    output: str = "force"
+    pressure: str = "pressure"
+    nonnegative: bool = False
     rest_length: Annotated[float, Gt(0)] | None = None
     diameter: Annotated[float, Gt(0)] = 10.0
 
@@ -171,26 +181,24 @@ class TonduLopezEstimator(ForceLawEstimator):
         """Return usual angles without corrections."""
         return [np.array([angle, 0.0, 1.0]) for angle in (0.35, 0.45, 0.55)]
 
-    def unit(self, theta: Array, data: TrainingData, mu: tuple[float, float]) -> TonduLopez:
-        """Return the law with given mu, without constant."""
+    def law(
+        self, theta: Array, mu: tuple[float, float], constant: float, data: TrainingData
+    ) -> TonduLopez:
+        """Return the law with these parameters."""
         rest = self.rest_length or data.input_range[1]
-        kappa = (float(theta[1]), float(theta[2]))
-        return TonduLopez(
-            rest, self.diameter, float(theta[0]), mu, kappa, 0.0, **self.channels(data)
-        )
+        angle, *kappa = theta.tolist()
+        channels = self.channels(data)
+        return TonduLopez(rest, self.diameter, angle, mu, tuple(kappa), constant, **channels)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the ideal force, with and without the decay of mu."""
-        unit = self.unit(theta, data, (0.0, 1.0))
-        ideal = unit.simulate(run.inputs)[:, 0]
-        e = 1.0 - run.history / unit.rest_length
-        return np.column_stack([ideal * np.exp(-MU_DECAY * e), ideal])
+        ideal = self.law(theta, (0.0, 1.0), 0.0, data)
+        force = ideal.simulate(run.inputs)[:, 0]
+        e = 1.0 - run.history / ideal.rest_length
+        return np.column_stack([force * np.exp(-MU_DECAY * e), force])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
-        from dataclasses import replace
-
-        mu = (float(linear[0]), float(linear[1]))
-        return replace(self.unit(theta, data, mu), constant=offset)
+        return self.law(theta, (float(linear[0]), float(linear[1])), offset, data)
 
 
 FORCE_BILINEAR = preset(

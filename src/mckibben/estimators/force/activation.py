@@ -1,0 +1,359 @@
+"""Identification of activation pressure: with memory, solved for at once; and as in its paper.
+
+Source of the latter: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization
+and Particle Swarm Optimization", Sections 4.2 to 4.4; gamma and phi are found by least squares where
+the paper has a particle swarm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
+
+import numpy as np
+from annotated_types import Ge, Interval
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
+from mckibben.blocks.force.activation import ActivationMemory, ActivationPressure
+from mckibben.errors import DataError
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Operators, SearchEstimator
+from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.core.uncertainty import simulate_all
+from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.signals.reversals import reversals
+
+SMOOTHED = 3.0
+"""Samples that the filter of the rate lasts where it is not set."""
+
+# -- with memory -----------------------------------------------------------------------------
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class ActivationMemoryEstimator(SeparableEstimator):
+    """Activation pressure that needs no frequency.
+
+    Parameters
+    ----------
+    force : str
+        Channel of the force.
+    degree, force_degree : int
+        Of the static surface, in contraction and force.
+    n_operators : int
+        Stop operators.
+    largest : float
+        Largest threshold, relative to the range of the contraction.
+    time_constants : sequence of float
+        Of what relaxes [s], positive; may be empty.
+    rate_time_constant : float, optional
+        Of the filter of the rate [s]; default three samples.
+    """
+
+    title = "Activation pressure with memory"
+    purpose = "force"
+    can = (
+        "Pressure for a contraction under a varying force, at any frequency: surface, "
+        "friction with memory, viscosity, relaxation."
+    )
+    cannot = (
+        "Is itself a compensator, so it has no inverse here; extrapolates as polynomials do "
+        "beyond the forces and contractions seen."
+    )
+    quick = True
+    effort: ClassVar[float] = 1.0
+    needs_time: ClassVar[bool] = True
+    made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
+    told: ClassVar[tuple[str, ...]] = ("force",)
+    rises: ClassVar[bool] = False
+
+    input: str = "contraction"
+    output: str = "pressure"
+    force: str = "force"
+    degree: Annotated[int, Interval(ge=1, le=9)] = 4
+    force_degree: Annotated[int, Interval(ge=0, le=5)] = 3
+    n_operators: Operators = 6
+    largest: Annotated[float, Interval(gt=0, le=0.5)] = 0.2
+    time_constants: tuple[float, ...] = (0.1, 0.6, 4.0)
+    rate_time_constant: Annotated[float, Ge(0)] | None = None
+    nonnegative: bool = False
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        data.timed()
+        return super().identify(data, tracker)
+
+    def unit(self, data: TrainingData) -> ActivationMemory:
+        """Return the model with zero parameters."""
+        forces = np.concatenate([run.scheduled[:, 0] for run in data.runs])
+        low, high = data.input_range
+        weakest, strongest = float(forces.min()), float(forces.max())
+        varies = strongest - weakest > 1e-6 * max(abs(strongest), 1.0)
+        n, taus, smoothed = self.n_operators, self.time_constants, self.rate_time_constant
+        return ActivationMemory(
+            surface=(0.0,) * ((self.degree + 1) * (self.force_degree + 1)),
+            thresholds=vector(self.largest * (high - low) * (np.arange(1, n + 1) / n) ** 1.5),
+            friction=(0.0,) * (2 * n),
+            viscosity=(0.0, 0.0),
+            relaxation=(0.0,) * (2 * len(taus)),
+            time_constants=taus,
+            degree=self.degree,
+            force_degree=self.force_degree,
+            input_scale=(0.5 * (low + high), 0.5 * (high - low)),
+            force_scale=(
+                0.5 * (weakest + strongest),
+                0.5 * (strongest - weakest) if varies else 1.0,
+            ),
+            rate_time_constant=SMOOTHED * data.timed() if smoothed is None else smoothed,
+            initial=self.starting_rule,
+            **self.channels(data),
+        )
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the output by each coefficient alone but the constant, over the run's history."""
+        unit = self.unit(data)
+        alone = np.eye(unit.n_parameters)[1:]
+        return unit.simulate_many(alone, run.inputs, sample_time=run.sample_time).T
+
+    def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
+        """Solve with every run's errors relative to its own range, so that light loads count too."""
+        parts = [run.y[run.counts] for run in data.runs]
+        weights = np.concatenate(
+            [np.full(y.size, 1.0 / max(float(np.ptp(y)), 1e-9)) for y in parts]
+        )
+        columns = np.column_stack([np.ones(len(matrix)), matrix]) * weights[:, np.newaxis]
+        size = np.linalg.norm(columns, axis=0)
+        size[size == 0] = 1.0
+        found = np.linalg.lstsq(columns / size, data.target * weights, rcond=1e-10)[0] / size
+        return found[1:], float(found[0])
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        return self.unit(data).unpack([offset, *linear])
+
+
+# -- as published ----------------------------------------------------------------------------
+
+STATIC_SHARE = 0.1
+"""A run below this share of the fastest run's frequency is static: it bounds low and high pressure,
+and nothing of the rate is found from it."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class ActivationPressureEstimator(SearchEstimator):
+    """Activation pressure by characteristic points, and gamma and phi by least squares.
+
+    Parameters
+    ----------
+    force : str
+        Channel of the force.
+    rate_time_constant : float, optional
+        Of the filter of the rate [s]; default three samples.
+    frequency : float, optional
+        Of the excitation in every run [Hz]; default the strongest in each run's spectrum. The model
+        found is set to that of the first run that is not static.
+    """
+
+    title = "Activation pressure by characteristic points"
+    purpose = "force"
+    can = (
+        "Pressure for a contraction under a force, at one frequency of a sine; as its paper has it."
+    )
+    cannot = "Knows no minor loops and no other frequency: its hysteresis is a term in the rate."
+    needs_time: ClassVar[bool] = True
+    made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
+    told: ClassVar[tuple[str, ...]] = ("force",)
+
+    input: str = "contraction"
+    output: str = "pressure"
+    force: str = "force"
+    rate_time_constant: Annotated[float, Ge(0)] | None = None
+    frequency: Annotated[float, Ge(0)] | None = None
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the model found, set to the first moving run's frequency, and the data."""
+        step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency
+        at = np.array([dominant_frequency(run) if given is None else given for run in data.runs])
+        moving = at >= STATIC_SHARE * at.max()
+        loops = replace(data, runs=tuple(data.runs[i] for i in np.flatnonzero(moving)))
+        contractions, pressures = characteristic_points(data.runs, moving)
+        model = ActivationPressure(
+            vector(contractions.ravel()),
+            vector(pressures.ravel()),
+            phi=(0.0, 0.0, 0.0, 1.0),
+            gamma=(0.0, 1.0),
+            frequency=1.0,
+            rate_time_constant=SMOOTHED * step if smoothed is None else smoothed,
+            initial=self.starting_rule,
+            **self.channels(data),
+        )
+        at = at[moving]
+        phi, gamma = self._rates(model, loops.thinned(20_000), at, tracker)
+        return replace(model, phi=vector(phi), gamma=gamma, frequency=float(at[0])), data
+
+    def _rates(
+        self, model: ActivationPressure, data: TrainingData, at: Array, tracker: Tracker
+    ) -> tuple[Array, tuple[float, float]]:
+        """Return phi (a cubic of the force) and gamma.
+
+        gamma phi is fixed up to a factor, which is chosen such that gamma is 1 at the mean
+        frequency.
+        """
+        whole, static = simulate_all([model, replace(model, gamma=(0.0, 0.0))], data)
+        rate, rest, middle = whole - static, data.target - static, float(at.mean())
+        rises = (at - middle) / max(middle, 1e-9)
+        rise = np.repeat(rises, [int(run.counts.sum()) for run in data.runs])
+        force = np.concatenate([run.scheduled[run.counts, 0] for run in data.runs])
+        largest = max(float(np.abs(force).max()), 1.0)
+        powers = np.vander(force / largest, 4)
+        start = np.linalg.lstsq(powers * rate[:, np.newaxis], rest, rcond=1e-9)[0]
+        width = np.maximum(np.abs(start), np.abs(start).max(initial=1e-6))
+        lower, upper = np.append(start - 2 * width, -1.0), np.append(start + 2 * width, 1.0)
+
+        def errors(point: Array) -> Array:
+            return (powers @ point[:4]) * (1 + point[4] * rise) * rate - rest
+
+        from scipy.optimize import least_squares
+
+        found = least_squares(errors, np.append(start, 0.0), bounds=(lower, upper)).x
+        tracker.saw(found, float(np.sqrt(np.mean(errors(found) ** 2))))
+        phi = found[:4] / largest ** np.array([3, 2, 1, 0])
+        slope = float(found[4]) / max(middle, 1e-9)
+        return phi, (slope, 1.0 - slope * middle)
+
+
+def dominant_frequency(run: Run) -> float:
+    """Return the strongest frequency of a run's input [Hz]."""
+    assert run.sample_time is not None
+    moved = run.u - run.u.mean()
+    spectrum = np.abs(np.fft.rfft(moved * np.hanning(moved.size), 4 * moved.size))
+    return float(np.argmax(spectrum) / (4 * moved.size * run.sample_time))
+
+
+# -- characteristic points -------------------------------------------------------------------
+
+FORCE_STEP = 5.0
+"""Runs whose mean forces differ by less belong to one force [N]."""
+
+LOW, HIGH = 0.07, 0.975
+"""Boundaries of low and high pressure as shares of the range: Table 1 has y_3 at .028 and y_4 at
+.391 MPa, of 0 to .4 MPa."""
+
+MARGIN, FARTHEST = 0.05, 3.0
+"""Least and greatest distance of a boundary from the extreme beside it: in contraction, relative to
+the distance of the extremes (by Table 1, 0.2 to 1.4). The least holds for the pressures, too, relative
+to their range."""
+
+
+def characteristic_points(runs: Sequence[Run], moving: Sequence[bool]) -> tuple[Array, Array]:
+    """Return e_1 to e_4 and y_1 to y_4 as cubics of the force (Sections 4.2 and 4.3).
+
+    First enrichment: the outermost turning points of the loops at a force, where the rate is nought and
+    the pressure static, are regressed on the force. Second enrichment: inflection and tangent are moved
+    to the boundaries of low and of high pressure, the same at every force and outside the extremes, so
+    that e_3 < e_1 < e_2 < e_4 as in Table 1. The paper does not say how the boundaries and their
+    contractions were chosen: here they are at its own shares of the range of pressure, and the cubic at
+    a force, held to its extremes, reaches them where it is nearest to all runs there.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        All runs, contraction to pressure, which changes, the force being scheduled.
+    moving : sequence of bool
+        Which of them are loops, whose turning points are the extremes; the others are slow cycles,
+        and count for the boundaries only. Where no run at a force is a loop, all there are taken.
+
+    Returns
+    -------
+    array, shape (4, 4), array, shape (4, 4)
+        Contractions, then pressures in the output's unit: a row a point, highest power first.
+
+    Raises
+    ------
+    DataError
+        Where the contraction does not move at some force.
+    """
+    groups = by_force(runs)
+    forces, groups_of = np.array(list(groups)), list(groups.values())
+    pressures = np.concatenate([run.y[run.counts] for run in runs])
+    lowest, span = float(pressures.min()), float(np.ptp(pressures))
+    loops = [[i for i in own if moving[i]] or own for own in groups_of]
+    extremes = np.array([outermost([runs[i] for i in own]) for own in loops])
+    still = extremes[:, 1, 0] <= extremes[:, 0, 0]
+    if still.any():
+        raise DataError(
+            f"the contraction does not move under {forces[still][0]:g} N",
+            remedy="leave that run out",
+        )
+    ends = np.array([[regress(forces, extremes[:, j, c]) for c in (0, 1)] for j in (0, 1)])
+    fitted = np.array([[np.polyval(cubic, forces) for cubic in end] for end in ends])
+    low = min(lowest + LOW * span, float(fitted[0, 1].min()) - MARGIN * span)
+    high = max(lowest + HIGH * span, float(fitted[1, 1].max()) + MARGIN * span)
+    bounds = [
+        boundaries([runs[i] for i in own], fitted[:, :, k], (low, high))
+        for k, own in enumerate(groups_of)
+    ]
+    contractions = [*ends[:, 0], *(regress(forces, bound) for bound in np.transpose(bounds))]
+    constants = [[0.0, 0.0, 0.0, level] for level in (low, high)]
+    return np.array(contractions), np.array([*ends[:, 1], *constants])
+
+
+def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
+    """Return which runs have one mean force [N], weakest first."""
+    means = [float(run.scheduled.mean()) for run in runs]
+    groups: dict[float, list[int]] = {}
+    for i in np.argsort(means, kind="stable"):
+        near = next((force for force in groups if abs(force - means[i]) < FORCE_STEP), means[i])
+        groups.setdefault(near, []).append(int(i))
+    return groups
+
+
+def outermost(runs: Sequence[Run]) -> Array:
+    """Return contraction and pressure, (2, 2), where the runs turn at the least and the most."""
+    turns = np.concatenate([_turns(run) for run in runs])
+    return turns[[turns[:, 0].argmin(), turns[:, 0].argmax()]]
+
+
+def _turns(run: Run) -> Array:
+    """Return contraction and pressure where a run turns, or of all of it where it hardly does."""
+    # where a run begins and ends, it does not turn
+    places = [place for place in reversals(run.u)[1:-1] if run.counts[place]]
+    if len(places) < 2:
+        places = list(np.flatnonzero(run.counts))
+    return np.column_stack([run.u[places], run.y[places]])
+
+
+def boundaries(runs: Sequence[Run], extremes: Array, levels: tuple[float, float]) -> Array:
+    """Return the contractions e_3 and e_4 of a cubic that goes through the extremes at one force.
+
+    The errors of a run are relative to its own range of pressure, so that loops and slow cycles count
+    alike.
+    """
+    from scipy.optimize import least_squares
+
+    (e_1, y_1), (e_2, y_2) = extremes
+    every = [(run.u[run.counts], run.y[run.counts]) for run in runs]
+    e, p = (np.concatenate(parts) for parts in zip(*every, strict=True))
+    scales = [max(float(np.ptp(y)), 1e-9) * np.sqrt(max(y.size, 1)) for _, y in every]
+    weight = 1.0 / np.repeat(scales, [y.size for _, y in every])
+    powers = np.vander((e - e_1) / (e_2 - e_1), 4)
+    pressures = np.array([y_1, y_2, *levels])
+
+    def errors(away: Array) -> Array:
+        through = np.vander([0.0, 1.0, -away[0], 1.0 + away[1]], 4)
+        found: Array = (powers @ np.linalg.solve(through, pressures) - p) * weight
+        return found
+
+    rise = max(y_2 - y_1, 1e-9)
+    straight = np.array([y_1 - levels[0], levels[1] - y_2]) / rise
+    start = np.clip(straight, 2 * MARGIN, 0.5 * FARTHEST)
+    away = least_squares(errors, start, bounds=(MARGIN, FARTHEST)).x
+    return e_1 + (e_2 - e_1) * np.array([-away[0], 1.0 + away[1]])
+
+
+def regress(forces: Array, values: Array) -> Array:
+    """Return a cubic of the force through values, of lower order where there are few forces."""
+    order = min(3, forces.size - 1)
+    scale = max(float(np.abs(forces).max()), 1.0)
+    found = np.polyfit(forces / scale, values, order) / scale ** np.arange(order, -1, -1)
+    return np.concatenate([np.zeros(3 - order), found])

@@ -73,7 +73,7 @@ def test_models_are_offered_by_need_with_reasons_for_the_others(tmp_path: Path) 
     desk = desk_of(filled(tmp_path / "one"))
     found = offered(desk)
     assert {"pi", "gpi", "cpi", "balance"} <= set(found.start) <= models_of(desk)
-    assert len(models_of(desk)) + len(found.against) == 50
+    assert len(models_of(desk)) + len(found.against) == 51
     assert all(found.against.values())
     several = desk_of(workspace_of(tmp_path / "two", run=two_muscles(5.0)))
     assert several.inputs == ("pressure_1", "pressure_2")

@@ -841,7 +841,7 @@ def coupled_memory(block: Any, inputs: Rows, sample_time: float) -> Rows:
     out = []
     for row in inputs:
         for own, felt, tau in zip(lagged, plays, block.lags, strict=True):
-            keep = math.exp(-sample_time / tau)
+            keep = math.exp(-sample_time / tau) if tau else 0.0
             for i in range(n):
                 own[i] = keep * own[i] + (1 - keep) * row[i]
                 felt[i] = [
@@ -853,6 +853,8 @@ def coupled_memory(block: Any, inputs: Rows, sample_time: float) -> Rows:
         for power in range(2, block.degree + 1):
             for chosen in itertools.combinations_with_replacement(range(n), power):
                 terms.append(math.prod(lagged[0][i] for i in chosen))
+        if block.crossed:
+            terms += [x * other for x in lagged[0] for other in terms[1 + n : 1 + block.n_states]]
         out.append([math.fsum(a * b for a, b in zip(w, terms, strict=True)) for w in block.readout])
     return out
 

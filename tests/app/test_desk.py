@@ -73,13 +73,13 @@ def test_models_are_offered_by_need_with_reasons_for_the_others(tmp_path: Path) 
     desk = desk_of(filled(tmp_path / "one"))
     found = offered(desk)
     assert {"pi", "gpi", "cpi", "balance"} <= set(found.start) <= models_of(desk)
-    assert len(models_of(desk)) + len(found.against) == 50
+    assert len(models_of(desk)) + len(found.against) == 51
     assert all(found.against.values())
     several = desk_of(workspace_of(tmp_path / "two", run=two_muscles(5.0)))
     assert several.inputs == ("pressure_1", "pressure_2")
     assert several.channels["output"] == ["displacement_1", "displacement_2"]
-    assert {"balance", "coupled-memory"} <= models_of(several)
-    assert not {"pi", "gpi", "arx", "coupled-pi"} & models_of(several)
+    assert {"balance", "play-ridge", "arx"} <= models_of(several)
+    assert not {"pi", "gpi", "coupled-pi"} & models_of(several)
     alone = Recording({"pressure": np.sin(np.arange(200))}, 0.1)
     workspace = workspace_of(tmp_path / "alone", run=alone)
     both = Desk(workspace, Jobs(workspace), inputs=("pressure",), outputs=("pressure",))

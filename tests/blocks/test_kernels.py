@@ -282,7 +282,8 @@ VARIANTS: dict[str, tuple[Any, float, list[float]]] = {
         replace(
             CoupledMemory.example(),
             degree=3,
-            readout=(vector(0.3 / (1.0 + np.arange(readout_width(2, 2, 1, 3)))),),
+            crossed=True,
+            readout=(vector(0.3 / (1.0 + np.arange(readout_width(2, 2, 1, 3, True)))),),
         ),
         0.01,
         [5.0, 5.0],

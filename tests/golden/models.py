@@ -279,7 +279,12 @@ def _variants() -> dict[str, Block]:
         "coupled-memory of degree 3": replace(
             memory, degree=3, readout=((*memory.readout[0], *products),)
         ),
-        "coupled-memory of the input itself": replace(memory, lags=(0.0, 0.5)),
+        "coupled-memory of crossed inputs": replace(
+            memory,
+            lags=(0.0, 0.5),
+            crossed=True,
+            readout=((*memory.readout[0], *np.linspace(0.02, -0.03, 12).tolist()),),
+        ),
         "multistate-friction each way": pulling,
         "force-feedforward by chou-hannaford": block(
             "force-feedforward", example("chou-hannaford"), pulling

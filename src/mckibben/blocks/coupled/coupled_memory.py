@@ -1,9 +1,10 @@
 """Lags and play operators of several inputs, read out by a polynomial: many inputs to many outputs.
 
 Every input passes first-order lags, every lagged input play operators; outputs are linear in those, and
-in products of the first lag's inputs up to a degree. A lag of 0 is the input itself. Nothing is fed back
-from outputs to states, so the model is stable whatever its readout. Displacements need not be one to a
-muscle, as the place of an arm's tip is not, and motion may be dynamic.
+in products of the first lag's inputs up to a degree, and of these with all other lags and plays:
+friction that grows with a pressure is such a product. A lag of 0 is the input itself. Nothing is fed
+back from outputs to states, so the model is stable whatever its readout. Displacements need not be one
+to a muscle, as the place of an arm's tip is not, and motion may be dynamic.
 
 The form is this package's own; it is linear in its parameters but for lags and thresholds.
 """
@@ -30,13 +31,14 @@ from mckibben.errors import ModelError
 def coupled_memory_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run lags, then plays, then the readout.
 
-    Coefficients are [lags, thresholds, degree, decays, thresholds (inputs by thresholds), readout].
+    Coefficients are [lags, thresholds, degree, crossed, decays, thresholds (inputs by thresholds),
+    readout].
     """
     n, n_out = inputs.size, outputs.size
     n_lags, m, degree = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
-    decays = coefficients[3 : 3 + n_lags]
-    radii = coefficients[3 + n_lags : 3 + n_lags + n * m]
-    readout = coefficients[3 + n_lags + n * m :]
+    decays = coefficients[4 : 4 + n_lags]
+    radii = coefficients[4 + n_lags : 4 + n_lags + n * m]
+    readout = coefficients[4 + n_lags + n * m :]
     width = readout.size // n_out
     for lag in range(n_lags):
         for i in range(n):
@@ -65,6 +67,11 @@ def coupled_memory_step(coefficients: Array, state: Array, inputs: Array, output
                     for q in range(k, n):
                         total += readout[at] * state[i] * state[k] * state[q]
                         at += 1
+        if coefficients[3] > 0.0:
+            for i in range(n):
+                for k in range(n, state.size):
+                    total += readout[at] * state[i] * state[k]
+                    at += 1
         outputs[j] = total
 
 
@@ -72,7 +79,7 @@ def coupled_memory_step(coefficients: Array, state: Array, inputs: Array, output
 def coupled_memory_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start at rest at the first inputs, reached from zero, or with all at zero."""
     n, n_lags, m = inputs.size, int(coefficients[0]), int(coefficients[1])
-    radii = coefficients[3 + n_lags : 3 + n_lags + n * m]
+    radii = coefficients[4 + n_lags : 4 + n_lags + n * m]
     for lag in range(n_lags):
         for i in range(n):
             x = 0.0 if virgin else inputs[i]
@@ -94,11 +101,14 @@ class CoupledMemory(Block):
         Of the play operators of every input, in its unit; as many for each, maybe none.
     readout : sequence of sequences of float
         For every output: the constant, every lag of every input, the plays of each of those in the same
-        order, then products of two and of three inputs, in order.
+        order, then products of two and of three inputs, in order, then those of an input with all other
+        lags and plays.
     degree : int
-        Highest degree of products, 1 for none.
+        Highest degree of products of inputs, 1 for none.
     driven, scheduled, given : sequence of Channel
         Inputs driven, those that schedule (treated alike), and outputs.
+    crossed : bool
+        Whether there are products of inputs with other lags and plays.
     """
 
     kind: ClassVar[str] = "coupled-memory"
@@ -108,7 +118,8 @@ class CoupledMemory(Block):
     parameters: ClassVar[tuple[str, ...]] = ("readout",)
     notation: ClassVar[Notation] = Notation(
         r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
-        r"y_j = R_j \cdot \left(1,\; x,\; z,\; x_{1i} x_{1k},\; x_{1i} x_{1k} x_{1q}\right)",
+        r"y_j = R_j \cdot \left(1,\; x,\; z,\; x_{1i} x_{1k},\; x_{1i} x_{1k} x_{1q},\; "
+        r"x_{1i} x_{lk},\; x_{1i} z_{lkm}\right)",
         lags=r"\tau_l [s]",
         thresholds="r_{ik} [{in0}]",
         readout="R_{jk}",
@@ -123,6 +134,7 @@ class CoupledMemory(Block):
     driven: Channels
     scheduled: Channels
     given: Channels
+    crossed: bool = False
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -138,7 +150,7 @@ class CoupledMemory(Block):
             )
         if any(not r > 0 for row in self.thresholds for r in row):
             raise ModelError(f"thresholds of {self.kind!r} are not positive. Remedy: correct them.")
-        width = readout_width(n, len(self.lags), len(self.thresholds[0]), self.degree)
+        width = readout_width(n, len(self.lags), len(self.thresholds[0]), self.degree, self.crossed)
         if len(self.readout) != len(self.given) or any(len(row) != width for row in self.readout):
             raise ModelError(
                 f"readout of {self.kind!r} has rows of {[len(row) for row in self.readout]}. "
@@ -158,7 +170,7 @@ class CoupledMemory(Block):
     def coefficients(self, sample_time: float | None) -> Array:
         """Return sizes, decays over a sample, thresholds and readout."""
         step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else 1.0
-        head = [len(self.lags), len(self.thresholds[0]), self.degree]
+        head = [len(self.lags), len(self.thresholds[0]), self.degree, self.crossed]
         decays = [math.exp(-step / tau) if tau else 0.0 for tau in self.lags]
         radii = np.array(self.thresholds).ravel()
         return np.concatenate([head, decays, radii, self.pack()])
@@ -185,6 +197,12 @@ class CoupledMemory(Block):
         per = ["", *units * len(self.lags), *plays * len(self.lags)]
         for degree in range(2, self.degree + 1):
             per += [" ".join(many) for many in combinations_with_replacement(units, degree)]
+        if self.crossed:
+            per += [
+                f"{unit} {other}"
+                for unit in units
+                for other in per[1 + len(units) : 1 + self.n_states]
+            ]
         given = self.outputs[index[0]].unit
         return f"{given or '1'}/{per[index[1]]}" if per[index[1]].strip() else given
 
@@ -204,9 +222,12 @@ class CoupledMemory(Block):
         )
 
 
-def readout_width(n: int, n_lags: int, n_thresholds: int, degree: int) -> int:
+def readout_width(
+    n: int, n_lags: int, n_thresholds: int, degree: int, crossed: bool = False
+) -> int:
     """Return how many numbers the readout of one output has."""
     products = sum(
         len(list(combinations_with_replacement(range(n), power))) for power in range(2, degree + 1)
     )
-    return 1 + n * n_lags * (1 + n_thresholds) + products
+    linear = n * n_lags * (1 + n_thresholds)
+    return 1 + linear + products + crossed * n * (linear - n)

@@ -53,6 +53,8 @@ class PlayRidgeEstimator(CoupledEstimator):
         Of the play operators of every lagged input, relative to the range of the input.
     degree : int
         Highest degree of products of inputs, 1 for none.
+    crossed : bool
+        Whether there are products of inputs with other lags and with plays.
     ridge : float, optional
         Penalty of the readout, its constant excepted, relative to the root mean square of what is read
         out. Default: for every output the largest whose error on blocks left out is within a standard
@@ -77,12 +79,15 @@ class PlayRidgeEstimator(CoupledEstimator):
     lags: Annotated[tuple[Annotated[float, Ge(0)], ...], Len(1)] = (0.0, 0.1, 0.6, 4.0)
     thresholds: tuple[Annotated[float, Gt(0)], ...] = (0.04, 0.11, 0.23)
     degree: Annotated[int, Interval(ge=1, le=3)] = 3
+    crossed: bool = True
     ridge: Annotated[float, Gt(0)] | None = None
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         lags = self.lags if data.sample_time is not None else (0.0,)
         spans = np.ptp(np.concatenate([run.inputs for run in data.runs]), axis=0)
-        width = readout_width(spans.size, len(lags), len(self.thresholds), self.degree)
+        width = readout_width(
+            spans.size, len(lags), len(self.thresholds), self.degree, self.crossed
+        )
         template = CoupledMemory(
             vector(lags),
             rows(np.where(spans > 0, spans, 1.0)[:, np.newaxis] * np.array(self.thresholds)),
@@ -91,6 +96,7 @@ class PlayRidgeEstimator(CoupledEstimator):
             data.inputs,
             data.scheduled,
             data.outputs,
+            self.crossed,
         )
         blocks = []
         for place, run in enumerate(data.runs):
@@ -154,6 +160,7 @@ def features(block: CoupledMemory, run: Run) -> Array:
         block.driven,
         block.scheduled,
         tuple(Channel(f"feature_{k}", "") for k in range(block.n_states + 1)),
+        block.crossed,
     )
     linear = many.simulate(inputs, sample_time=run.sample_time)
     first = linear[:, 1 : 1 + n]
@@ -162,6 +169,8 @@ def features(block: CoupledMemory, run: Run) -> Array:
         for power in range(2, block.degree + 1)
         for chosen in combinations_with_replacement(range(n), power)
     ]
+    if block.crossed:
+        products += [first[:, [k]] * linear[:, 1 + n :] for k in range(n)]
     return np.column_stack([linear, *products])
 
 
@@ -177,6 +186,7 @@ COUPLED_MEMORY = preset(
     makes=("coupled-memory",),
     alone=False,
     needs_time=True,
+    crossed=False,
     lags=(0.3, 1.0, 8.0),
     ridge=1e-4,
 )

@@ -23,19 +23,21 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Kernel, Start, needs_sample_time
-from mckibben.blocks.dynamics.linear_start import LinearStart
+from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     FittedInitial,
+    Initial,
     Vector,
 )
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import Notation, tex
 from mckibben.errors import ModelError
+from mckibben.recording import Recording
 
 LONGEST_DELAY = 254
 """Samples."""
@@ -80,7 +82,7 @@ def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin
 
 
 @dataclass(frozen=True, config=STRICT)
-class ProcessModel(LinearStart):
+class ProcessModel(Block):
     """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
 
     Parameters
@@ -165,7 +167,7 @@ class ProcessModel(LinearStart):
         return f"P{self.order}{'D' * (self.delay > 0)}{under}{'Z' * (self.zero_time is not None)}"
 
     @property
-    def n_free(self) -> int:
+    def n_fitted(self) -> int:
         """As many states as there are lags."""
         return self.order
 
@@ -205,6 +207,10 @@ class ProcessModel(LinearStart):
                 through = self.gain * self.zero_time / d[0]
                 c[0] = self.gain - through
         return a, b, c, through
+
+    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
+        """Return the state that explains the recording's outputs best, where that is the rule."""
+        return start_on(self, recording, initial)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return what the kernel reads, for a sample time.

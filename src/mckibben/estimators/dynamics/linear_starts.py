@@ -11,7 +11,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.dynamics.linear_start import LinearStart
+from mckibben.blocks.dynamics.starts import fitted_state
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.core.uncertainty import (
@@ -101,8 +101,7 @@ class LinearEstimator(SingleEstimator):
 
 def started(block: Block, run: Run) -> Array:
     """Return the free-running output over a run from the state that explains it best, shape (n,)."""
-    assert isinstance(block, LinearStart)
     inputs, outputs = run.inputs, np.empty((run.u.size, 1))
-    state = block.fitted_state(inputs, run.y, run.sample_time, run.counts)
+    state = fitted_state(block, inputs, run.y, run.sample_time, run.counts)
     block.bind(run.sample_time, state, inputs, outputs)()
     return outputs[:, 0]

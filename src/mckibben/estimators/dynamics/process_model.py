@@ -12,6 +12,7 @@ from annotated_types import Ge
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import LONGEST_DELAY, ProcessModel
+from mckibben.blocks.dynamics.starts import free_responses
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.dynamics.linear_starts import LinearEstimator
@@ -144,7 +145,11 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         if self.initial != "fitted":
             return columns
         unit = self._units(theta, data)[0]
-        starts = [unit.free_responses(run.u.size, run.sample_time)[run.counts] for run in data.runs]
+        places = range(unit.n_fitted)
+        starts = [
+            free_responses(unit, run.inputs, run.sample_time, places)[run.counts]
+            for run in data.runs
+        ]
         return np.column_stack([columns, block_diag(*starts)])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> ProcessModel:

@@ -17,7 +17,7 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.creep import Creep, creep_step
-from mckibben.blocks.dynamics.creep_start import begun_places, begun_state
+from mckibben.blocks.dynamics.starts import fitted_places, fitted_state
 from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import Run, TrainingData
@@ -173,15 +173,14 @@ class CreepingEstimator(SeparableEstimator):
 
     @staticmethod
     def _free_run(block: Block, data: TrainingData) -> Array:
-        if not begun_places(block):
+        if not fitted_places(block):
             return simulate_all([block], data)[0]
         found = []
         for run in data.runs:
             before = run.history.size - run.u.size
             y = np.concatenate([np.zeros(before), run.y])
             counts = np.concatenate([np.zeros(before, dtype=bool), run.counts])
-            state = block.initial_state(run.inputs[0])
-            state = begun_state(block, state, run.inputs, y, run.sample_time, counts)
+            state = fitted_state(block, run.inputs, y, run.sample_time, counts)
             outputs = run_many(
                 [block], run.inputs, sample_time=run.sample_time, initial=tuple(state)
             )

@@ -88,11 +88,14 @@ def free_responses(
 
     Of a linear model at its operating point, where nothing else moves its output.
     """
-    state = block.initial_state(inputs[0])
-    if hasattr(block, "input_offset"):
-        inputs, state = np.full_like(inputs, block.input_offset), np.zeros_like(state)
-    rest = _run(block, state, inputs, sample_time)
-    unit = float(np.ptp(rest)) or 1.0
+    rest: float | Array
+    if hasattr(block, "input_offset") and hasattr(block, "output_offset"):
+        inputs, state = np.full_like(inputs, block.input_offset), np.zeros(block.n_states)
+        rest, unit = block.output_offset, 1.0
+    else:
+        state = block.initial_state(inputs[0])
+        rest = _run(block, state, inputs, sample_time)
+        unit = float(np.ptp(rest)) or 1.0
     found = np.empty((len(inputs), len(places)))
     for column, place in enumerate(places):
         moved = state.copy()

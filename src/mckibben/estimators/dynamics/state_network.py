@@ -49,6 +49,9 @@ FIRST_DAMPING, HEAVIEST, EASING, FLOOR = 0.1, 1e9, 2.0, 1e-6
 LEAST_GAIN = 1e-7
 """Share of the squared error that a step gains, or the descent has arrived."""
 
+RUNGE_KUTTA = ((0.0, 1.0, 0.5), (0.5, 2.0, 0.5), (0.5, 2.0, 1.0), (1.0, 1.0, 0.0))
+"""Of every stage how far into the step it is, the weight of its rates, and how far these then lead."""
+
 LARGEST = 1e6
 """State, in units of the output's scale, that is out of all bounds."""
 
@@ -155,9 +158,7 @@ class StateNetworkEstimator(SingleEstimator):
 
     def search(self, template: StateNetwork, data: TrainingData, tracker: Tracker) -> NetworkRuns:
         """Return the errors of networks of one structure on all runs."""
-        warm = self._warm if self.periodic else None
-        at_rest = not self.periodic and self.starting_rule == "first_sample"
-        return NetworkRuns(template, data, warm, at_rest, tracker)
+        return NetworkRuns(template, data, self._warm if self.periodic else None, tracker)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the outputs of blocks where samples count: in steady state, of periodic recordings."""
@@ -189,23 +190,19 @@ class NetworkRuns:
     data : TrainingData
     warm : int or None
         Samples before those of a period; None where runs are not periodic.
-    at_rest : bool
-        Whether runs begin as after their first input has long been held, instead of with zeros.
+        Others begin as after their first input has long been held, unless the template's start is
+        virgin: all zeros.
     tracker : Tracker
         Told of the best.
     """
 
     def __init__(
-        self,
-        template: StateNetwork,
-        data: TrainingData,
-        warm: int | None,
-        at_rest: bool,
-        tracker: Tracker,
+        self, template: StateNetwork, data: TrainingData, warm: int | None, tracker: Tracker
     ) -> None:
         self.template, self.target, self.tracker = template, data.target, tracker
-        self.at_rest, self.rate = at_rest, template.rate * (data.sample_time or 1.0)
-        self.paths = paths(data, template.substeps, warm, at_rest)
+        self.at_rest = warm is None and template.initial == "first_sample"
+        self.rate = template.rate * (data.sample_time or 1.0)
+        self.paths = paths(data, template.substeps, warm, self.at_rest)
 
     def errors(self, theta: Array) -> Array:
         """Return the errors where samples count; infinite where a run leaves all bounds."""
@@ -336,23 +333,21 @@ def follow_network(
     bool
         Whether it came to the end: a state that leaves all bounds ends it.
     """
-    at, rate, total = np.zeros_like(state), np.zeros_like(state), np.zeros_like(state)
+    n, columns = state.shape
+    at, rate, total = np.zeros((n, columns)), np.zeros((n, columns)), np.zeros((n, columns))
     known, act = np.ones(linear.shape[1]), np.zeros(hidden.shape[0])
     for t in range(inputs.size - 1):
         rise = inputs[t + 1] - inputs[t]
-        for stage in range(4):
-            way = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-            weight = 2.0 if stage in (1, 2) else 1.0
-            for d in range(state.shape[0]):
-                for i in range(state.shape[1]):
-                    at[d, i] = state[d, i] + way * h * rate[d, i]
-            known[state.shape[0]] = inputs[t] + way * rise
+        at[:], total[:] = state, 0.0
+        for way, weight, ahead in RUNGE_KUTTA:
+            known[n] = inputs[t] + way * rise
             rates(linear, hidden, readout, at, known, act, rate)
-            for d in range(state.shape[0]):
-                for i in range(state.shape[1]):
-                    total[d, i] = weight * rate[d, i] + (total[d, i] if stage > 0 else 0.0)
-        for d in range(state.shape[0]):
-            for i in range(state.shape[1]):
+            for d in range(n):
+                for i in range(columns):
+                    total[d, i] += weight * rate[d, i]
+                    at[d, i] = state[d, i] + ahead * h * rate[d, i]
+        for d in range(n):
+            for i in range(columns):
                 state[d, i] += h / 6.0 * total[d, i]
             if not abs(state[d, 0]) < LARGEST:
                 return False

@@ -81,6 +81,14 @@ def fitted_state(
     return state
 
 
+def fitted_run(
+    block: Block, inputs: Array, outputs: Array, sample_time: float | None, counts: Mask
+) -> Array:
+    """Return the first output of a run from such a state, shape (n,)."""
+    state = fitted_state(block, inputs, outputs, sample_time, counts)
+    return _run(block, state, inputs, sample_time)
+
+
 def free_responses(
     block: Block, inputs: Array, sample_time: float | None, places: Sequence[int]
 ) -> Array:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.dynamics.starts import fitted_places, fitted_run
 from mckibben.blocks.running import run_many
 from mckibben.estimators.core.autoregression import Autoregression, autoregression
 from mckibben.estimators.core.data import Run, TrainingData
@@ -40,6 +41,19 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
         many = run_many(blocks, run.inputs, sample_time=run.sample_time)
         trimmed = many if run.peak is None else many[:, 1:]
         outputs.append(trimmed[:, run.counts].reshape(len(many), -1))
+    return np.concatenate(outputs, axis=1)
+
+
+def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
+    """Return the same with the states that are solved for at a start fitted to every run."""
+    if not any(map(fitted_places, blocks)):
+        return simulate_all(blocks, data)
+    outputs = []
+    for run in data.runs:
+        before = run.history.size - run.u.size
+        y, counts = np.pad(run.y, (before, 0)), np.pad(run.counts, (before, 0))
+        known = (run.inputs, y, run.sample_time, counts)
+        outputs.append([fitted_run(block, *known)[counts] for block in blocks])
     return np.concatenate(outputs, axis=1)
 
 

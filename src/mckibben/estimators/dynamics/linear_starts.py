@@ -11,13 +11,11 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.dynamics.starts import fitted_state
-from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.core.uncertainty import (
     relative_sizes,
     sensitivities,
-    simulate_all,
     told_by_runs,
 )
 from mckibben.estimators.optimisers.tracker import Progress
@@ -62,17 +60,6 @@ class LinearEstimator(SingleEstimator):
                 setattr(self, name, value)
         return self
 
-    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks where samples count, started by their rule."""
-        if self.initial != "fitted":
-            return simulate_all(blocks, data)
-        return np.array(
-            [
-                np.concatenate([started(block, run)[run.counts] for run in data.runs])
-                for block in blocks
-            ]
-        )
-
     def undetermined(self) -> tuple[int, ...]:
         """Return the places of what the recordings do not determine; the input's offset is chosen."""
         names = self.fitted.parameter_names
@@ -97,11 +84,3 @@ class LinearEstimator(SingleEstimator):
         condition, own = told_by_runs(slopes, residual, data.runs)
         covariance[np.ix_(free, free)] = own * np.outer(sizes[free], sizes[free])
         return condition, covariance
-
-
-def started(block: Block, run: Run) -> Array:
-    """Return the free-running output over a run from the state that explains it best, shape (n,)."""
-    inputs, outputs = run.inputs, np.empty((run.u.size, 1))
-    state = fitted_state(block, inputs, run.y, run.sample_time, run.counts)
-    block.bind(run.sample_time, state, inputs, outputs)()
-    return outputs[:, 0]

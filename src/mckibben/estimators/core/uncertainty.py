@@ -23,6 +23,9 @@ from mckibben.blocks.running import run_many
 from mckibben.estimators.core.autoregression import Autoregression, autoregression
 from mckibben.estimators.core.data import Run, TrainingData
 
+Simulated = Callable[[Sequence[Block], TrainingData], Array]
+"""Gives the free-running outputs of blocks where samples count, shape (blocks, n)."""
+
 LARGEST = 1e150
 """Sensitivity that still is one: its square is a number."""
 
@@ -63,7 +66,11 @@ def unknown(block: Block) -> Array:
 
 
 def covariance_of(
-    block: Block, data: TrainingData, residual: Array, fixed: Sequence[int]
+    block: Block,
+    data: TrainingData,
+    residual: Array,
+    fixed: Sequence[int],
+    simulated: Simulated = simulate_all,
 ) -> tuple[float, Array]:
     """Return the condition of the parameters that are free, and the covariance of all.
 
@@ -78,7 +85,7 @@ def covariance_of(
         return np.inf, covariance
     sizes = relative_sizes(parameters)
     with np.errstate(over="ignore", invalid="ignore"):
-        slopes = sensitivities(block, free, sizes[free], lambda blocks: simulate_all(blocks, data))
+        slopes = sensitivities(block, free, sizes[free], lambda blocks: simulated(blocks, data))
         power = float(residual @ residual)
     finite = np.isfinite(slopes).all(axis=0) & (np.abs(slopes).max(axis=0, initial=0.0) < LARGEST)
     if not finite.any() or not np.isfinite(power):

@@ -1,23 +1,15 @@
-"""What linear estimators share: runs started as fitted, and covariances that stand coloured noise."""
+"""What linear estimators share: starts fitted with the rest, unless they explain the data alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal, Self
 
 import numpy as np
 
-from mckibben.arrays import Array
-from mckibben.blocks.base import Block
-from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.data import Mask
 from mckibben.estimators.core.single import SingleEstimator
-from mckibben.estimators.core.uncertainty import (
-    relative_sizes,
-    sensitivities,
-    told_by_runs,
-)
 from mckibben.estimators.optimisers.tracker import Progress
 from mckibben.recording import Recording
 
@@ -64,23 +56,3 @@ class LinearEstimator(SingleEstimator):
         """Return the places of what the recordings do not determine; the input's offset is chosen."""
         names = self.fitted.parameter_names
         return tuple(place for place in super().undetermined() if names[place] != "input offset")
-
-    def free_run_covariance(
-        self, block: Block, data: TrainingData, fixed: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return the condition and covariance of what was found by free-run errors; NaN where fixed.
-
-        The derivatives are those with every start solved for. Residuals may be coloured, and are taken
-        not to depend on the input; see `uncertainty`.
-        """
-        values = block.pack()
-        covariance = np.full((values.size, values.size), np.nan)
-        free = [place for place in range(values.size) if place not in fixed]
-        sizes = relative_sizes(values)
-        slopes = sensitivities(block, free, sizes[free], partial(self.free_runs, data=data))
-        if not np.isfinite(slopes).all():
-            return np.inf, covariance
-        residual = data.target - self.free_runs([block], data)[0]
-        condition, own = told_by_runs(slopes, residual, data.runs)
-        covariance[np.ix_(free, free)] = own * np.outer(sizes[free], sizes[free])
-        return condition, covariance

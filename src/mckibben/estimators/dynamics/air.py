@@ -225,13 +225,12 @@ class AirEstimator(SeparableEstimator):
     def unit(self, theta: Array, data: TrainingData) -> Air:
         """Return the block with a gain of 1, and neither offset nor limits nor dead time."""
         filling, venting = np.exp(theta[:2]).tolist()
-        return Air(
-            *(1.0, 0.0, float(theta[2]), filling, venting),
-            ambient=None,
-            input_range=data.input_range,
-            initial=self.starting_rule,
+        rest: dict[str, Any] = {
+            "input_range": data.input_range,
+            "initial": self.starting_rule,
             **self.channels(data),
-        )
+        }
+        return Air(1.0, 0.0, float(theta[2]), filling, venting, **rest)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         unit = data.latest("unit", theta, lambda: self.unit(theta, data))

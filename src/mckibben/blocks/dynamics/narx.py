@@ -91,47 +91,34 @@ def give_output(y: float, coefficients: Array, state: Array) -> float:
 
 
 @inlined
-def output_at_rest(
-    regression: Any, wanted: int, coefficients: Array, state: Array
-) -> tuple[float, int]:
-    """Return the output that the regression gives back, one of several by its number, and how many.
-
-    Where there is none, the output that changes least.
-    """
-    n = int(coefficients[0])
-    found, rests, least = 0.0, 0, math.inf
-    before, last = 0.0, 0.0
-    for place in range(PLACES):
-        y = place * SPACING - FARTHEST
-        state[:n] = y
-        change = regression(coefficients, state) - y
-        if rests == 0 and abs(change) < least:
-            found, least = y, abs(change)
-        if place > 0 and ((before > 0.0) != (change > 0.0) or (before < 0.0) != (change < 0.0)):
-            if rests == wanted:
-                found = last - SPACING * before / (change - before)
-            rests += 1
-        before, last = change, y
-    return found, rests
-
-
-@inlined
 def start_resting(
     regression: Any, coefficients: Array, state: Array, inputs: Array, virgin: bool
 ) -> None:
     """Start at rest at the first input: where the regression gives back the output it is given.
 
     Of several such outputs within the data's range, the lowest for an input that has risen, the middle
-    one for a virgin start.
+    one for a virgin start; where there is none, the output that changes least.
     """
     n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
     x = (inputs[0] - coefficients[3]) / coefficients[4]
     state[n : n + m] = x
     start_operators(coefficients[HEAD : HEAD + k], x, x, virgin, state[n + m :])
-    y, rests = output_at_rest(regression, 0, coefficients, state)
-    if virgin:
-        y, _ = output_at_rest(regression, rests // 2, coefficients, state)
-    state[:n] = y
+    found, rests = 0.0, 0
+    for _ in range(2 if virgin else 1):
+        wanted = rests // 2
+        rests, least, before, last = 0, math.inf, 0.0, 0.0
+        for place in range(PLACES):
+            y = place * SPACING - FARTHEST
+            state[:n] = y
+            change = regression(coefficients, state) - y
+            if rests == 0 and abs(change) < least:
+                found, least = y, abs(change)
+            if place > 0 and ((before > 0.0) != (change > 0.0) or (before < 0.0) != (change < 0.0)):
+                if rests == wanted:
+                    found = last - SPACING * before / (change - before)
+                rests += 1
+            before, last = change, y
+    state[:n] = found
 
 
 @kernel

@@ -12,7 +12,13 @@ from mckibben import Recording
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.comparison.memory_test import hold_test
 from mckibben.estimators.core.checking import training_data
-from mckibben.estimators.dynamics.narx import FreeRuns, NarxEstimator, feed_back, select
+from mckibben.estimators.dynamics.narx import (
+    FreeRuns,
+    NarxEstimator,
+    feed_back,
+    select,
+    stretches,
+)
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.registry import load
 from tests.twins import fed_back
@@ -57,7 +63,7 @@ def test_slopes_of_free_runs_are_those_of_finite_differences(
     polynomial = kind == "narx-polynomial"
     block = load("blocks", kind if polynomial else "narx-network").example()
     model = replace(block, **scales, **(terms if polynomial else network))
-    runs = FreeRuns(model, data, horizon, Tracker())
+    runs = FreeRuns(model, stretches(model, data, horizon), Tracker())
     parameters, step = model.pack(), 1e-6
     differences = [
         (runs.errors(parameters + move) - runs.errors(parameters - move)) / (2 * step)
@@ -74,6 +80,16 @@ def test_feeding_back_agrees_with_its_twin() -> None:
     expected = fed_back(slopes.tolist(), by_past.tolist())
     feed_back(slopes, by_past)
     np.testing.assert_allclose(slopes, expected, rtol=1e-12)
+
+
+def test_no_short_stretch_starts_where_nothing_before_it_is_measured() -> None:
+    rows = [np.arange(TIME.size) % 2 == 0]
+    data = training_data(loop(), "pressure", "displacement", rows)
+    model = load("blocks", "narx-polynomial").example()
+    sparse = replace(model, sample_time=0.02, output_lags=2, terms=((0,), (1,)), weights=(0.5, 0.2))
+    assert not stretches(sparse, data, 20)
+    assert len(stretches(sparse, data, None)) == 1
+    assert NarxEstimator()._refined(sparse, 20, data, Tracker()) == []
 
 
 def test_refining_on_free_runs_lowers_the_free_run_error() -> None:

@@ -15,7 +15,7 @@ system identification", 1989 (error reduction ratio).
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, pairwise
 from typing import Annotated, Any, ClassVar, Literal
@@ -35,7 +35,7 @@ from mckibben.blocks.dynamics.narx import (
 from mckibben.blocks.fields import vector
 from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.core.uncertainty import relative_sizes
@@ -59,8 +59,8 @@ LEAST_GAIN = 1e-6
 HORIZON_SAMPLES, SELECTION_SAMPLES, LAYER_SAMPLES = 4000, 5000, 3000
 """Samples looked at, at most: over short horizons, to choose terms, and to find a hidden layer."""
 
-LAYER_EVALUATIONS = 15
-"""Most evaluations of a search for a hidden layer."""
+LAYER_EVALUATIONS, DAMPING = 15, 1e-4
+"""Most evaluations of a search for a hidden layer, and damping of the weights behind it."""
 
 FAR, STEEPEST = 10.0, 1e6
 """Errors, and their derivatives, are not counted as larger, relative to half the output's range."""
@@ -248,7 +248,7 @@ class NarxEstimator(SingleEstimator):
                 most_evaluations=LAYER_EVALUATIONS,
                 least_gain=LEAST_GAIN,
             )
-            models.append(layers.model(layer))
+            models.append(layers.solved(layer)[0])
         return models
 
     def _refined(
@@ -259,10 +259,11 @@ class NarxEstimator(SingleEstimator):
         A model that is unstable when it runs free has no slope to follow there; over short horizons,
         each started from what was measured, it has.
         """
-        runs, start = FreeRuns(model, data, horizon, tracker), model.pack()
+        pieces, start = stretches(model, data, horizon), model.pack()
         # the samples before a stretch may be measured nowhere, or seldom
-        if runs.target.size < start.size:
+        if sum(int(piece.counts.sum()) for piece in pieces) < start.size:
             return []
+        runs = FreeRuns(model, pieces, tracker)
         path = descend(
             runs.errors,
             runs.slopes,
@@ -394,54 +395,63 @@ class HiddenLayers:
     units: int
     tracker: Tracker
 
-    def model(self, layer: Array) -> NarxNetwork:
-        """Return the network of a hidden layer, shape (units * (k + 1),), with the best of all else."""
-        bias, linear, read = np.split(self._solved(layer)[1], [1, 1 + self.x.shape[1]])
-        hidden = np.column_stack([layer.reshape(self.units, -1), read])
-        return NarxNetwork(
-            bias=float(bias[0]),
-            linear=vector(linear),
-            hidden=vector(hidden.ravel()),
-            **self.fields,
+    def solved(self, layer: Array) -> tuple[NarxNetwork, Array]:
+        """Return the best network of a hidden layer, shape (units * (k + 1),), and its errors.
+
+        Behind the errors is the damping of the weights solved for: neighbouring samples make the
+        regressors nearly dependent.
+        """
+        rows = layer.reshape(self.units, -1)
+        columns = self._columns(rows)
+        target = np.append(self.y, np.zeros(len(columns) - self.y.size))
+        weights = np.linalg.lstsq(columns, target, rcond=None)[0]
+        bias, linear, read = np.split(weights, [1, 1 + self.x.shape[1]])
+        hidden = vector(np.column_stack([rows, read]).ravel())
+        network = NarxNetwork(
+            bias=float(bias[0]), linear=vector(linear), hidden=hidden, **self.fields
         )
+        return network, columns @ weights - target
 
     def errors(self, layer: Array) -> Array:
-        """Return the errors, and the damping of the weights, with these solved for."""
+        """Return the errors."""
         self.tracker.evaluations += 1
-        columns, weights = self._solved(layer)
-        return np.asarray(columns @ weights - self._target(columns))
+        return self.solved(layer)[1]
 
     def slopes(self, layer: Array) -> Array:
         """Return the derivatives of the errors, less what the weights would take up (Kaufman)."""
         n, k = self.x.shape
-        columns = self._solved(layer)[0]
-        by_hidden = self.model(layer).slopes(self.x)[0][:, 1 + k :].reshape(n, self.units, k + 2)
+        columns = self._columns(layer.reshape(self.units, -1))
+        by_all, _ = self.solved(layer)[0].slopes(self.x)
         moved = np.zeros((len(columns), layer.size))
-        moved[:n] = by_hidden[:, :, :-1].reshape(n, -1)
+        moved[:n] = by_all[:, 1 + k :].reshape(n, self.units, -1)[:, :, :-1].reshape(n, -1)
         taken = np.linalg.qr(columns)[0]
         return np.asarray(moved - taken @ (taken.T @ moved))
 
-    def _solved(self, layer: Array) -> tuple[Array, Array]:
-        """Return what the weights multiply, and the best weights."""
-        n, k = self.x.shape
-        rows = layer.reshape(self.units, -1)
+    def _columns(self, rows: Array) -> Array:
+        """Return what the weights multiply: a constant, the regressors and the units; then damping."""
         a, _ = activated(self.fields["activation"], self.x @ rows[:, :-1].T + rows[:, -1])
-        # a little damping: neighbouring samples make the regressors nearly dependent
-        damping = 1e-4 * np.eye(1 + k + self.units)
-        columns = np.vstack([np.column_stack([np.ones(n), self.x, a]), damping])
-        return columns, np.linalg.lstsq(columns, self._target(columns), rcond=None)[0]
-
-    def _target(self, columns: Array) -> Array:
-        return np.append(self.y, np.zeros(len(columns) - self.y.size))
+        columns = np.column_stack([np.ones(len(a)), self.x, a])
+        return np.vstack([columns, DAMPING * np.eye(columns.shape[1])])
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of a run, and the state before it."""
+    """A stretch of a run: the state before it, outputs, which of them count, and what drives them.
 
-    run: Run
-    samples: slice
+    ``regressors`` are those that depend on inputs alone.
+    """
+
     state: Array
+    inputs: Array
+    outputs: Array
+    counts: Mask
+    regressors: Array
+
+    @classmethod
+    def of(cls, run: Run, samples: slice, state: Array, regressors: Array) -> Stretch:
+        """Return the stretch of some samples of a run, of which all regressors are given."""
+        given = np.ascontiguousarray(run.driven[samples])
+        return cls(state, given, run.y[samples], run.counts[samples], regressors[samples])
 
 
 def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stretch]:
@@ -453,11 +463,12 @@ def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stre
     found = []
     n, m = model.output_lags, model.past_inputs
     for run in data.runs:
+        regressors = driven(model, run)
         if horizon is None:
             state = model.state_at(run.driven[0], run.y[:1]) if run.counts[0] else None
             if state is None:
                 state = model.initial_state(run.driven[0])
-            found.append(Stretch(run, slice(None), state))
+            found.append(Stretch.of(run, slice(None), state, regressors))
             continue
         x, y = scaled(run.u, model.input_scale), scaled(run.y, model.output_scale)
         played = operators(model, x)
@@ -465,7 +476,8 @@ def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stre
             before = start - 1 - np.arange(max(n, m))
             if run.counts[before[:n]].all():
                 state = np.concatenate([y[before[:n]], x[before[:m]], played[start - 1]])
-                found.append(Stretch(run, slice(start, start + horizon), state))
+                samples = slice(start, start + horizon)
+                found.append(Stretch.of(run, samples, state, regressors))
     if horizon is None:
         return found
     few = min(len(found), -(-HORIZON_SAMPLES // horizon))
@@ -494,41 +506,35 @@ class FreeRuns:
     ----------
     model : Narx
         One of them.
-    data : TrainingData
-    horizon : int or None
-        Samples of a stretch; None for whole runs.
+    stretches : sequence of Stretch
+        One or more; their outputs follow one another.
     tracker : Tracker
         Counts evaluations.
     """
 
-    def __init__(
-        self, model: Narx, data: TrainingData, horizon: int | None, tracker: Tracker
-    ) -> None:
-        self.model, self.sample_time, self.tracker = model, data.sample_time, tracker
-        self.stretches = stretches(model, data, horizon)
-        self.inputs = [np.ascontiguousarray(s.run.driven[s.samples]) for s in self.stretches]
-        self.counts = np.concatenate([s.run.counts[s.samples] for s in self.stretches])
-        self.target = np.concatenate([s.run.y[s.samples] for s in self.stretches])[self.counts]
-        tables = {id(run): driven(model, run) for run in data.runs}
-        self._driven = np.concatenate([tables[id(s.run)][s.samples] for s in self.stretches])
+    def __init__(self, model: Narx, stretches: Sequence[Stretch], tracker: Tracker) -> None:
+        self.model, self.stretches, self.tracker = model, stretches, tracker
+        self.counts = np.concatenate([each.counts for each in stretches])
+        self.target = np.concatenate([each.outputs for each in stretches])[self.counts]
+        self._driven = np.concatenate([each.regressors for each in stretches])
         # outputs of all stretches, each behind the measured ones before it, the oldest first
-        lags, lengths = model.output_lags, [len(inputs) for inputs in self.inputs]
+        lags, lengths = model.output_lags, [each.counts.size for each in stretches]
         numbers = np.repeat(np.arange(len(lengths)), lengths)
         self._own = np.arange(numbers.size) + lags * (1 + numbers)
         self._past = self._own[:, np.newaxis] - 1 - np.arange(lags)
         self._behind = np.full(numbers.size + lags * len(lengths), np.nan)
         self._behind[np.delete(np.arange(self._behind.size), self._own)] = np.concatenate(
-            [s.state[:lags][::-1] for s in self.stretches]
+            [each.state[:lags][::-1] for each in stretches]
         )
 
     def outputs(self, model: Narx) -> Array:
         """Return the outputs over all stretches, whether they count or not, shape (n,)."""
-        coefficients = model.coefficients(self.sample_time)
+        coefficients = model.coefficients(model.sample_time)
         outputs = np.empty((self.counts.size, 1))
         stop = 0
-        for stretch, inputs in zip(self.stretches, self.inputs, strict=True):
-            start, stop = stop, stop + len(inputs)
-            model.kernel.batch(coefficients, stretch.state.copy(), inputs, outputs[start:stop])
+        for each in self.stretches:
+            start, stop = stop, stop + each.counts.size
+            model.kernel.batch(coefficients, each.state.copy(), each.inputs, outputs[start:stop])
         return outputs[:, 0]
 
     def errors(self, theta: Array) -> Array:
@@ -560,7 +566,7 @@ class FreeRuns:
 
 def free_run_rmse(model: Narx, data: TrainingData) -> float:
     """Return the RMSE of free runs, each started where it was measured; infinite where it overflows."""
-    runs = FreeRuns(model, data, None, Tracker())
+    runs = FreeRuns(model, stretches(model, data, None), Tracker())
     with np.errstate(over="ignore", invalid="ignore"):
         value = float(np.sqrt(np.mean((runs.outputs(model)[runs.counts] - runs.target) ** 2)))
     return value if np.isfinite(value) else np.inf

@@ -275,15 +275,16 @@ def rates(
         for e in range(width):
             s += hidden[j, e] * known[e]
         act[j] = np.tanh(s)
-    found[:] = 0.0
     for d in range(n):
+        own = found[d]
+        for i in range(1 + p):
+            own[i] = 0.0
         for e in range(width):
-            found[d, 0] += linear[d, e] * known[e]
+            own[0] += linear[d, e] * known[e]
         for j in range(units):
-            found[d, 0] += readout[d, j] * act[j]
+            own[0] += readout[d, j] * act[j]
         if p == 0:
             continue
-        own = found[d]
         for e in range(n):
             share = linear[d, e]
             for j in range(units):
@@ -334,11 +335,10 @@ def follow_network(
         Whether it came to the end: a state that leaves all bounds ends it.
     """
     n, columns = state.shape
-    at, rate, total = np.zeros((n, columns)), np.zeros((n, columns)), np.zeros((n, columns))
+    at, rate, total = state.copy(), np.zeros((n, columns)), np.zeros((n, columns))
     known, act = np.ones(linear.shape[1]), np.zeros(hidden.shape[0])
     for t in range(inputs.size - 1):
         rise = inputs[t + 1] - inputs[t]
-        at[:], total[:] = state, 0.0
         for way, weight, ahead in RUNGE_KUTTA:
             known[n] = inputs[t] + way * rise
             rates(linear, hidden, readout, at, known, act, rate)
@@ -349,6 +349,7 @@ def follow_network(
         for d in range(n):
             for i in range(columns):
                 state[d, i] += h / 6.0 * total[d, i]
+                at[d, i], total[d, i] = state[d, i], 0.0
             if not abs(state[d, 0]) < LARGEST:
                 return False
         k = (t + 1) // every - skipped - 1

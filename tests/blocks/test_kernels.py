@@ -19,7 +19,7 @@ from mckibben.blocks.coupled.force_balance import ForceBalance
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
-from mckibben.blocks.dynamics.narx_polynomial import NarxPolynomial
+from mckibben.blocks.dynamics.narx import NarxPolynomial
 from mckibben.blocks.dynamics.state_network import StateNetwork
 from mckibben.blocks.fields import vector
 from mckibben.blocks.force.multistate_friction import deflected

@@ -9,7 +9,7 @@ from mckibben import PI, Recording
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.dynamics.creep import Creep
-from mckibben.blocks.dynamics.creep_start import begun_places, begun_state
+from mckibben.blocks.dynamics.starts import fitted_places, fitted_state
 from mckibben.blocks.memoryless import Negative
 from mckibben.comparison.free_run import run_free
 from mckibben.estimators.core.data import training_data
@@ -41,23 +41,23 @@ def test_known_outputs_tell_how_far_elements_had_crept(block: Block) -> None:
     pressure = levels(80)
     inputs = pressure[:, np.newaxis]
     rest = block.initial_state(inputs[0])
-    places = begun_places(block)
+    places = fitted_places(block)
     crept = rest.copy()
     crept[places] += [3.0, -11.0]
     y = block.simulate(pressure, initial=crept.tolist(), sample_time=STEP)
     every = np.ones(80, dtype=bool)
-    np.testing.assert_allclose(begun_state(block, rest, inputs, y, STEP, every), crept, atol=1e-9)
+    np.testing.assert_allclose(fitted_state(block, inputs, y, STEP, every), crept, atol=1e-9)
     # what is not known has no say
     y[40:] = np.nan
     early = np.arange(80) < 40
-    np.testing.assert_allclose(begun_state(block, rest, inputs, y, STEP, early), crept, atol=1e-8)
+    np.testing.assert_allclose(fitted_state(block, inputs, y, STEP, early), crept, atol=1e-8)
 
 
 def test_a_drift_from_before_the_recording_is_found_and_gone_on_from() -> None:
     run = worked(SLOW, 200, 100, 0.01)
     train, test = run.slice(0, 120), run.slice(120, 200)
     found, settled = (CreepPIEstimator(settled=s).fit(train) for s in (None, True))
-    assert begun_places(found.model_)
+    assert fitted_places(found.model_)
     assert any("under way" in note for note in found.diagnostics_.notes)
     missed = [
         test["displacement"] - run_free(fit.model_, test, "displacement", (train,))
@@ -73,7 +73,7 @@ def test_where_the_muscle_was_settled_nothing_is_made_up() -> None:
     y = SLOW.simulate(pressure, sample_time=STEP)
     y += 0.05 * np.random.default_rng(2).standard_normal(y.size)
     run = Recording({"pressure": pressure, "displacement": y}, STEP)
-    assert begun_places(CreepPIEstimator().fit(run).model_) == []
+    assert fitted_places(CreepPIEstimator().fit(run).model_) == []
 
 
 def test_moves_of_what_was_begun_are_those_of_finite_differences() -> None:

@@ -12,9 +12,14 @@ from mckibben import Recording
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.comparison.memory_test import hold_test
 from mckibben.estimators.core.data import training_data
-from mckibben.estimators.dynamics.narx_free_run import FreeRuns, feed_back, segments
-from mckibben.estimators.dynamics.narx_polynomial import NarxPolynomialEstimator
-from mckibben.estimators.dynamics.narx_selection import select
+from mckibben.estimators.dynamics.narx import (
+    FreeRuns,
+    NarxEstimator,
+    feed_back,
+    select,
+    stretches,
+)
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.registry import load
 from tests.twins import fed_back
 
@@ -58,17 +63,13 @@ def test_slopes_of_free_runs_are_those_of_finite_differences(
     polynomial = kind == "narx-polynomial"
     block = load("blocks", kind if polynomial else "narx-network").example()
     model = replace(block, **scales, **(terms if polynomial else network))
-    runs = FreeRuns(model, 0.02, segments(model, data, horizon))
+    runs = FreeRuns(model, stretches(model, data, horizon), Tracker())
     parameters, step = model.pack(), 1e-6
     differences = [
-        (
-            runs.errors(model.unpack(parameters + move))
-            - runs.errors(model.unpack(parameters - move))
-        )
-        / (2 * step)
+        (runs.errors(parameters + move) - runs.errors(parameters - move)) / (2 * step)
         for move in step * np.eye(parameters.size)
     ]
-    slopes = runs.slopes(model)
+    slopes = runs.slopes(parameters)
     np.testing.assert_allclose(slopes, np.transpose(differences), atol=1e-6 * np.ptp(slopes))
 
 
@@ -81,9 +82,19 @@ def test_feeding_back_agrees_with_its_twin() -> None:
     np.testing.assert_allclose(slopes, expected, rtol=1e-12)
 
 
+def test_no_short_stretch_starts_where_nothing_before_it_is_measured() -> None:
+    rows = [np.arange(TIME.size) % 2 == 0]
+    data = training_data(loop(), "pressure", "displacement", rows)
+    model = load("blocks", "narx-polynomial").example()
+    sparse = replace(model, sample_time=0.02, output_lags=2, terms=((0,), (1,)), weights=(0.5, 0.2))
+    assert not stretches(sparse, data, 20)
+    assert len(stretches(sparse, data, None)) == 1
+    assert NarxEstimator()._refined(sparse, 20, data, Tracker()) == []
+
+
 def test_refining_on_free_runs_lowers_the_free_run_error() -> None:
-    rough = NarxPolynomialEstimator(refine=False, allow_unstable=True, n_terms=6).fit(loop())
-    fine = NarxPolynomialEstimator().fit(loop())
+    rough = NarxEstimator(refine=False, allow_unstable=True, n_terms=6).fit(loop())
+    fine = NarxEstimator().fit(loop())
     assert fine.diagnostics_.rmse < rough.diagnostics_.rmse
 
 
@@ -91,7 +102,7 @@ def test_play_operators_keep_the_branch_that_plain_narx_forgets() -> None:
     recording = loop()
     plain, kept = (
         hold_test(estimator.fit(recording).model_, recording, "pressure", "displacement")
-        for estimator in (NarxPolynomialEstimator(), load("estimators", "narx-play")())
+        for estimator in (NarxEstimator(), load("estimators", "narx-play")())
     )
     assert plain is not None
     assert kept is not None

@@ -40,7 +40,7 @@ Start = Callable[..., None]
 VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
 """Named starts, and whether a start kernel takes them as if nothing had happened before.
 
-"fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamics.linear_start`."""
+"fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamics.starts`."""
 
 Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 """Names of fields of channels: driven, scheduling, and given."""
@@ -193,6 +193,11 @@ class Block(DrawsItself, Parametrised):
     @property
     def n_states(self) -> int:
         """Length of the state vector."""
+        return 0
+
+    @property
+    def n_fitted(self) -> int:
+        """How many states, the first ones, are solved for where its `initial` is "fitted"."""
         return 0
 
     @property

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
 
-Rule = Literal["first_sample", "virgin"]
+Rule = Literal["first_sample", "virgin", "fitted"]
 """Name of a starting memory."""
 
 Initial = Rule | Sequence[float]
@@ -54,7 +54,7 @@ StoredInitial = Literal["first_sample", "virgin"] | Vector
 
 
 FittedInitial = Literal["first_sample", "virgin", "fitted"] | Vector
-"""`StoredInitial` of linear models, whose start can be fitted to outputs too; see `LinearStart`."""
+"""`StoredInitial` of linear models, whose start can be fitted to outputs too."""
 
 
 def vector(values: ArrayLike) -> tuple[float, ...]:

@@ -10,9 +10,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.dynamics.creep_start import begun_places, begun_state
-from mckibben.blocks.dynamics.linear_start import LinearStart
 from mckibben.blocks.dynamics.repeating import Repeating
+from mckibben.blocks.dynamics.starts import fitted_places, fitted_state
 from mckibben.comparison.splits import Mask, predecessor
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.recording import Recording
@@ -115,16 +114,9 @@ def known_start(
 
     That of the least squared error where the block's start is fitted; else `measured_start`.
     """
-    if isinstance(block, LinearStart) and block.initial == "fitted":
+    if block.start == "fitted" or fitted_places(block):
         inputs = recording.matrix(channel.name for channel in block.inputs)
-        return block.fitted_state(inputs, recording[outputs[0]], recording.sample_time, rows)
-    if begun_places(block):
-        inputs = recording.matrix(channel.name for channel in block.inputs)
-        known = np.ones(len(recording), dtype=bool) if rows is None else rows
-        state = block.initial_state(inputs[0])
-        return begun_state(
-            block, state, inputs, recording[outputs[0]], recording.sample_time, known
-        )
+        return fitted_state(block, inputs, recording[outputs[0]], recording.sample_time, rows)
     return measured_start(block, recording, outputs)
 
 

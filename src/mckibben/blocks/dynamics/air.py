@@ -166,11 +166,7 @@ class Air(Invertible):
     inverse_start_kernel: ClassVar[Start] = air_inverse_start
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = (
-        "gain",
-        "offset",
-        "hysteresis",
-        "filling_time",
-        "venting_time",
+        *("gain", "offset", "hysteresis", "filling_time", "venting_time"),
     )
     notation: ClassVar[Notation] = Notation(
         r"\begin{cases} T_f \dot{x} = g_f - x & \text{filling, } g_f = K (u - u_0 - h/2) "
@@ -213,8 +209,7 @@ class Air(Invertible):
     def pressures(self) -> tuple[float, float]:
         """Lowest and highest pressure aimed for; infinite where there is no limit."""
         lowest = -math.inf if self.ambient is None else self.ambient
-        highest = math.inf if self.supply is None else self.supply
-        return lowest, highest
+        return lowest, math.inf if self.supply is None else self.supply
 
     @property
     def offsets(self) -> tuple[float, float]:
@@ -232,31 +227,14 @@ class Air(Invertible):
         aimed = self.gain * (command - self.offset - 0.5 * way * self.hysteresis)
         return min(max(aimed, lowest), highest)
 
-    def dead_samples(self, sample_time: float | None) -> int:
-        """Return the dead time in samples, rounded.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or where they are more than 254.
-        """
-        step = needs_sample_time(self.kind, sample_time)
-        samples = self.dead_time / step
-        if not samples <= LONGEST_DEAD_TIME + 0.5:
-            raise ModelError(
-                f"a dead time of {self.dead_time:g} s is {samples:.0f} samples. Remedy: a dead time "
-                f"of at most {LONGEST_DEAD_TIME} samples, or a longer sample time."
-            )
-        return round(samples)
-
     def check_time(self, sample_time: float | None) -> None:
         """Warn where the dead time is no whole number of samples."""
-        samples = self.dead_samples(sample_time)
+        late = self.coefficients(sample_time)[-1]
         assert sample_time is not None
-        if abs(self.dead_time / sample_time - samples) > WHOLE:
+        if abs(self.dead_time / sample_time - late) > WHOLE:
             warnings.warn(
                 f"the dead time of {self.kind!r}, {self.dead_time:g} s, is no whole number of samples "
-                f"of {sample_time:g} s: {samples * sample_time:g} s is taken",
+                f"of {sample_time:g} s: {late * sample_time:g} s is taken",
                 ModelWarning,
                 stacklevel=4,
             )
@@ -269,11 +247,16 @@ class Air(Invertible):
         ModelError
             Without a sample time, or where the dead time is more than 254 samples.
         """
-        late = self.dead_samples(sample_time)
-        assert sample_time is not None
+        step = needs_sample_time(self.kind, sample_time)
+        late = self.dead_time / step
+        if not late <= LONGEST_DEAD_TIME + 0.5:
+            raise ModelError(
+                f"a dead time of {self.dead_time:g} s is {late:.0f} samples. Remedy: a dead time "
+                f"of at most {LONGEST_DEAD_TIME} samples, or a longer sample time."
+            )
         times = (self.filling_time, self.venting_time)
-        shares = [-math.expm1(-sample_time / time) if time > 0 else 1.0 for time in times]
-        return np.array([self.gain, *self.offsets, *shares, *self.pressures, late])
+        shares = [-math.expm1(-step / time) if time > 0 else 1.0 for time in times]
+        return np.array([self.gain, *self.offsets, *shares, *self.pressures, round(late)])
 
     def start_numbers(self) -> Array:
         """Return the coefficients at a sample time that its dead time allows."""

@@ -120,6 +120,11 @@ class Creep(Invertible):
         """One to every Kelvin-Voigt element."""
         return len(self.compliances)
 
+    @property
+    def n_fitted(self) -> int:
+        """All of them."""
+        return self.n_states
+
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [decays over a sample, compliances].
 

@@ -12,7 +12,6 @@ corner of the delayed input by matrix exponentials.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -23,19 +22,21 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Kernel, Start, needs_sample_time
-from mckibben.blocks.dynamics.linear_start import LinearStart
+from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     FittedInitial,
+    Initial,
     Vector,
 )
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import Notation, tex
 from mckibben.errors import ModelError
+from mckibben.recording import Recording
 
 LONGEST_DELAY = 254
 """Samples."""
@@ -80,7 +81,7 @@ def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin
 
 
 @dataclass(frozen=True, config=STRICT)
-class ProcessModel(LinearStart):
+class ProcessModel(Block):
     """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
 
     Parameters
@@ -165,14 +166,18 @@ class ProcessModel(LinearStart):
         return f"P{self.order}{'D' * (self.delay > 0)}{under}{'Z' * (self.zero_time is not None)}"
 
     @property
-    def n_free(self) -> int:
-        """As many states as there are lags."""
+    def n_fitted(self) -> int:
+        """As many as there are lags."""
         return self.order
 
     @property
     def n_states(self) -> int:
         """Of the lags, past inputs, and as many for the lags again, to compute in."""
         return 2 * self.order + (3 if self.delay == 0 else LONGEST_DELAY + 3)
+
+    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
+        """Return the state that explains the recording's outputs best, where that is the rule."""
+        return start_on(self, recording, initial)
 
     def denominator(self) -> Array:
         """Return D(s), descending powers."""
@@ -184,28 +189,6 @@ class ProcessModel(LinearStart):
             found = np.polymul(found, [t, 1.0])
         return found
 
-    def state_space(self) -> tuple[Array, Array, Array, float]:
-        """Return A, B, C and D of the lags without delay, in controllable form, x_1 being at rest u.
-
-        The state is scaled so that x = (u, 0, ..., 0) at rest, which keeps digits of slow lags.
-        """
-        d = self.denominator()
-        n = d.size - 1
-        a = np.diag(np.ones(n - 1), 1)
-        a[-1] = -d[:0:-1] / d[0]
-        b = np.zeros(n)
-        b[-1] = 1.0 / d[0]
-        c = np.zeros(n)
-        c[0] = self.gain
-        through = 0.0
-        if self.zero_time is not None:
-            if n > 1:
-                c[1] = self.gain * self.zero_time
-            else:
-                through = self.gain * self.zero_time / d[0]
-                c[0] = self.gain - through
-        return a, b, c, through
-
     def coefficients(self, sample_time: float | None) -> Array:
         """Return what the kernel reads, for a sample time.
 
@@ -215,37 +198,6 @@ class ProcessModel(LinearStart):
             Without a sample time, or where the delay is more than 254 samples.
         """
         return _discretised(self, sample_time).copy()
-
-    def discretised(self, sample_time: float | None) -> Array:
-        """Return the same, computed; see `coefficients`."""
-        step = needs_sample_time(self.kind, sample_time)
-        samples = self.delay / step
-        m = int(np.floor(samples + 1e-9))
-        if m > LONGEST_DELAY:
-            raise ModelError(
-                f"a delay of {self.delay:g} s is {m} samples. Remedy: a delay of at most "
-                f"{LONGEST_DELAY} samples, or a longer sample time."
-            )
-        part = min(max(samples - m, 0.0), 1.0)
-        a, b, c, through = self.state_space()
-        n = b.size
-        early, early_from, early_to = held(a, b, part * step)
-        late, late_from, late_to = held(a, b, (1 - part) * step)
-        vectors = np.zeros((3, n))
-        if self.hold == "first":
-            # the delayed input at the start of the step, at its corner, and at its end
-            start, corner, end = late @ early_from, late @ early_to + late_from, late_to
-            vectors[0] = (1 - part) * end
-            vectors[1] = part * end + corner + (1 - part) * start
-            vectors[2] = part * start
-            now, before = (1 - part) * through, part * through
-        else:
-            # until the corner the input is two samples old, then one
-            vectors[1] = late_from + late_to
-            vectors[2] = late @ (early_from + early_to)
-            now, before = (through, 0.0) if part == 0 else (0.0, through)
-        head = [n, m, self.input_offset, self.output_offset, now, before]
-        return np.concatenate([head, c, vectors.ravel(), (late @ early).ravel()])
 
     def start_numbers(self) -> Array:
         """Return [n, 0, u_0], which is what the start reads."""
@@ -261,26 +213,22 @@ class ProcessModel(LinearStart):
 
     def equations(self) -> tuple[str, ...]:
         """Return the transfer function of this structure."""
-        pair = r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1"
-        return (self._transfer("K", "T_z", pair, "T_{{p,{}}} s + 1", "T_d"),)
+        lags = [f"T_{{p,{k + 1}}} s + 1" for k in range(len(self.time_constants))]
+        return (
+            self._transfer("K", r"T_z\,s", lags, r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1", "T_d"),
+        )
 
     def worked(self) -> tuple[str, ...]:
         """Return the transfer function with its numbers."""
         a, b = (tex(float(c)) for c in self.denominator()[:2])
-        zero = "" if self.zero_time is None else tex(self.zero_time)
-        names = [f"{tex(t)}\\,s + 1" for t in self.time_constants]
+        zero = rf"{tex(self.zero_time or 0.0)}\,s"
+        lags = [rf"{tex(t)}\,s + 1" for t in self.time_constants]
         pair = rf"{a}\,s^2 + {b}\,s + 1"
-        return (self._transfer(tex(self.gain), zero, pair, names, tex(self.delay)),)
+        return (self._transfer(tex(self.gain), zero, lags, pair, tex(self.delay)),)
 
-    def _transfer(
-        self, gain: str, zero: str, pair: str, lag: str | Sequence[str], delay: str
-    ) -> str:
-        lags = [
-            lag.format(k + 1) if isinstance(lag, str) else lag[k]
-            for k in range(len(self.time_constants))
-        ]
-        below = pair if self.damping is not None else "".join(rf"({text})" for text in lags)
-        above = gain if self.zero_time is None else rf"{gain} ({zero}\,s + 1)"
+    def _transfer(self, gain: str, zero: str, lags: list[str], pair: str, delay: str) -> str:
+        below = "".join(f"({lag})" for lag in lags) if self.damping is None else pair
+        above = gain if self.zero_time is None else f"{gain} ({zero} + 1)"
         late = rf"\, e^{{-{delay}\,s}}" if self.delay else ""
         return rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}"
 
@@ -327,9 +275,58 @@ class ProcessModel(LinearStart):
         return cls(6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=8)  # once for many runs of one model
 def _discretised(model: ProcessModel, sample_time: float | None) -> Array:
-    return model.discretised(sample_time)  # once for many runs of one model
+    """Return the coefficients of a model."""
+    step = needs_sample_time(model.kind, sample_time)
+    samples = model.delay / step
+    m = int(np.floor(samples + 1e-9))
+    if m > LONGEST_DELAY:
+        raise ModelError(
+            f"a delay of {model.delay:g} s is {m} samples. Remedy: a delay of at most "
+            f"{LONGEST_DELAY} samples, or a longer sample time."
+        )
+    part = min(max(samples - m, 0.0), 1.0)
+    a, b, c, through = _state_space(model)
+    early, early_from, early_to = held(a, b, part * step)
+    late, late_from, late_to = held(a, b, (1 - part) * step)
+    vectors = np.zeros((3, b.size))
+    if model.hold == "first":
+        # the delayed input at the start of the step, at its corner, and at its end
+        start, corner, end = late @ early_from, late @ early_to + late_from, late_to
+        vectors[0] = (1 - part) * end
+        vectors[1] = part * end + corner + (1 - part) * start
+        vectors[2] = part * start
+        now, before = (1 - part) * through, part * through
+    else:
+        # until the corner the input is two samples old, then one
+        vectors[1] = late_from + late_to
+        vectors[2] = late @ (early_from + early_to)
+        now, before = (through, 0.0) if part == 0 else (0.0, through)
+    head = [b.size, m, model.input_offset, model.output_offset, now, before]
+    return np.concatenate([head, c, vectors.ravel(), (late @ early).ravel()])
+
+
+def _state_space(model: ProcessModel) -> tuple[Array, Array, Array, float]:
+    """Return A, B, C and D of the lags without delay, in controllable form.
+
+    The state is scaled so that it is (u, 0, ..., 0) at rest, which keeps digits of slow lags.
+    """
+    d = model.denominator()
+    n = d.size - 1
+    a = np.diag(np.ones(n - 1), 1)
+    a[-1] = -d[:0:-1] / d[0]
+    b = np.zeros(n)
+    b[-1] = 1.0 / d[0]
+    c = np.zeros(n)
+    c[0] = model.gain
+    through = 0.0
+    if model.zero_time is not None and n > 1:
+        c[1] = model.gain * model.zero_time
+    elif model.zero_time is not None:
+        through = model.gain * model.zero_time / d[0]
+        c[0] = model.gain - through
+    return a, b, c, through
 
 
 def held(a: Array, b: Array, step: float) -> tuple[Array, Array, Array]:

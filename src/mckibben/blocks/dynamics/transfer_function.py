@@ -19,8 +19,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start, own_sample_time
-from mckibben.blocks.dynamics.linear_start import LinearStart
+from mckibben.blocks.base import Block, Kernel, Start, own_sample_time
+from mckibben.blocks.dynamics.starts import free_responses, start_on
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -28,6 +28,7 @@ from mckibben.blocks.fields import (
     ChannelField,
     Coefficients,
     FittedInitial,
+    Initial,
 )
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
@@ -68,7 +69,7 @@ def transfer_function_start(coefficients: Array, state: Array, inputs: Array, vi
 
 
 @dataclass(frozen=True, config=STRICT)
-class TransferFunction(LinearStart):
+class TransferFunction(Block):
     """Discrete transfer function about an operating point.
 
     Parameters
@@ -141,7 +142,7 @@ class TransferFunction(LinearStart):
         return max(len(self.numerator) - 1, len(self.denominator))
 
     @property
-    def n_free(self) -> int:
+    def n_fitted(self) -> int:
         """As many states as there are poles."""
         return len(self.denominator)
 
@@ -166,6 +167,10 @@ class TransferFunction(LinearStart):
         b = np.pad(np.array(self.numerator), (0, n + 1 - len(self.numerator)))
         f = np.pad(np.array([1.0, *self.denominator]), (0, n - len(self.denominator)))
         return b, f
+
+    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
+        """Return the state that explains the recording's outputs best, where that is the rule."""
+        return start_on(self, recording, initial)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [u_0, y_0, b, f, gain], with no gain where that is infinite.
@@ -218,8 +223,10 @@ class TransferFunction(LinearStart):
             inputs, initial="first_sample" if fitted else None, sample_time=recording.sample_time
         )[:, 0]
         errors = np.asarray(lfilter(d, c, measured - rest))
-        if fitted and self.n_free:
-            free = lfilter(d, c, self.free_responses(len(inputs), recording.sample_time), axis=0)
+        if fitted and self.n_fitted:
+            places = range(self.n_fitted)
+            free = free_responses(self, inputs, recording.sample_time, places)
+            free = lfilter(d, c, free, axis=0)
             errors = errors - free @ np.linalg.lstsq(free, errors, rcond=1e-12)[0]
         # what an error does to the samples after it, of which there are no more than in the recording
         ahead = lfilter(c, d, np.eye(1, min(horizon, len(errors)))[0])

@@ -20,7 +20,12 @@ from mckibben.blocks.fields import Channel
 from mckibben.errors import ModelWarning
 from mckibben.estimators.core.data import Mask, TrainingData, training_data
 from mckibben.estimators.core.settings import check_settings
-from mckibben.estimators.core.uncertainty import covariance_of, simulate_all, unknown
+from mckibben.estimators.core.uncertainty import (
+    covariance_of,
+    simulate_all,
+    simulate_started,
+    unknown,
+)
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
 from mckibben.recording import Recording, listed
 from mckibben.signals.checking import LARGEST_SEED
@@ -450,7 +455,7 @@ class Estimator(ABC):
 
         Shape (blocks, samples).
         """
-        return simulate_all(blocks, data)
+        return simulate_started(blocks, data)
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]

@@ -19,8 +19,12 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.dynamics.starts import fitted_places, fitted_run
 from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import Run, TrainingData
+
+Simulated = Callable[[Sequence[Block], TrainingData], Array]
+"""Gives the free-running outputs of blocks where samples count, shape (blocks, n)."""
 
 LARGEST = 1e150
 """Sensitivity that still is one: its square is a number."""
@@ -46,13 +50,30 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
     return np.concatenate(outputs, axis=1)
 
 
+def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
+    """Return the same with the states that are solved for at a start fitted to every run."""
+    if not any(map(fitted_places, blocks)):
+        return simulate_all(blocks, data)
+    outputs = []
+    for run in data.runs:
+        before = run.history.size - run.u.size
+        y, counts = np.pad(run.y, (before, 0)), np.pad(run.counts, (before, 0))
+        known = (run.inputs, y, run.sample_time, counts)
+        outputs.append([fitted_run(block, *known)[counts] for block in blocks])
+    return np.concatenate(outputs, axis=1)
+
+
 def unknown(block: Block) -> Array:
     """Return the covariance of a block's parameters of which nothing is known."""
     return np.full((block.n_parameters, block.n_parameters), np.nan)
 
 
 def covariance_of(
-    block: Block, data: TrainingData, residual: Array, fixed: Sequence[int]
+    block: Block,
+    data: TrainingData,
+    residual: Array,
+    fixed: Sequence[int],
+    simulated: Simulated = simulate_all,
 ) -> tuple[float, Array]:
     """Return the condition of the parameters that are free, and the covariance of all.
 
@@ -67,7 +88,7 @@ def covariance_of(
         return np.inf, covariance
     sizes = relative_sizes(parameters)
     with np.errstate(over="ignore", invalid="ignore"):
-        slopes = sensitivities(block, free, sizes[free], lambda blocks: simulate_all(blocks, data))
+        slopes = sensitivities(block, free, sizes[free], lambda blocks: simulated(blocks, data))
         power = float(residual @ residual)
     finite = np.isfinite(slopes).all(axis=0) & (np.abs(slopes).max(axis=0, initial=0.0) < LARGEST)
     if not finite.any() or not np.isfinite(power):

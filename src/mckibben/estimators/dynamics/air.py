@@ -99,13 +99,14 @@ class AirEstimator(SeparableEstimator):
         return "it maps a command to a pressure" if given in MOVED or wanted != "pressure" else None
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        data.timed()
+        step = data.timed()
         if self.initial == "fitted":
             raise ModelError(
                 "starts of air are not fitted. Remedy: use initial=first_sample, and recordings that "
                 "begin at rest."
             )
-        most = self._longest(data)
+        shortest = min(run.u.size for run in data.runs)
+        most = min(int(self.longest_dead_time / step + 1e-9), LONGEST_DEAD_TIME, shortest // 4)
         tried: dict[int, tuple[float, Air]] = {}
         best = self._correlated(data, most)
         asked = [best]
@@ -121,7 +122,6 @@ class AirEstimator(SeparableEstimator):
             asked = [late for late in near if 0 <= late <= most and late not in tried][:2]
         tracker.best_cost, block = tried[best]
         tracker.best = block.pack()
-        step = data.sample_time or 1.0
         others = [
             f"{100 * (tried[late][0] / max(tried[best][0], 1e-300) - 1):.1f} % at {late * step:g} s"
             for late in (best - 1, best + 1)
@@ -134,33 +134,29 @@ class AirEstimator(SeparableEstimator):
             )
         return block, data
 
-    def _longest(self, data: TrainingData) -> int:
-        shortest = min(run.u.size for run in data.runs)
-        samples = int(self.longest_dead_time / (data.sample_time or 1.0) + 1e-9)
-        return min(samples, LONGEST_DEAD_TIME, shortest // 4)
-
     def _correlated(self, data: TrainingData, most: int) -> int:
         """Return the dead time at which the pressure follows the command best, with some lag."""
         thin = data.thinned(SEARCH_SAMPLES)
         wanted = thin.target - thin.target.mean()
         lower, upper = self.bounds(data)
-        best, found = 0.0, -1
-        for share in np.linspace(0.0, 0.8, GUESSES):
-            theta = np.array([*(lower + share * (upper - lower))[:2], 0.0])
-            for late in range(most + 1):
-                given = self.matrix(theta, delayed(thin, late))[:, 0]
+        likeness: dict[int, float] = {}
+        for late in range(most + 1):
+            moved = delayed(thin, late)
+            for share in np.linspace(0.0, 0.8, GUESSES):
+                theta = np.array([*(lower + share * (upper - lower))[:2], 0.0])
+                given = self.matrix(theta, moved)[:, 0]
                 given = given - given.mean()
                 size = float(np.linalg.norm(given))
-                likeness = float(given @ wanted) / size if size > 0 else 0.0
-                if likeness > best:
-                    best, found = likeness, late
-        if found < 0:
+                found = float(given @ wanted) / size if size > 0 else 0.0
+                likeness[late] = max(found, likeness.get(late, 0.0))
+        best = max(likeness, key=lambda late: likeness[late])
+        if not likeness[best] > 0:
             raise DataError(
                 "the pressure does not rise with the command",
                 channel=data.input,
                 remedy="choose the command with --input, and the pressure it makes with --output",
             )
-        return found
+        return best
 
     def _at(self, late: int, data: TrainingData, tracker: Tracker) -> tuple[float, Air]:
         """Return the error and the block found with a dead time in samples."""
@@ -185,17 +181,16 @@ class AirEstimator(SeparableEstimator):
         self, block: Air, data: TrainingData, tracker: Tracker, limits: Sequence[str]
     ) -> tuple[Air, float]:
         """Return the block with all parameters, and some limits, refined together; and its error."""
-        low, high = data.input_range
-        bottom, top = data.output_range
-        lags = self.bounds(data)
+        span, wide = np.ptp(data.input_range), np.ptp(data.output_range)
+        (quick, _, _), (slow, _, most) = self.bounds(data)
         times = np.log([block.filling_time, block.venting_time])
         limit = [getattr(block, name) for name in limits]
         start = np.array([block.gain, block.offset, block.hysteresis, *times, *limit])
-        reach = np.array([0.5 * block.gain, 0.5 * (high - low), 0.0, 0.0, 0.0])
-        reach = np.append(reach, np.full(len(limits), 0.25 * (top - bottom)))
+        reach = np.array(
+            [0.5 * block.gain, 0.5 * span, 0.0, 0.0, 0.0, *[0.25 * wide] * len(limits)]
+        )
         lower, upper = start - reach, start + reach
-        lower[2], upper[2] = 0.0, WIDEST * (high - low)
-        lower[3:5], upper[3:5] = lags[0][:2], lags[1][:2]
+        lower[2:5], upper[2:5] = (0.0, quick, quick), (most, slow, slow)
 
         def made(point: Array) -> Air:
             changed: dict[str, Any] = dict(zip(limits, point[5:].tolist(), strict=True))
@@ -217,10 +212,9 @@ class AirEstimator(SeparableEstimator):
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [log filling time, log venting time, hysteresis]."""
         step = data.sample_time or 1.0
-        longest = max(run.u.size for run in data.runs) * step
-        low, high = data.input_range
-        quick, slow = np.log(0.1 * step), np.log(longest)
-        return np.array([quick, quick, 0.0]), np.array([slow, slow, WIDEST * (high - low)])
+        quick, slow = np.log(0.1 * step), np.log(max(run.u.size for run in data.runs) * step)
+        widest = WIDEST * float(np.ptp(data.input_range))
+        return np.array([quick, quick, 0.0]), np.array([slow, slow, widest])
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return lags of a few speeds, without hysteresis and with some."""
@@ -230,33 +224,21 @@ class AirEstimator(SeparableEstimator):
 
     def unit(self, theta: Array, data: TrainingData) -> Air:
         """Return the block with a gain of 1, and neither offset nor limits nor dead time."""
-        return Air(
-            1.0,
-            0.0,
-            float(theta[2]),
-            float(np.exp(theta[0])),
-            float(np.exp(theta[1])),
-            0.0,
-            None,
-            None,
-            data.input_range,
-            self.starting_rule,
+        filling, venting = np.exp(theta[:2]).tolist()
+        rest: dict[str, Any] = {
+            "input_range": data.input_range,
+            "initial": self.starting_rule,
             **self.channels(data),
-        )
+        }
+        return Air(1.0, 0.0, float(theta[2]), filling, venting, **rest)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         unit = data.latest("unit", theta, lambda: self.unit(theta, data))
         return unit.simulate(run.history, sample_time=run.sample_time)[:, np.newaxis]
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Air:
-        gain = float(linear[0])
-        return replace(
-            self.unit(theta, data),
-            gain=gain,
-            offset=-offset / gain,
-            ambient=self.ambient,
-            supply=self.supply,
-        )
+        block = replace(self.unit(theta, data), ambient=self.ambient, supply=self.supply)
+        return replace(block, gain=float(linear[0]), offset=-offset / float(linear[0]))
 
 
 def delayed(data: TrainingData, late: int) -> TrainingData:

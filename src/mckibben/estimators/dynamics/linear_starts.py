@@ -1,25 +1,15 @@
-"""What linear estimators share: runs started as fitted, and covariances that stand coloured noise."""
+"""What linear estimators share: starts fitted with the rest, unless they explain the data alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Self
 
 import numpy as np
 
-from mckibben.arrays import Array
-from mckibben.blocks.base import Block
-from mckibben.blocks.dynamics.linear_start import LinearStart
-from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.core.data import Mask
 from mckibben.estimators.core.estimator import Estimator, Initial
-from mckibben.estimators.core.uncertainty import (
-    relative_sizes,
-    sensitivities,
-    simulate_all,
-    told_by_runs,
-)
 from mckibben.estimators.optimisers.tracker import Progress
 from mckibben.recording import Recording
 
@@ -64,47 +54,7 @@ class LinearEstimator(Estimator):
                 setattr(self, name, value)
         return self
 
-    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks where samples count, started by their rule."""
-        if self.initial != "fitted":
-            return simulate_all(blocks, data)
-        return np.array(
-            [
-                np.concatenate([started(block, run)[run.counts] for run in data.runs])
-                for block in blocks
-            ]
-        )
-
     def undetermined(self) -> tuple[int, ...]:
         """Return the places of what the recordings do not determine; the input's offset is chosen."""
         names = self.fitted.parameter_names
         return tuple(place for place in super().undetermined() if names[place] != "input offset")
-
-    def free_run_covariance(
-        self, block: Block, data: TrainingData, fixed: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return the condition and covariance of what was found by free-run errors; NaN where fixed.
-
-        The derivatives are those with every start solved for. Residuals may be coloured, and are taken
-        not to depend on the input; see `uncertainty`.
-        """
-        values = block.pack()
-        covariance = np.full((values.size, values.size), np.nan)
-        free = [place for place in range(values.size) if place not in fixed]
-        sizes = relative_sizes(values)
-        slopes = sensitivities(block, free, sizes[free], partial(self.free_runs, data=data))
-        if not np.isfinite(slopes).all():
-            return np.inf, covariance
-        residual = data.target - self.free_runs([block], data)[0]
-        condition, own = told_by_runs(slopes, residual, data.runs)
-        covariance[np.ix_(free, free)] = own * np.outer(sizes[free], sizes[free])
-        return condition, covariance
-
-
-def started(block: Block, run: Run) -> Array:
-    """Return the free-running output over a run from the state that explains it best, shape (n,)."""
-    assert isinstance(block, LinearStart)
-    inputs, outputs = run.inputs, np.empty((run.u.size, 1))
-    state = block.fitted_state(inputs, run.y, run.sample_time, run.counts)
-    block.bind(run.sample_time, state, inputs, outputs)()
-    return outputs[:, 0]

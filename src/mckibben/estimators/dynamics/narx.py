@@ -1,28 +1,47 @@
-"""What NARX estimators share: free-run refinement, and the check that the model stays within bounds."""
+"""Identification of NARX models: on one-step errors first, then on those of free runs.
+
+Terms of a polynomial are chosen by forward orthogonal least squares, one by one by how much of the
+output they explain; the hidden layer of a network is searched by variable projection. Both are then
+refined over ever longer free runs, and a model that leaves all bounds is refused.
+
+A free run feeds on its own outputs, so a parameter acts twice: y_t = f(y_{t-1}, ..., x_t; theta) gives
+dy_t/dtheta = df/dtheta + sum_k df/dy_{t-k} dy_{t-k}/dtheta. What else f looks at, past inputs and play
+operators, depends on no parameter, and is prepared once.
+
+Source: Chen, Billings and Luo, "Orthogonal least squares methods and their application to non-linear
+system identification", 1989 (error reduction ratio).
+"""
 
 from __future__ import annotations
 
 import warnings
-from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from itertools import pairwise
-from typing import Annotated, Any, ClassVar
+from itertools import combinations_with_replacement, pairwise
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.dynamics.narx import Narx
+from mckibben.blocks.dynamics.narx import (
+    Narx,
+    NarxNetwork,
+    NarxPolynomial,
+    activated,
+    products,
+)
+from mckibben.blocks.fields import vector
+from mckibben.blocks.kernels import kernel
 from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.estimator import SearchEstimator
+from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.core.estimator import Grid, SearchEstimator
 from mckibben.estimators.core.uncertainty import relative_sizes
-from mckibben.estimators.dynamics.narx_free_run import FreeRuns, Segment, free_run_errors, segments
-from mckibben.estimators.dynamics.narx_regressors import Lags
+from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
 
 BOUND = 1.0
 """How far beyond the data's range a stable model's output may go, relative to the range."""
@@ -34,24 +53,35 @@ MOST_REFINED = 2
 """Models refined over whole runs."""
 
 LEAST_GAIN = 1e-6
-"""Share of the squared error that a step of the refinement has to gain."""
+"""Share of the squared error that a step of a descent has to gain."""
 
-HORIZON_SAMPLES = 4000
-"""Samples looked at over such horizons, at most."""
+HORIZON_SAMPLES, SELECTION_SAMPLES, LAYER_SAMPLES = 4000, 5000, 3000
+"""Samples looked at, at most: over short horizons, to choose terms, and to find a hidden layer."""
 
-FAR = 10.0
-"""Errors are not counted as larger than this, relative to half the output's range."""
+LAYER_EVALUATIONS, DAMPING = 15, 1e-4
+"""Most evaluations of a search for a hidden layer, and damping of the weights behind it."""
+
+FAR, STEEPEST = 10.0, 1e6
+"""Errors, and their derivatives, are not counted as larger, relative to half the output's range."""
 
 HOLD = 1000
 """Samples for which inputs are held in the check of stability."""
 
+MOST_CANDIDATES = 2000
+"""Products of regressors that terms are chosen from."""
+
+DEPENDENT = 1e-10
+"""Share of a term left after taking the chosen ones out of it, below which it explains nothing new."""
+
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class NarxEstimator(SearchEstimator):
-    """An estimator of a NARX model.
+    """NARX model: one-step least squares, then free-run refinement.
 
     Parameters
     ----------
+    mapping : {"polynomial", "network"}
+        From regressors to the next output.
     output_lags, input_lags : int
         Past outputs, and inputs from `delay` samples ago on.
     delay : int
@@ -64,10 +94,35 @@ class NarxEstimator(SearchEstimator):
         Of the refinement.
     allow_unstable : bool
         Whether a model that leaves all bounds is returned, with a warning, instead of refused.
+    degree : int
+        Of a polynomial's products of regressors.
+    n_terms : int
+        Most terms of a polynomial; half and a quarter of them are tried too, and the best free run kept.
+    n_units : int
+        Units of a network's hidden layer.
+    activation : {"tanh", "wavelet"}
+        Of the units.
+    n_starts : int
+        Random hidden layers tried.
     """
 
+    title = "Polynomial NARX model"
+    purpose = "rate"
+    can = (
+        "Nonlinear dynamics by a polynomial of past inputs and outputs; terms chosen by "
+        "orthogonal least squares."
+    )
+    cannot = "Remembers only as far as its lags; no inverse."
+    caution = "a polynomial of past values leaves all bounds beyond them"
+    param_grid: ClassVar[Grid] = {
+        "output_lags": (1, 2),
+        "input_lags": (1, 2),
+        "n_terms": (8, 16),
+    }
     needs_time: ClassVar[bool] = True
+    effort: ClassVar[float] = 0.6
 
+    mapping: Literal["polynomial", "network"] = "polynomial"
     output_lags: Annotated[int, Interval(ge=1, le=20)] = 2
     input_lags: Annotated[int, Interval(ge=1, le=20)] = 2
     delay: Annotated[int, Interval(ge=0, le=50)] = 0
@@ -75,14 +130,11 @@ class NarxEstimator(SearchEstimator):
     refine: bool = True
     max_evaluations: Annotated[int, Interval(ge=1, le=10_000)] = 20
     allow_unstable: bool = False
-
-    def fields(self, lags: Lags, data: TrainingData) -> dict[str, Any]:
-        """Return the fields that all NARX blocks have."""
-        return lags.fields(data) | {"initial": self.starting_rule} | self.channels(data)
-
-    @abstractmethod
-    def candidates(self, lags: Lags, data: TrainingData, tracker: Tracker) -> list[Narx]:
-        """Return models fitted to one-step errors, the most promising first."""
+    degree: Annotated[int, Interval(ge=1, le=6)] = 3
+    n_terms: Annotated[int, Interval(ge=1, le=200)] = 16
+    n_units: Annotated[int, Interval(ge=1, le=100)] = 5
+    activation: Literal["tanh", "wavelet"] = "tanh"
+    n_starts: Annotated[int, Interval(ge=1, le=100)] = 3
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the best model that stays within bounds, and the data."""
@@ -91,42 +143,41 @@ class NarxEstimator(SearchEstimator):
             raise ModelError(
                 "a NARX model starts from the first measured output. Remedy: leave initial out."
             )
-        lags = Lags.of(data, self.output_lags, self.input_lags, self.delay, self.n_play)
-        started: list[list[Narx]] = []
+        found = self._polynomials if self.mapping == "polynomial" else self._networks
+        paths: list[list[Narx]] = []
         tried: list[tuple[float, Narx]] = []
 
-        def settle(found: list[Narx]) -> None:
+        def settle(path: list[Narx]) -> None:
             # what is refined last is best, if it stays within bounds
-            options = (m for m in reversed(found) if self.allow_unstable or stable(m, data))
+            options = (m for m in reversed(path) if self.allow_unstable or stable(m, data))
             best = next(options, None)
             if best is not None:
-                tried.append((rms(free_run_errors(best, data)), best))
+                tried.append((free_run_rmse(best, data), best))
 
         with tracker.searching():
-            for model in self.candidates(lags, data, tracker):
+            for model in found(self._fields(data), data, tracker):
                 if data.target.size <= model.n_parameters:
                     raise DataError(
                         f"{data.target.size} samples are too few for {model.n_parameters} parameters",
                         remedy="give longer recordings, or use fewer lags, terms or units",
                     )
-                started.append(found := [model])
+                paths.append(path := [model])
                 for horizon in HORIZONS if self.refine else ():
-                    found += self._refined(found[-1], horizon, data, tracker)[-1:]
-            started.sort(key=lambda found: rms(free_run_errors(found[-1], data)))
-            for found in started:
+                    path += self._refined(path[-1], horizon, data, tracker)[-1:]
+            paths.sort(key=lambda path: free_run_rmse(path[-1], data))
+            for path in paths:
                 if self.refine and len(tried) < MOST_REFINED:
-                    found += self._refined(found[-1], None, data, tracker)[1:]
-                settle(found)
+                    path += self._refined(path[-1], None, data, tracker)[1:]
+                settle(path)
         if tracker.interrupted and not tried:
-            for found in started:
-                settle(found)
+            for path in paths:
+                settle(path)
         if not tried:
             raise ModelError(
                 "every NARX model found leaves all bounds when it runs free. Remedy: use fewer terms "
                 "or units, n_play=3, or allow_unstable=true to get it nevertheless."
             )
-        cost, chosen = min(tried, key=lambda item: item[0])
-        tracker.best_cost = cost
+        tracker.best_cost, chosen = min(tried, key=lambda item: item[0])
         if not stable(chosen, data):
             warnings.warn(
                 "the NARX model leaves all bounds when its input is held or goes on: do not run it free",
@@ -134,6 +185,69 @@ class NarxEstimator(SearchEstimator):
                 stacklevel=4,
             )
         return chosen, data
+
+    def _fields(self, data: TrainingData) -> dict[str, Any]:
+        """Return the fields of all models tried; the scales bring the data to -1 to 1."""
+        (ul, uh), (yl, yh) = data.input_range, data.output_range
+        return {
+            "output_lags": self.output_lags,
+            "input_lags": self.input_lags,
+            "delay": self.delay,
+            "thresholds": vector(np.arange(1, self.n_play + 1) / (self.n_play + 1)),
+            "input_scale": (0.5 * (ul + uh), 0.5 * (uh - ul)),
+            "output_scale": (0.5 * (yl + yh), 0.5 * (yh - yl)),
+            "sample_time": data.sample_time,
+            "initial": self.starting_rule,
+            **self.channels(data),
+        }
+
+    def _polynomials(
+        self, fields: Mapping[str, Any], data: TrainingData, tracker: Tracker
+    ) -> list[Narx]:
+        """Return polynomials of the most telling terms: all that are allowed, half, and a quarter."""
+        del tracker
+        x, y = one_step_pairs(fields, data, SELECTION_SAMPLES)
+        terms = tuple(
+            term
+            for order in range(self.degree + 1)
+            for term in combinations_with_replacement(range(x.shape[1]), order)
+        )
+        if len(terms) > MOST_CANDIDATES:
+            raise ModelError(
+                f"{len(terms)} products of {x.shape[1]} regressors are too many to choose from. "
+                "Remedy: use a lower degree, or fewer lags."
+            )
+        columns = products(x, terms)
+        order = select(columns, y, self.n_terms)
+        models: list[Narx] = []
+        for size in sorted({max(len(order) // part, 1) for part in (1, 2, 4)}, reverse=True):
+            weights = np.linalg.lstsq(columns[:, order[:size]], y, rcond=1e-12)[0]
+            chosen = tuple(terms[index] for index in order[:size])
+            models.append(NarxPolynomial(terms=chosen, weights=vector(weights), **fields))
+        return models
+
+    def _networks(
+        self, fields: Mapping[str, Any], data: TrainingData, tracker: Tracker
+    ) -> list[Narx]:
+        """Return networks fitted to one-step errors by variable projection, one a start."""
+        x, y = one_step_pairs(fields, data, LAYER_SAMPLES)
+        layers = HiddenLayers(
+            x, y, {"activation": self.activation, **fields}, self.n_units, tracker
+        )
+        rng = np.random.default_rng(self.seed)
+        models: list[Narx] = []
+        for _ in range(self.n_starts):
+            first = rng.normal(0.0, 1.0, self.n_units * (x.shape[1] + 1))
+            *_, (layer, _) = trust_region(
+                layers.errors,
+                layers.slopes,
+                first,
+                scale=np.ones(first.size),
+                least_gain=LEAST_GAIN,
+                max_evaluations=LAYER_EVALUATIONS,
+            )
+            models.append(layers.solved(layer)[0])
+        return models
 
     def _refined(
         self, model: Narx, horizon: int | None, data: TrainingData, tracker: Tracker
@@ -143,15 +257,14 @@ class NarxEstimator(SearchEstimator):
         A model that is unstable when it runs free has no slope to follow there; over short horizons,
         each started from what was measured, it has.
         """
-        pieces = some(segments(model, data, horizon), horizon)
-        start = model.pack()
+        pieces, start = stretches(model, data, horizon), model.pack()
         # the samples before a stretch may be measured nowhere, or seldom
         if sum(int(piece.counts.sum()) for piece in pieces) < start.size:
             return []
-        runs = FreeRuns(model, data.sample_time, pieces)
+        runs = FreeRuns(model, pieces, tracker)
         path = trust_region(
-            partial(_errors, model, runs, tracker),
-            partial(_slopes, model, runs),
+            runs.errors,
+            runs.slopes,
             start,
             scale=relative_sizes(start),
             least_gain=LEAST_GAIN,
@@ -160,29 +273,301 @@ class NarxEstimator(SearchEstimator):
         return [model.unpack(parameters) for parameters, _ in path]
 
 
-def _errors(model: Narx, runs: FreeRuns, tracker: Tracker, parameters: Array) -> Array:
-    """Return errors relative to half the output's range, none counted as larger than `FAR`."""
-    half = model.output_scale[1]
-    errors = runs.errors(model.unpack(parameters)) / half
-    errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
-    tracker.saw(parameters, rms(errors) * half)
-    return errors
+NARX_NETWORK = preset(
+    NarxEstimator,
+    "NARX model with one hidden layer: linear part first, units on top, then free-run refinement.",
+    title="NARX network",
+    can="Nonlinear dynamics by one hidden layer.",
+    cannot="Slow to fit; no inverse; nothing keeps it sensible beyond the data.",
+    caution="a network without physics is arbitrary beyond them",
+    param_grid={"output_lags": (1, 2), "n_units": (3, 5)},
+    mapping="network",
+    effort=2.0,
+)
+
+NARX_PLAY = preset(
+    NarxEstimator,
+    (
+        "Polynomial NARX model with play operators among its regressors, so that it keeps its"
+        " branch."
+    ),
+    title="Polynomial NARX model with play operators",
+    can=(
+        "Polynomial dynamics with play operators among the regressors: hysteresis and rate in one."
+    ),
+    cannot="No inverse.",
+    param_grid={"n_play": (3, 6), "n_terms": (8, 16)},
+    output_lags=1,
+    input_lags=1,
+    n_play=6,
+    effort=0.2,
+)
 
 
-def _slopes(model: Narx, runs: FreeRuns, parameters: Array) -> Array:
-    """Return the derivatives of `_errors`."""
-    here, half = model.unpack(parameters), model.output_scale[1]
-    slopes = runs.slopes(here) / half
-    slopes[~(np.abs(runs.errors(here)) < FAR * half)] = 0.0
-    return slopes
+def scaled(values: Array, scale: tuple[float, float]) -> Array:
+    """Return values less a centre, over half a range."""
+    return np.asarray((values - scale[0]) / scale[1])
 
 
-def some(pieces: list[Segment], horizon: int | None) -> list[Segment]:
-    """Return stretches spread evenly over all, as many as short horizons need; all of whole runs."""
+def driven(model: Narx, run: Run) -> Array:
+    """Return the regressors over a run that depend on inputs alone: past ones, and operators."""
+    x = scaled(run.u, model.input_scale)
+    ago = np.arange(model.delay, model.delay + model.input_lags)
+    past = x[np.maximum(np.arange(x.size)[:, np.newaxis] - ago, 0)]
+    return np.column_stack([past, operators(model, x)])
+
+
+def operators(model: Narx, x: Array) -> Array:
+    """Return the play operators over a scaled input, shape (n, number of operators)."""
+    rule = "virgin" if model.initial == "virgin" else "first_sample"
+    return play_operators(x, np.array(model.thresholds), rule)
+
+
+def one_step_pairs(fields: Mapping[str, Any], data: TrainingData, most: int) -> tuple[Array, Array]:
+    """Return regressors and next outputs at so many samples, spread evenly, where all involved count."""
+    model = NarxPolynomial(terms=(), weights=(), **fields)
+    lags = 1 + np.arange(model.output_lags)
+    tables, targets = [], []
+    for run in data.runs:
+        rows = np.arange(max(model.output_lags, model.past_inputs - 1), run.u.size)
+        past = rows[:, np.newaxis] - lags
+        rows, past = (
+            part[run.counts[rows] & run.counts[past].all(axis=1)] for part in (rows, past)
+        )
+        y = scaled(run.y, model.output_scale)
+        tables.append(np.column_stack([y[past], driven(model, run)[rows]]))
+        targets.append(y[rows])
+    target = np.concatenate(targets)
+    keep = np.linspace(0, target.size - 1, min(target.size, most)).round().astype(int)
+    return np.concatenate(tables)[keep], target[keep]
+
+
+def select(columns: Array, target: Array, most: int) -> list[int]:
+    """Return columns in the order in which they explain the target, at most so many.
+
+    Parameters
+    ----------
+    columns : array, shape (n, k)
+        Candidates.
+    target : array, shape (n,)
+    most : int
+        Columns to choose.
+    """
+    left, rest = columns.copy(), target.copy()
+    power = np.maximum((columns**2).sum(axis=0), 1e-300)
+    chosen: list[int] = []
+    for _ in range(min(most, columns.shape[1])):
+        size = (left**2).sum(axis=0)
+        usable = size > DEPENDENT * power
+        usable[chosen] = False
+        if not usable.any():
+            break
+        explained = np.where(usable, (left.T @ rest) ** 2 / np.where(usable, size, 1.0), -1.0)
+        best = int(np.argmax(explained))
+        direction = left[:, best] / np.sqrt(size[best])
+        rest = rest - direction * (direction @ rest)
+        left = left - np.outer(direction, direction @ left)
+        chosen.append(best)
+    return chosen
+
+
+@dataclass(frozen=True)
+class HiddenLayers:
+    """One-step errors of networks by their hidden layers; all behind these is solved for.
+
+    Parameters
+    ----------
+    x, y : arrays, shapes (n, k) and (n,)
+        Regressors, and the outputs to give.
+    fields : mapping
+        Of the networks.
+    units : int
+        Of the hidden layer.
+    tracker : Tracker
+        Counts evaluations.
+    """
+
+    x: Array
+    y: Array
+    fields: Mapping[str, Any]
+    units: int
+    tracker: Tracker
+
+    def solved(self, layer: Array) -> tuple[NarxNetwork, Array]:
+        """Return the best network of a hidden layer, shape (units * (k + 1),), and its errors.
+
+        Behind the errors is the damping of the weights solved for: neighbouring samples make the
+        regressors nearly dependent.
+        """
+        rows = layer.reshape(self.units, -1)
+        columns = self._columns(rows)
+        target = np.append(self.y, np.zeros(len(columns) - self.y.size))
+        weights = np.linalg.lstsq(columns, target, rcond=None)[0]
+        bias, linear, read = np.split(weights, [1, 1 + self.x.shape[1]])
+        hidden = vector(np.column_stack([rows, read]).ravel())
+        network = NarxNetwork(
+            bias=float(bias[0]), linear=vector(linear), hidden=hidden, **self.fields
+        )
+        return network, columns @ weights - target
+
+    def errors(self, layer: Array) -> Array:
+        """Return the errors."""
+        self.tracker.evaluations += 1
+        return self.solved(layer)[1]
+
+    def slopes(self, layer: Array) -> Array:
+        """Return the derivatives of the errors, less what the weights would take up (Kaufman)."""
+        n, k = self.x.shape
+        columns = self._columns(layer.reshape(self.units, -1))
+        by_all, _ = self.solved(layer)[0].slopes(self.x)
+        moved = np.zeros((len(columns), layer.size))
+        moved[:n] = by_all[:, 1 + k :].reshape(n, self.units, -1)[:, :, :-1].reshape(n, -1)
+        taken = np.linalg.qr(columns)[0]
+        return np.asarray(moved - taken @ (taken.T @ moved))
+
+    def _columns(self, rows: Array) -> Array:
+        """Return what the weights multiply: a constant, the regressors and the units; then damping."""
+        a, _ = activated(self.fields["activation"], self.x @ rows[:, :-1].T + rows[:, -1])
+        columns = np.column_stack([np.ones(len(a)), self.x, a])
+        return np.vstack([columns, DAMPING * np.eye(columns.shape[1])])
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch of a run: the state before it, outputs, which of them count, and what drives them.
+
+    ``regressors`` are those that depend on inputs alone.
+    """
+
+    state: Array
+    inputs: Array
+    outputs: Array
+    counts: Mask
+    regressors: Array
+
+    @classmethod
+    def of(cls, run: Run, samples: slice, state: Array, regressors: Array) -> Stretch:
+        """Return the stretch of some samples of a run, of which all regressors are given."""
+        given = np.ascontiguousarray(run.driven[samples])
+        return cls(state, given, run.y[samples], run.counts[samples], regressors[samples])
+
+
+def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stretch]:
+    """Return stretches of so many samples, each started from measured outputs; or whole runs.
+
+    Of short ones no more than `HORIZON_SAMPLES` take, spread evenly. A whole run whose first sample does
+    not count starts at rest, since its output may not be looked at.
+    """
+    found = []
+    n, m = model.output_lags, model.past_inputs
+    for run in data.runs:
+        regressors = driven(model, run)
+        if horizon is None:
+            state = model.state_at(run.driven[0], run.y[:1]) if run.counts[0] else None
+            if state is None:
+                state = model.initial_state(run.driven[0])
+            found.append(Stretch.of(run, slice(None), state, regressors))
+            continue
+        x, y = scaled(run.u, model.input_scale), scaled(run.y, model.output_scale)
+        played = operators(model, x)
+        for start in range(max(n, m, 1), run.u.size, horizon):
+            before = start - 1 - np.arange(max(n, m))
+            if run.counts[before[:n]].all():
+                state = np.concatenate([y[before[:n]], x[before[:m]], played[start - 1]])
+                samples = slice(start, start + horizon)
+                found.append(Stretch.of(run, samples, state, regressors))
     if horizon is None:
-        return pieces
-    n = min(len(pieces), -(-HORIZON_SAMPLES // horizon))
-    return [pieces[k] for k in np.linspace(0, len(pieces) - 1, n).round().astype(int)]
+        return found
+    few = min(len(found), -(-HORIZON_SAMPLES // horizon))
+    return [found[k] for k in np.linspace(0, len(found) - 1, few).round().astype(int)]
+
+
+@kernel
+def feed_back(slopes: Array, by_past: Array) -> None:
+    """Turn derivatives of f by its parameters into those of its free run, in place.
+
+    Shapes: slopes (n, p); by_past (n, lags), the derivatives by past outputs, newest first, 0 where
+    these are given.
+    """
+    for t in range(slopes.shape[0]):
+        for k in range(min(t, by_past.shape[1])):
+            share = by_past[t, k]
+            if share != 0.0:
+                for j in range(slopes.shape[1]):
+                    slopes[t, j] += share * slopes[t - 1 - k, j]
+
+
+class FreeRuns:
+    """Free runs over stretches of data, of models that differ in their parameters alone.
+
+    Parameters
+    ----------
+    model : Narx
+        One of them.
+    stretches : sequence of Stretch
+        One or more; their outputs follow one another.
+    tracker : Tracker
+        Counts evaluations.
+    """
+
+    def __init__(self, model: Narx, stretches: Sequence[Stretch], tracker: Tracker) -> None:
+        self.model, self.stretches, self.tracker = model, stretches, tracker
+        self.counts = np.concatenate([each.counts for each in stretches])
+        self.target = np.concatenate([each.outputs for each in stretches])[self.counts]
+        self._driven = np.concatenate([each.regressors for each in stretches])
+        # outputs of all stretches, each behind the measured ones before it, the oldest first
+        lags, lengths = model.output_lags, [each.counts.size for each in stretches]
+        numbers = np.repeat(np.arange(len(lengths)), lengths)
+        self._own = np.arange(numbers.size) + lags * (1 + numbers)
+        self._past = self._own[:, np.newaxis] - 1 - np.arange(lags)
+        self._behind = np.full(numbers.size + lags * len(lengths), np.nan)
+        self._behind[np.delete(np.arange(self._behind.size), self._own)] = np.concatenate(
+            [each.state[:lags][::-1] for each in stretches]
+        )
+
+    def outputs(self, model: Narx) -> Array:
+        """Return the outputs over all stretches, whether they count or not, shape (n,)."""
+        coefficients = model.coefficients(model.sample_time)
+        outputs = np.empty((self.counts.size, 1))
+        stop = 0
+        for each in self.stretches:
+            start, stop = stop, stop + each.counts.size
+            model.kernel.batch(coefficients, each.state.copy(), each.inputs, outputs[start:stop])
+        return outputs[:, 0]
+
+    def errors(self, theta: Array) -> Array:
+        """Return the errors at samples that count, relative to half the output's range."""
+        half = self.model.output_scale[1]
+        errors = (self.outputs(self.model.unpack(theta))[self.counts] - self.target) / half
+        errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
+        self.tracker.saw(theta, half * float(np.sqrt(np.mean(errors**2))))
+        return errors
+
+    def slopes(self, theta: Array) -> Array:
+        """Return the derivatives of the errors, shape (errors, parameters)."""
+        model = self.model.unpack(theta)
+        y = scaled(self.outputs(model), model.output_scale)
+        behind = self._behind.copy()
+        behind[self._own] = y
+        with np.errstate(over="ignore", invalid="ignore"):
+            regressors = np.column_stack([behind[self._past], self._driven])
+            by_parameters, by_past = model.slopes(regressors)
+            by_past[np.isfinite(self._behind)[self._past]] = (
+                0.0  # measured, whatever the parameters
+            )
+            feed_back(by_parameters, by_past)
+        slopes = by_parameters[self.counts]
+        errors = y[self.counts] - scaled(self.target, model.output_scale)
+        slopes[~((np.abs(slopes).max(axis=1) < STEEPEST) & (np.abs(errors) < FAR))] = 0.0
+        return slopes
+
+
+def free_run_rmse(model: Narx, data: TrainingData) -> float:
+    """Return the RMSE of free runs, each started where it was measured; infinite where it overflows."""
+    runs = FreeRuns(model, stretches(model, data, None), Tracker())
+    with np.errstate(over="ignore", invalid="ignore"):
+        value = float(np.sqrt(np.mean((runs.outputs(model)[runs.counts] - runs.target) ** 2)))
+    return value if np.isfinite(value) else np.inf
 
 
 def stable(model: Narx, data: TrainingData) -> bool:
@@ -204,10 +589,3 @@ def stable(model: Narx, data: TrainingData) -> bool:
         if not np.isfinite(outputs).all() or np.abs(outputs - centre).max() > most:
             return False
     return True
-
-
-def rms(errors: Array) -> float:
-    """Return the root mean square, infinite where it overflows."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        value = float(np.sqrt(np.mean(errors**2)))
-    return value if np.isfinite(value) else np.inf

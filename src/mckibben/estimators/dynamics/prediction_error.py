@@ -17,7 +17,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.dynamics.linear_start import known_starts
+from mckibben.blocks.dynamics.starts import known_starts
 from mckibben.estimators.core.data import Run
 from mckibben.estimators.dynamics.linear_polynomials import Orders, Polynomials, Start, errors
 from mckibben.estimators.dynamics.linear_stability import (

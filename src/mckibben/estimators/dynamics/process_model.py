@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge
@@ -12,11 +12,13 @@ from annotated_types import Ge
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import LONGEST_DELAY, ProcessModel
+from mckibben.blocks.dynamics.starts import free_responses
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.core.uncertainty import covariance_of
 from mckibben.estimators.dynamics.linear_starts import LinearEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.presets import preset
+from mckibben.presets import Preset, preset
 
 Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 
@@ -62,7 +64,8 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
         """Return the condition and covariance from free-run errors; the input's offset is set."""
-        return self.free_run_covariance(block, data, [*at_bounds, block.n_parameters - 2])
+        fixed = [*at_bounds, block.n_parameters - 2]
+        return covariance_of(block, data, residual, fixed, self.free_runs)
 
     def undetermined(self) -> tuple[int, ...]:
         """Return also a gain, a time constant or a zero within two standard errors of 0.
@@ -120,18 +123,13 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
             **self.channels(data),
         )
 
-    def _units(self, theta: Array, data: TrainingData) -> tuple[ProcessModel, ProcessModel]:
-        """Return the model without zero, and with one."""
-        unit = self.unit(theta, data)
-        return unit, replace(unit, zero_time=1.0)
-
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the response to the input, and, with a zero, to its derivative."""
-        unit, with_zero = data.latest("units", theta, lambda: self._units(theta, data))
-        step = run.sample_time
-        columns = [unit.simulate(run.history, sample_time=step)]
+        unit = data.latest("unit", theta, lambda: self.unit(theta, data))
+        columns = [unit.simulate(run.history, sample_time=run.sample_time)]
         if "Z" in self.structure:
-            whole = with_zero.simulate(run.history, sample_time=step)
+            zero = data.latest("zero", theta, lambda: replace(unit, zero_time=1.0))
+            whole = zero.simulate(run.history, sample_time=run.sample_time)
             columns.append(whole - columns[0])
         return np.column_stack(columns)
 
@@ -142,65 +140,37 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         columns = super().matrix(theta, data)
         if self.initial != "fitted":
             return columns
-        unit = self._units(theta, data)[0]
-        starts = [unit.free_responses(run.u.size, run.sample_time)[run.counts] for run in data.runs]
+        unit = data.latest("unit", theta, lambda: self.unit(theta, data))
+        places = range(unit.n_fitted)
+        starts = [
+            free_responses(unit, run.inputs, run.sample_time, places)[run.counts]
+            for run in data.runs
+        ]
         return np.column_stack([columns, block_diag(*starts)])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> ProcessModel:
-        gain = float(linear[0])
-        zero = float(linear[1] / gain) if "Z" in self.structure and gain != 0 else None
-        if "Z" in self.structure and zero is None:
-            zero = 0.0
+        gain, zero = float(linear[0]), None
+        if "Z" in self.structure:
+            zero = float(linear[1] / gain) if gain != 0 else 0.0
         return replace(self.unit(theta, data, gain), zero_time=zero, output_offset=offset)
 
 
-P1 = preset(
-    ProcessModelEstimator,
-    "One lag.",
-    title="Process model: one lag (P1)",
-    structure="P1",
-)
+def _structure(name: Structure, poles: str, **chosen: Any) -> Preset:
+    """Return the estimator of one structure."""
+    title = f"Process model: {poles} ({name})"
+    about = f"{poles.capitalize()}."
+    return preset(ProcessModelEstimator, about, title=title, structure=name, **chosen)
 
-P1Z = preset(
-    ProcessModelEstimator,
-    "One lag and a zero.",
-    title="Process model: one lag and a zero (P1Z)",
-    structure="P1Z",
-)
 
-P2 = preset(
-    ProcessModelEstimator,
-    "Two lags.",
-    title="Process model: two lags (P2)",
-    structure="P2",
-)
-
-P2U = preset(
-    ProcessModelEstimator,
-    "Two poles that may oscillate.",
-    title="Process model: oscillating poles (P2U)",
-    structure="P2U",
-)
-
-P2UZ = preset(
-    ProcessModelEstimator,
-    "Two poles that may oscillate, and a zero.",
-    title="Process model: oscillating poles and a zero (P2UZ)",
+P1 = _structure("P1", "one lag")
+P1Z = _structure("P1Z", "one lag and a zero")
+P2 = _structure("P2", "two lags")
+P2Z = _structure("P2Z", "two lags and a zero")
+P2U = _structure("P2U", "oscillating poles")
+P2UZ = _structure(
+    "P2UZ",
+    "oscillating poles and a zero",
     can="Two poles that may oscillate, and a zero: best of the linear ones on coiled muscles.",
     quick=True,
-    structure="P2UZ",
 )
-
-P2Z = preset(
-    ProcessModelEstimator,
-    "Two lags and a zero.",
-    title="Process model: two lags and a zero (P2Z)",
-    structure="P2Z",
-)
-
-P3 = preset(
-    ProcessModelEstimator,
-    "Three lags.",
-    title="Process model: three lags (P3)",
-    structure="P3",
-)
+P3 = _structure("P3", "three lags")

@@ -18,6 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.state_network import SETTLING, SETTLING_STEP, StateNetwork
 from mckibben.blocks.fields import rows
+from mckibben.blocks.kernels import summing_kernel
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
@@ -28,7 +29,6 @@ from mckibben.estimators.dynamics.linear_oscillator import (
     linear_oscillator,
 )
 from mckibben.estimators.dynamics.paths import averaged, paths
-from mckibben.estimators.dynamics.state_network_slopes import follow_network
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
@@ -44,6 +44,12 @@ UNIT, FORCED, READ = 0.7, 0.05, 0.01
 
 LEAST_GAIN = 1e-7
 """Share of the squared error that a step gains, or the descent has arrived."""
+
+RUNGE_KUTTA = ((0.0, 1.0, 0.5), (0.5, 2.0, 0.5), (0.5, 2.0, 1.0), (1.0, 1.0, 0.0))
+"""Of every stage how far into the step it is, the weight of its rates, and how far these then lead."""
+
+LARGEST = 1e6
+"""State, in units of the output's scale, that is out of all bounds."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -147,9 +153,7 @@ class StateNetworkEstimator(SearchEstimator):
 
     def search(self, template: StateNetwork, data: TrainingData, tracker: Tracker) -> NetworkRuns:
         """Return the errors of networks of one structure on all runs."""
-        warm = self._warm if self.periodic else None
-        at_rest = not self.periodic and self.starting_rule == "first_sample"
-        return NetworkRuns(template, data, warm, at_rest, tracker)
+        return NetworkRuns(template, data, self._warm if self.periodic else None, tracker)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the outputs of blocks where samples count: in steady state, of periodic recordings."""
@@ -181,61 +185,169 @@ class NetworkRuns:
     data : TrainingData
     warm : int or None
         Samples before those of a period; None where runs are not periodic.
-    at_rest : bool
-        Whether runs begin as after their first input has long been held, instead of with zeros.
+        Others begin as after their first input has long been held, unless the template's start is
+        virgin: all zeros.
     tracker : Tracker
         Told of the best.
     """
 
     def __init__(
-        self,
-        template: StateNetwork,
-        data: TrainingData,
-        warm: int | None,
-        at_rest: bool,
-        tracker: Tracker,
+        self, template: StateNetwork, data: TrainingData, warm: int | None, tracker: Tracker
     ) -> None:
         self.template, self.target, self.tracker = template, data.target, tracker
-        self.at_rest, self.rate = at_rest, template.rate * (data.sample_time or 1.0)
-        self.paths = paths(data, template.substeps, warm, at_rest)
+        self.at_rest = warm is None and template.initial == "first_sample"
+        self.rate = template.rate * (data.sample_time or 1.0)
+        self.paths = paths(data, template.substeps, warm, self.at_rest)
 
     def errors(self, theta: Array) -> Array:
         """Return the errors where samples count; infinite where a run leaves all bounds."""
-        found = self.outputs(theta, slopes=True) - self.target
-        self.tracker.saw(theta, float(np.sqrt(np.mean(found**2))))
-        return found
+        found = self._followed(theta, theta.size)
+        self._slopes = found[:, 1:]
+        errors = found[:, 0] - self.target
+        self.tracker.saw(theta, float(np.sqrt(np.mean(errors**2))))
+        return np.asarray(errors)
 
     def slopes(self, theta: Array) -> Array:
         """Return the derivatives where errors were last asked for."""
         del theta
         return self._slopes
 
-    def outputs(self, theta: Array, slopes: bool = False) -> Array:
-        """Return the outputs where samples count; note their derivatives, if wanted."""
+    def outputs(self, theta: Array) -> Array:
+        """Return the outputs where samples count."""
+        return self._followed(theta, 0)[:, 0]
+
+    def _followed(self, theta: Array, p: int) -> Array:
+        """Return the outputs where samples count, and their derivatives by p weights, (n, 1 + p)."""
         model = self.template
         n, units = len(model.linear), len(model.hidden)
-        sizes = n * (n + 2), units * (n + 2)
-        weights: Any = np.split(theta, np.cumsum(sizes))
+        parts: Any = np.split(theta, np.cumsum([n * (n + 2), units * (n + 2)]))
         linear, hidden, readout = (
-            np.ascontiguousarray(part.reshape(count, -1))
-            for part, count in zip(weights, (n, units, n), strict=True)
+            part.reshape(k, -1) for part, k in zip(parts, (n, units, n), strict=True)
         )
-        found, tables = [], []
+        found = []
         for path in self.paths:
-            samples = path.run.u.size
-            given, table = np.empty(samples), np.empty((samples if slopes else 0, theta.size))
+            given = np.empty((path.run.u.size, 1 + p))
             h, u = self.rate / path.every, (path.inputs - model.input_offset) / model.input_scale
-            state, moved = np.zeros(n), np.zeros((n, theta.size))
+            state = np.zeros((n, 1 + p))
             if self.at_rest:
-                held, last = np.full(1 + SETTLING, u[0]), (np.empty(1), np.empty((1, theta.size)))
+                held, last = np.full(1 + SETTLING, u[0]), np.empty((1, 1 + p))
                 follow_network(
-                    linear, hidden, readout, SETTLING_STEP, state, moved, held, SETTLING, 0, *last
+                    linear, hidden, readout, SETTLING_STEP, state, held, SETTLING, 0, last
                 )
             along = (u, path.every, path.skipped)
-            ended = follow_network(linear, hidden, readout, h, state, moved, *along, given, table)
-            if not ended or not np.isfinite(table).all():
-                return np.full(self.target.size, np.inf)
-            found.append(given[path.run.counts])
-            tables.append(table[path.run.counts] if slopes else table)
-        self._slopes = model.output_scale * np.concatenate(tables)
-        return np.asarray(model.output_offset + model.output_scale * np.concatenate(found))
+            ended = follow_network(linear, hidden, readout, h, state, *along, given)
+            if not ended or not np.isfinite(given).all():
+                return np.full((self.target.size, 1 + p), np.inf)
+            found.append(model.output_scale * given[path.run.counts])
+        together = np.concatenate(found)
+        together[:, 0] += model.output_offset
+        return together
+
+
+@summing_kernel
+def rates(
+    linear: Array, hidden: Array, readout: Array, x: Array, known: Array, act: Array, found: Array
+) -> None:
+    """Fill in x', in units of the rate, and its derivatives by the weights.
+
+    Parameters
+    ----------
+    linear, hidden, readout : arrays, shapes (n, n + 2), (units, n + 2) and (n, units)
+    x : array, shape (n, 1 + p)
+        States, and their derivatives by the weights, row by row; p may be 0.
+    known : array, shape (n + 2,)
+        States, the input and 1; the states are filled in here.
+    act : array, shape (units,)
+        Scratch.
+    found : array, shape (n, 1 + p)
+    """
+    n, width = linear.shape
+    units, p = hidden.shape[0], x.shape[1] - 1
+    for d in range(n):
+        known[d] = x[d, 0]
+    for j in range(units):
+        s = 0.0
+        for e in range(width):
+            s += hidden[j, e] * known[e]
+        act[j] = np.tanh(s)
+    for d in range(n):
+        own = found[d]
+        for i in range(1 + p):
+            own[i] = 0.0
+        for e in range(width):
+            own[0] += linear[d, e] * known[e]
+        for j in range(units):
+            own[0] += readout[d, j] * act[j]
+        if p == 0:
+            continue
+        for e in range(n):
+            share = linear[d, e]
+            for j in range(units):
+                share += readout[d, j] * (1.0 - act[j] * act[j]) * hidden[j, e]
+            for i in range(1, 1 + p):
+                own[i] += share * x[e, i]
+        for e in range(width):
+            own[1 + d * width + e] += known[e]
+        for j in range(units):
+            share = readout[d, j] * (1.0 - act[j] * act[j])
+            for e in range(width):
+                own[1 + (n + j) * width + e] += share * known[e]
+            own[1 + (n + units) * width + d * units + j] += act[j]
+
+
+@summing_kernel
+def follow_network(
+    linear: Array,
+    hidden: Array,
+    readout: Array,
+    h: float,
+    state: Array,
+    inputs: Array,
+    every: int,
+    skipped: int,
+    found: Array,
+) -> bool:
+    """Run a network over inputs joined by straight lines, one Runge-Kutta step each.
+
+    Parameters
+    ----------
+    linear, hidden, readout : arrays
+        As of `rates`.
+    h : float
+        Step by rate.
+    state : array, shape (n, 1 + p)
+        At the first input, with its derivatives by the weights; changed.
+    inputs : array, shape (1 + every * (skipped + samples),)
+        Less their offset, by their scale.
+    every, skipped : int
+        Steps from sample to sample, and samples before the first that is wanted.
+    found : array, shape (samples, 1 + p)
+        Filled with the first state at every sample, and its derivatives.
+
+    Returns
+    -------
+    bool
+        Whether it came to the end: a state that leaves all bounds ends it.
+    """
+    n, columns = state.shape
+    at, rate, total = state.copy(), np.zeros((n, columns)), np.zeros((n, columns))
+    known, act = np.ones(linear.shape[1]), np.zeros(hidden.shape[0])
+    for t in range(inputs.size - 1):
+        rise = inputs[t + 1] - inputs[t]
+        for way, weight, ahead in RUNGE_KUTTA:
+            known[n] = inputs[t] + way * rise
+            rates(linear, hidden, readout, at, known, act, rate)
+            for d in range(n):
+                for i in range(columns):
+                    total[d, i] += weight * rate[d, i]
+                    at[d, i] = state[d, i] + ahead * h * rate[d, i]
+        for d in range(n):
+            for i in range(columns):
+                state[d, i] += h / 6.0 * total[d, i]
+                at[d, i], total[d, i] = state[d, i], 0.0
+            if not abs(state[d, 0]) < LARGEST:
+                return False
+        k = (t + 1) // every - skipped - 1
+        if (t + 1) % every == 0 and k >= 0:
+            found[k] = state[0]
+    return True

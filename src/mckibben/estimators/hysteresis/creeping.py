@@ -17,9 +17,7 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.creep import Creep, creep_step
-from mckibben.blocks.dynamics.creep_start import begun_places, begun_state
 from mckibben.blocks.fields import Channel, vector
-from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import (
@@ -27,7 +25,6 @@ from mckibben.estimators.core.separable import (
     SEARCH_SAMPLES,
     SeparableEstimator,
 )
-from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.optimisers.tracker import Tracker
 
 FASTEST, SLOWEST = 3.0, 3.0
@@ -166,27 +163,6 @@ class CreepingEstimator(SeparableEstimator):
         columns = self.begun(theta, run, data) * left
         by_element = columns.reshape(len(columns), -1, self.n_creep).sum(axis=1)
         return np.asarray(by_element * elapsed(run)[:, np.newaxis] / taus)
-
-    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks where samples count, with creep begun as told."""
-        return np.array([self._free_run(block, data) for block in blocks])
-
-    @staticmethod
-    def _free_run(block: Block, data: TrainingData) -> Array:
-        if not begun_places(block):
-            return simulate_all([block], data)[0]
-        found = []
-        for run in data.runs:
-            before = run.history.size - run.u.size
-            y = np.concatenate([np.zeros(before), run.y])
-            counts = np.concatenate([np.zeros(before, dtype=bool), run.counts])
-            state = block.initial_state(run.inputs[0])
-            state = begun_state(block, state, run.inputs, y, run.sample_time, counts)
-            outputs = run_many(
-                [block], run.inputs, sample_time=run.sample_time, initial=tuple(state)
-            )
-            found.append(outputs[0, counts, 0])
-        return np.concatenate(found)
 
     def tail(self, theta: Array) -> tuple[Array, Array]:
         """Return time constants and compliances as they are searched."""

@@ -9,7 +9,6 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.estimators.dynamics.narx_network import NarxNetworkEstimator
 from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.papers.field_models.published import THRESHOLDS
 from mckibben.registry import load
@@ -41,7 +40,7 @@ def published(seed: int) -> dict[str, Estimator]:
     Eqs. (14) and (15).
     """
     return {
-        "NARX": NarxNetworkEstimator(
+        "NARX": load("estimators", "narx-network")(
             n_units=10, delay=1, refine=False, allow_unstable=True, n_starts=5, seed=seed
         ),
         "Box-Jenkins": load("estimators", "bj")(lags=(0, 2), initial="first_sample", seed=seed),

@@ -112,11 +112,11 @@ def allowed(n: int, rows: Array, path: Array, t: int, at_any_rate: bool) -> bool
     for turn in range(2):  # changes first: the range is what counts in the end
         for i in range(m):
             row = rows[i * width : (i + 1) * width]
-            k = own_place(row)
-            if k >= 0 and int(row[0]) == 1 - turn and not (at_any_rate and turn == 0):
+            own = own_place(row)
+            if own >= 0 and int(row[0]) == 1 - turn and not (at_any_rate and turn == 0):
                 over = weighed(row, path, t) - row[1]
                 if over > 0.0:
-                    now[k] -= over / row[2 + k]
+                    now[own] -= over / row[2 + own]
                     there = there and over <= SLACK
     share = 1.0
     for i in range(m):

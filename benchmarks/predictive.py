@@ -15,7 +15,6 @@ import tempfile
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +24,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
+from mckibben.blocks.predictive.plan import kept_to
 from mckibben.blocks.predictive.predictive import Predictive
-from mckibben.blocks.predictive.supply import allowed
 from mckibben.export.c.emulation import emulate, missing_tools
 from mckibben.export.c.project import export_c
 
@@ -67,8 +66,8 @@ def clipped(inverse: Block, references: Array, **limits: float) -> Array:
     n, rows = len(block.outputs), block.rows(STEP)
     held = np.concatenate([np.repeat(references[:1], HORIZON, axis=0), references])
     pressures = np.asarray(inverse.simulate(held, sample_time=STEP))
-    for before, row in pairwise(pressures):
-        allowed(rows, before, row)
+    pressures = pressures.reshape(-1, n)
+    kept_to(n, rows.ravel(), pressures.reshape(-1))
     start = block.initial_state(held[0])[: block.undone.n_states].tolist()
     driven = np.hstack([pressures, held[:, n:]])
     given = block.undone.simulate(driven, initial=start, sample_time=STEP)

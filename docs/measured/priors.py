@@ -16,7 +16,7 @@ import numpy as np
 
 import mckibben
 from mckibben import Recording, muscles
-from mckibben.blocks.coupled.load_estimate import LoadEstimate, load_of
+from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.errors import DataWarning, ModelWarning
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.muscles import Sheet
@@ -146,7 +146,7 @@ def held(folder: Path) -> None:
         left = 1.0 - run["displacement"] / long.stroke
         return long.force * run["pressure"] / long.max_pressure_bar * left
 
-    told(of(LoadEstimate.of(muscles.scaled(short.balance, short.sheet, long))), None, "scaled only")
+    told(of(load_of(muscles.scaled(short.balance, short.sheet, long))), None, "scaled only")
     laws = {
         "the braid of Chou and Hannaford": braid,
         "the catalogue's straight line (Festo)": straight,

@@ -19,7 +19,6 @@ PLUGINS: dict[str, dict[str, str]] = {
         "activation-memory": "mckibben.blocks.force.activation:ActivationMemory",
         "activation-pressure": "mckibben.blocks.force.activation:ActivationPressure",
         "adaptive": "mckibben.blocks.adaptive.adaptive:Adaptive",
-        "adaptive-series": "mckibben.blocks.adaptive.adaptive_series:AdaptiveSeries",
         "affine": "mckibben.blocks.memoryless:Affine",
         "air": "mckibben.blocks.dynamics.air:Air",
         "balance": "mckibben.blocks.coupled.balance:Balance",

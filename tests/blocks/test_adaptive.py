@@ -13,9 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import Block, ModelError, Series, load
-from mckibben.blocks.adaptive.adaptive import Adaptive, taught
-from mckibben.blocks.adaptive.adaptive_series import adaptive
-from mckibben.blocks.adaptive.drift import alarm_limit
+from mckibben.blocks.adaptive.adaptive import Adaptive, adaptive, alarm_limit
 from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
@@ -29,10 +27,11 @@ CREEPING = Series((*Series.example().parts, Creep.example()))
 
 def changed(model: Any, gain: float = 1.2, shift: float = 0.3) -> Block:
     """Return a model of another gain, and shifted."""
-    theta = model.taught.copy()
+    theta = model.learnable.fitted.copy()
     theta[:-1] *= gain
     theta[-1] += shift
-    return taught(model, theta)
+    found: Block = model.learnable.with_parameters(theta)
+    return found
 
 
 def references(model: Block, seconds: float, share: float = 0.7, seed: int = 0) -> Array:
@@ -111,7 +110,8 @@ def test_a_sensor_that_drops_out_or_stands_still_teaches_nothing(absent: bool, m
     stream, asked = block.stream(STEP), references(model, 30.0)
     for y in asked:
         assert np.isfinite(stream.step([y, np.nan if absent else asked[0]])).all()
-    change = (block.present(stream.state).taught - model.taught) / model.scales
+    found, fitted = block.present(stream.state).learnable.fitted, model.learnable
+    change = (found - fitted.fitted) / fitted.scales
     assert np.abs(change).max() < most
 
 

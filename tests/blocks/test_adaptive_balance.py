@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mckibben.blocks.adaptive.adaptive import Adaptive
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_adapting import FRICTION, STIFFNESS
+from mckibben.blocks.coupled.balance_learning import learnt_of, ratios
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import wander
 from tests.blocks.balances import ALONE, STEP, balances
@@ -59,7 +60,7 @@ def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) ->
         stream.step([*sample, *rng.uniform(-100.0, 100.0, n)])
     changed: Balance = block.present(stream.state).inverse()  # type: ignore[assignment]
     for k in range(n):
-        most = balance.ratios[2 * k]
+        most = ratios(balance)[2 * k]
         area = changed.areas[k][0] / balance.areas[k][0]
         for new, old in zip(changed.friction[k], balance.friction[k], strict=True):
             assert new <= old * area * most * (1 + 1e-12)
@@ -89,8 +90,10 @@ def followed(block: Adaptive, plant: Any) -> tuple[Array, Array]:
 )
 def test_what_changed_is_made_up_for_and_found(kind: int, factor: float, name: str) -> None:
     block = Adaptive(Inverse(SINGLE), 20.0, 0.02)
-    kinds = np.array([one for _, one in SINGLE.learnt])
-    plant = SINGLE.retaught(np.where(kinds == kind, factor, SINGLE.taught))
+    kinds = np.array([one for _, one in learnt_of(SINGLE)])
+    plant = SINGLE.learnable.with_parameters(
+        np.where(kinds == kind, factor, SINGLE.learnable.fitted)
+    )
     state, errors = followed(block, plant)
     assert np.sqrt((errors[-1000:] ** 2).mean()) < 0.05 * np.abs(errors[:200]).max() + 0.005
     drift = block.drift(state)

@@ -30,7 +30,7 @@ from mckibben.blocks.laws import wander
 from mckibben.blocks.solving import eliminate, solve_near
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_starts import begin_at
-from mckibben.estimators.coupled.recurrent_fit import remembered
+from mckibben.estimators.coupled.mpi_narmax import remembered
 from mckibben.registry import load, names
 from mckibben.system.compiling import Deferred
 from tests.blocks.balances import ALONE as HARDENING

@@ -14,10 +14,16 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.predictive.plan import MOST_STEPS, plan, plan_scratch
-from mckibben.blocks.predictive.plan_one import one_scratch, plan_one, turned
+from mckibben.blocks.predictive.plan import (
+    MOST_STEPS,
+    allowed,
+    limit_rows,
+    plan_one,
+    plan_scratch,
+    plan_several,
+    turned,
+)
 from mckibben.blocks.predictive.predictive import Predictive
-from mckibben.blocks.predictive.supply import allowed, limit_rows
 
 STEP = 0.01
 ARM = replace(Balance.example(), pressure_range=(0.0, 6.0))
@@ -132,27 +138,27 @@ def test_plans_are_the_best_there_are(n: int) -> None:
             constraints=[limits],
             options={"maxiter": 500, "ftol": 1e-12},
         )
-        found = nominal.copy()
-        flat = (slopes.ravel(), nominal.ravel(), errors.ravel())
-        given = (rows.ravel(), before, *flat, found.reshape(-1))
-        plan(n, *given, np.zeros(plan_scratch(6, n, len(rows))))
-        assert np.abs(found.ravel() - best.x).max() < 1e-4
+        path = np.concatenate([before, nominal.ravel()])
+        given = (n, rows.ravel(), slopes.ravel(), nominal.ravel(), errors.ravel())
+        plan_several(*given, path, np.zeros(1000))
+        found = path[n:]
+        assert np.abs(found - best.x).max() < 1e-4
         if n == 1:
-            exact = nominal.copy()
-            plan_one(*given[:-1], exact.reshape(-1), np.zeros(one_scratch(6)))
-            assert np.abs(exact - found).max() < 1e-4
-            assert lost(exact.ravel()) <= lost(best.x) + 1e-7
+            exact = np.concatenate([before, nominal.ravel()])
+            plan_one(*given, exact, np.zeros(plan_scratch(6, 1, len(rows))))
+            assert np.abs(exact[1:] - found).max() < 1e-4
+            assert lost(exact[1:]) <= lost(best.x) + 1e-7
 
 
 @pytest.mark.kernel
 def test_plans_end_where_there_is_none() -> None:
     rows, before, slopes, nominal, errors = problem(2, 0)
     for slope, start, steps in ((np.nan, before, 0), (1.0, before + 50.0, MOST_STEPS)):
-        found = nominal.copy()
+        path = np.concatenate([start, nominal.ravel()])
         flat = (slope * slopes.ravel(), nominal.ravel(), errors.ravel())
-        given = (rows.ravel(), start, *flat, found.reshape(-1))
-        assert plan(2, *given, np.zeros(plan_scratch(6, 2, len(rows)))) == steps
-        assert np.isfinite(found).all()
+        scratch = np.zeros(plan_scratch(6, 2, len(rows)))
+        assert plan_several(2, rows.ravel(), *flat, path, scratch) == steps
+        assert np.isfinite(path).all()
 
 
 @pytest.mark.kernel
@@ -169,13 +175,13 @@ def test_a_derivative_above_zero_throughout_is_least_at_its_lowest(
 
 @pytest.mark.kernel
 def test_the_supply_takes_from_all_in_one_share() -> None:
-    rows = limit_rows(np.zeros(2), np.full(2, 5.0), np.inf, 6.0, 1.0, np.ones(2))
-    p = np.array([3.0, 2.0])
-    assert not allowed(rows.ravel(), np.array([1.0, 1.0]), p)
-    assert p == pytest.approx([1.5, 1.5])
-    falling = np.array([0.0, 2.0])
-    assert allowed(rows.ravel(), np.array([4.0, 1.0]), falling)  # what vents gives nothing back
-    assert not allowed(rows.ravel(), np.array([4.0, 0.5]), np.array([0.0, 2.0]))
+    rows = limit_rows(np.zeros(2), np.full(2, 5.0), np.inf, 6.0, 1.0, np.ones(2)).ravel()
+    path = np.array([1.0, 1.0, 3.0, 2.0])
+    assert not allowed(2, rows, path, 0, False)
+    assert path[2:] == pytest.approx([1.5, 1.5])
+    falling = np.array([4.0, 1.0, 0.0, 2.0])
+    assert allowed(2, rows, falling, 0, False)  # what vents gives nothing back
+    assert not allowed(2, rows, np.array([4.0, 0.5, 0.0, 2.0]), 0, False)
 
 
 @pytest.mark.kernel

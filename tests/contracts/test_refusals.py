@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Channel, ModelError, PerChannel, Play, Series
-from mckibben.blocks.adaptive.adaptive_series import adaptive
+from mckibben.blocks.adaptive.adaptive import adaptive
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.fields import DISPLACEMENT
@@ -166,10 +166,6 @@ OTHERS: dict[str, tuple[Make, str]] = {
         "254",
     ),
     "too fast": (lambda: example("state-network").simulate(U, sample_time=1.0), "2 substep"),
-    "diverges": (
-        lambda: Coupling(((1.0, 1.5), (1.5, 1.0)), PAIR, PAIR).jacobi([1.0, 2.0]),
-        r"1\.5",
-    ),
     "not linear": (lambda: PI.example().to_scipy(0.01), "'pi'"),
     "linear but for its delay": (
         lambda: ProcessModel(1.0, (0.1,), None, None, 0.05).to_scipy(),

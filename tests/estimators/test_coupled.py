@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, ModelError, registry
-from mckibben.estimators.coupled.fuzzy import Consequents, Problem, Sets
-from mckibben.estimators.coupled.fuzzy_projection import sensitivities
+from mckibben.estimators.coupled.fuzzy import Consequents, Problem, Sets, sensitivities
 from tests.estimators.examples import recorded
 
 STEP = 0.05

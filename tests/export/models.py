@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from mckibben import Block, ModelError, ModelWarning
 from mckibben.blocks.adaptive.adaptive import Adaptive
-from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
 from mckibben.blocks.laws import examples, input_limits, wander
 from mckibben.registry import load
 from tests.export.building import SAMPLE_TIME
@@ -43,7 +42,7 @@ def path_for(block: Block, seed: int, n: int) -> Array:
     pace = 200 if block.rate_dependent else 12
     inputs = wander(*input_limits(block), rng, pace, max(n // pace, 3) + 2)
     inputs = np.resize(inputs, (n, inputs.shape[1]))
-    if isinstance(block, Adaptive | AdaptiveSeries):
+    if isinstance(block, Adaptive):
         # measured as on a plant that is 5 % off: of nonsense, rounding decides what is believed
         m = len(block.measured)
         inputs[1:, -m:] = 1.05 * inputs[:-1, :m] + 0.02 * rng.normal(size=(n - 1, m))

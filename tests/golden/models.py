@@ -30,7 +30,7 @@ RANGES: dict[str, tuple[tuple[float, float], ...]] = {
     "recurrent-fuzzy-network": ((0.0, 45.0), (0.0, 150.0)),
     "tondu-lopez": ((3.8, 5.0), (0.0, 5.0)),
     "adaptive": ((4.5, 29.5), (0.0, 0.0)),
-    "adaptive-series": ((6.5, 25.5), (0.0, 0.0)),
+    "adaptive series": ((6.5, 25.5), (0.0, 0.0)),
     "feedforward-feedback": (
         (0.0, 8.0),
         (0.0, 8.0),
@@ -187,6 +187,7 @@ def _compositions() -> dict[str, Block]:
         "slack muscles": example("balance", pushes=(8.0, 2.0)),
         "limited muscles": example("balance", pressure_range=(0.0, 1.2)),
         "adaptive gpi": block("adaptive", gpi, 20.0, 0.05),
+        "adaptive series": block("adaptive", Series.example(), 60.0, 0.05),
         "adaptive balance": block("adaptive", balance.inverse(), 20.0, 0.05),
         "predictive, all limits": block(
             "predictive",

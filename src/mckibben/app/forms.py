@@ -99,7 +99,7 @@ def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]
         case "force":
             return force_of(block)
         case "adaptive":
-            from mckibben.blocks.adaptive.adaptive_series import adaptive
+            from mckibben.blocks.adaptive.adaptive import adaptive
 
             time = given["time"]
             if not 0 < time <= 1e6:
@@ -177,7 +177,7 @@ def in_python(block: Block, form: str, settings: Mapping[str, Any]) -> list[str]
     if form == "inverse" and ForceFeedforward.of(block) is None:
         return ["inverse = model.inverse()"]
     where, name, asked = {
-        "adaptive": ("adaptive.adaptive_series", "adaptive", "(model"),
+        "adaptive": ("adaptive.adaptive", "adaptive", "(model"),
         "predictive": ("predictive.predictive", "Predictive", "(model.inverse()"),
         "inverse": ("force.feedforward", "ForceFeedforward", ".of(model"),
     }[form]

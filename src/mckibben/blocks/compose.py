@@ -23,6 +23,7 @@ from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
+from mckibben.registry import load
 from mckibben.system.compiling import in_turn
 
 DEEPEST, MOST_BLOCKS = 32, 1000
@@ -275,10 +276,7 @@ class Series(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return a modified Prandtl-Ishlinskii model: a PI model and a saturating curve."""
-        from mckibben.blocks.hysteresis.pi import PI
-        from mckibben.blocks.memoryless import PiecewiseLinear
-
-        return cls((PI.example(), PiecewiseLinear.example()))
+        return cls((load("blocks", "pi").example(), load("blocks", "piecewise-linear").example()))
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -388,10 +386,7 @@ class Parallel(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return the sum of a PI model and a play operator."""
-        from mckibben.blocks.hysteresis.pi import PI
-        from mckibben.blocks.hysteresis.play import Play
-
-        return cls((PI.example(), Play.example()))
+        return cls((load("blocks", "pi").example(), load("blocks", "play").example()))
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -475,11 +470,10 @@ class PerChannel(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return two muscles with models of their own."""
-        from mckibben.blocks.hysteresis.gpi import GPI
-        from mckibben.blocks.hysteresis.pi import PI
-
         pressures = [Channel(f"pressure_{number}", "bar") for number in (1, 2)]
         displacements = [Channel(f"displacement_{number}", "mm") for number in (1, 2)]
-        first = replace(PI.example(), input=pressures[0], output=displacements[0])
-        second = replace(GPI.example(), input=pressures[1], output=displacements[1])
+        first = replace(load("blocks", "pi").example(), input=pressures[0], output=displacements[0])
+        second = replace(
+            load("blocks", "gpi").example(), input=pressures[1], output=displacements[1]
+        )
         return cls((first, second))

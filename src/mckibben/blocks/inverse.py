@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
@@ -22,6 +22,9 @@ from mckibben.blocks.notation import indexed, lettered
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.registry import load
+
+if TYPE_CHECKING:
+    from mckibben.blocks.adaptive.learning import Learnable
 
 USUAL_TRIALS, MOST_TRIALS = 12, 600
 """In a step of an inverse that is solved for: on smooth references, and at worst."""
@@ -125,6 +128,11 @@ class Invertible(Block):
     def remembered(self, state: Array) -> tuple[float, ...]:
         """Return what the inverse remembers, as a state of this block tells it."""
         return (float(state[-1]),) if self.inverse_remembers == "input" else ()
+
+    @property
+    def learnable(self) -> Learnable | None:
+        """What of it is learnt while its inverse runs; None where nothing is."""
+        return None
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
         """Return what a step of the inverse costs; by default one pass, or trials."""

@@ -96,6 +96,8 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
 
 def _present(kind: str, group: str) -> str:
     """Return what a kind of an older file is called now: every inverse had a kind of its own."""
+    if (group, kind) == ("blocks", "adaptive-series"):
+        return "adaptive"
     known = names(group)
     undone = kind.removesuffix("-inverse")
     return "inverse" if group == "blocks" and kind not in known and undone in known else kind

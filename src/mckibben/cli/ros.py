@@ -56,7 +56,6 @@ def ros(
     from contextlib import suppress
 
     from mckibben.blocks.adaptive.adaptive import Adaptive
-    from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
     from mckibben.blocks.saving import load
     from mckibben.outputs import claim, claim_model, never
     from mckibben.ros.dds import Topics
@@ -78,7 +77,7 @@ def ros(
 
     block = load(model)
     if save is not None:
-        if not isinstance(block, Adaptive | AdaptiveSeries):
+        if not isinstance(block, Adaptive):
             raise ModelError(
                 f"{block.title!r} does not learn, so there is nothing to save. Remedy: leave out "
                 "--save, or give what mckibben invert --adaptive writes."
@@ -107,7 +106,7 @@ def ros(
     finally:
         for each, handler in before.items():
             signal.signal(each, handler)
-        if isinstance(block, Adaptive | AdaptiveSeries) and save is not None:
+        if isinstance(block, Adaptive) and save is not None:
             learnt = block if node.state is None else block.resumed(node.state)
             learnt.save(save)
     kept = turns.deadlines

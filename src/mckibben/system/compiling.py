@@ -193,7 +193,8 @@ def _cache_class() -> Any:
                 base.save_overload(self, *what)
 
         def load_overload(self, *what: Any) -> Any:
-            with suppress(OSError, EOFError, UnpicklingError):
+            # ImportError: of a version in which what it calls stood in another module
+            with suppress(OSError, EOFError, UnpicklingError, ImportError):
                 return base.load_overload(self, *what)
 
     return Cache

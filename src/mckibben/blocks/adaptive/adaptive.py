@@ -1,16 +1,22 @@
 """An inverse that learns from what is measured, and stays exact.
 
-Inputs are those of the inverse, then what is measured of the references; outputs are the inverse's.
-With every measured sample the parameters of the model follow, see `learning`; the inverse runs with
-them as they are, so that model and inverse match at every step.
+Inputs are those of the inverse, then what is measured of the references; outputs are the inverse's. With
+every measured sample the parameters of the model follow, see `mckibben.blocks.adaptive.learning`; the
+inverse runs with them as they are, so that model and inverse match at every step.
 
 A measurement answers the reference of the step before, as behind a compensator: since the model gives
-exactly what was asked for, what it predicts is known from the inverse's own memory.
+exactly what was asked for, what it predicts is known from the inverse's own memory. One part of a series
+learns (mpi, cpi and their kin): parts behind it are undone on what is measured as on the reference, each
+with a memory of its own, and parts before it on what the inverse gives.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass as plain_dataclass
 from dataclasses import replace
+from functools import cached_property
+from statistics import NormalDist
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -19,8 +25,6 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.adaptable import Adaptable
-from mckibben.blocks.adaptive.drift import FIT_ERROR, Drift, alarm_limit, scatter
 from mckibben.blocks.adaptive.learning import (
     LARGEST,
     READY,
@@ -28,21 +32,30 @@ from mckibben.blocks.adaptive.learning import (
     SQUARED,
     STOOD,
     USUAL,
+    Group,
+    Learnable,
     covariance_of,
     start_root,
 )
-from mckibben.blocks.base import Block, Cost, Kernel, Start, explicit_state, needs_sample_time
+from mckibben.blocks.base import (
+    Block,
+    Board,
+    Cost,
+    Kernel,
+    Run,
+    Start,
+    explicit_state,
+    needs_sample_time,
+)
 from mckibben.blocks.compose import Series
 from mckibben.blocks.feedback import MEASURED
 from mckibben.blocks.fields import STRICT, Channel, Initial, Vector, vector
-from mckibben.blocks.inverse import Inverse
-from mckibben.blocks.memoryless import Affine
+from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 TRUSTED = 1 / 3
 """Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
-
 
 TIMES = 1e-3, 1e9
 """Shortest and longest time to learn in [s]."""
@@ -54,35 +67,88 @@ FARTHEST = 1e6
 MOST = 1e12
 """Beyond what memory of an inverse is, and samples are counted."""
 
-
-def learner_of(block: Block) -> Adaptable | None:
-    """Return what learns while a block is undone: it, or what undoes it; None where none does."""
-    if isinstance(block, Inverse):
-        inner = block.forward
-        return inner if isinstance(inner, Adaptable) and not inner.learns_inverted else None
-    return block if isinstance(block, Adaptable) and block.learns_inverted else None
+FALSE_ALARMS = 1e-3
+"""An hour, where nothing drifts."""
+FIT_ERROR = 0.01
+"""Standard error of a fit itself, of every group."""
 
 
-def told_width(model: Block, learner: Adaptable) -> float:
+@plain_dataclass(frozen=True)
+class Drift:
+    """What has changed since the fit, by groups of parameters.
+
+    A standard error is that of the learner's covariance, and what a fit itself is wrong by: a little of
+    every group, and whatever moves the output no further than its usual error. What the form of a model
+    leaves goes with the motion: other motion makes it look like other parameters.
+
+    Parameters
+    ----------
+    groups : tuple of Group
+        Which changes are reported.
+    changes, errors : tuple of float
+        Relative change of every group, and its standard error.
+    limit : float
+        Standard errors at which an alarm is given: at `FALSE_ALARMS` an hour by chance, where one look
+        is independent of the next after the time to learn in.
+    measured : bool
+        Whether anything was, by now.
+    """
+
+    groups: tuple[Group, ...]
+    changes: tuple[float, ...]
+    errors: tuple[float, ...]
+    limit: float
+    measured: bool = True
+
+    @property
+    def by_errors(self) -> tuple[float, ...]:
+        """Changes in standard errors."""
+        return tuple(c / e for c, e in zip(self.changes, self.errors, strict=True))
+
+    @property
+    def alarms(self) -> tuple[bool, ...]:
+        """Whether a group has changed by more than chance."""
+        return tuple(abs(size) > self.limit for size in self.by_errors)
+
+    @property
+    def alarm(self) -> bool:
+        """Whether any has."""
+        return any(self.alarms)
+
+    def __str__(self) -> str:
+        if not self.measured:
+            return "nothing measured yet"
+        changed, same = [], []
+        for group, change, alarm in zip(self.groups, self.changes, self.alarms, strict=True):
+            if alarm:
+                way = group.more if change > 0 else group.less
+                changed.append(f"{group.name} {100 * abs(change):.0f} % {way}")
+            else:
+                same.append(group.name)
+        if not changed:
+            return f"{' and '.join(same)} unchanged since the day of the fit"
+        told = f"{', '.join(changed)} than on the day of the fit"
+        return f"{told}; {', '.join(same)} unchanged" if same else told
+
+
+def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float:
+    """Return the standard errors at which alarms are false at a rate [1/h]; ``time`` in s."""
+    looks = n_groups * 3600.0 / time
+    return -NormalDist().inv_cdf(min(rate / looks, 0.5) / 2.0)
+
+
+def learnable_of(block: Block) -> Learnable | None:
+    """Return what is learnt while a block is undone, as it or its inverse declares; None if nothing."""
+    inner = block.forward if isinstance(block, Inverse) else block
+    found = inner.learnable if isinstance(inner, Invertible) else None
+    return found if found and found.compensates == isinstance(block, Inverse) else None
+
+
+def width_of(model: Block, learnable: Learnable) -> float:
     """Return the widest range that a model reaches, or else where it was fitted; 0 if unknown."""
     low, high = model.reachable()
     width = float(np.max(high - low))
-    return width if np.isfinite(width) else learner.known_span
-
-
-def check_settings(kind: str, time: float, noise: float, width: float) -> None:
-    """Refuse times and noises, in the unit of ``width``, that nothing is measured with."""
-    if not TIMES[0] <= time <= TIMES[1]:
-        raise ModelError(
-            f"{kind!r} cannot learn in a time of {time:g} s. Remedy: give {TIMES[0]:g} to "
-            f"{TIMES[1]:g} s."
-        )
-    low, high = (bound * width for bound in NOISES) if 0 < width < np.inf else NOISES
-    if not low <= noise <= high:
-        raise ModelError(
-            f"a noise of {noise:g} is none that {kind!r} is measured with. Remedy: give the standard "
-            f"deviation of what is measured, {low:.3g} to {high:.3g} in its unit."
-        )
+    return width if np.isfinite(width) else learnable.known_span
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -92,7 +158,8 @@ class Adaptive(Block):
     Parameters
     ----------
     forward : Block
-        The block undone, which declares what of it is learnt; or its inverse does, as of a balance.
+        The block undone, which declares what of it is learnt, or whose inverse does, as of a balance; or
+        a series of blocks of one channel, exactly one of which does.
     time : float
         How long it takes to learn what the motion shows [s]; positive.
     noise : float
@@ -107,37 +174,62 @@ class Adaptive(Block):
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
 
-    forward: Annotated[InstanceOf[Adaptable] | InstanceOf[Inverse], BeforeValidator(nested)]
+    forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     time: Annotated[FiniteFloat, Gt(0)]
     noise: Annotated[FiniteFloat, Gt(0)]
     memory: Vector | None = None
 
     def __post_init__(self) -> None:
-        self.learner.check_invertible()
-        check_settings(self.kind, self.time, self.noise, told_width(self.forward, self.learner))
-        if self.memory is not None and len(self.memory) not in (self.n_states, self.n_learnt):
+        if isinstance(self.forward, Series):
+            parts = self.forward.parts
+            learning = sum(learnable_of(part) is not None for part in parts)
+            if learning != 1 or any(len(p.inputs) != 1 or len(p.outputs) != 1 for p in parts):
+                raise ModelError(
+                    f"{learning} parts of this series can learn. Remedy: adapt pi, gpi, mpi, cpi or "
+                    "balance models: one part that learns, of one channel like the others."
+                )
+        self.forward.inverse()  # which refuses what has none
+        self._check_settings()
+        if self.memory is None:
+            return
+        if len(self.memory) not in (self.n_states, self.n_learnt):
             raise ModelError(
                 f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
                 f"{self.n_states}. Remedy: resume what was saved with the same model."
             )
-        if self.memory is not None:
-            self.check_memory(np.array(self.memory))
+        self._check_memory(np.array(self.memory))
 
-    def check_memory(self, state: Array) -> None:
-        """Refuse a state, or what is learnt of one, that learning never comes to.
+    def _check_settings(self) -> None:
+        """Refuse a time and a noise that nothing is measured with."""
+        if not TIMES[0] <= self.time <= TIMES[1]:
+            raise ModelError(
+                f"{self.kind!r} cannot learn in a time of {self.time:g} s. Remedy: give {TIMES[0]:g} "
+                f"to {TIMES[1]:g} s."
+            )
+        width = width_of(self.forward, self.learnable)
+        low, high = (bound * width for bound in NOISES) if 0 < width < np.inf else NOISES
+        if not low <= self.noise <= high:
+            raise ModelError(
+                f"a noise of {self.noise:g} is none that {self.kind!r} is measured with. Remedy: give "
+                f"the standard deviation of what is measured, {low:.3g} to {high:.3g} in its unit."
+            )
 
-        Raises
-        ------
-        ModelError
-            If so.
-        """
+    def _check_memory(self, state: Array) -> None:
+        """Refuse a state, or what is learnt of one, that learning never comes to."""
+        if self.parts and len(state) == self.n_states:
+            for part, share in zip(self.parts, self._states(state), strict=True):
+                if part is self.core:
+                    self.core._check_memory(share)  # of this class
+                else:
+                    part.initial_state(np.zeros(len(part.inputs)), share.tolist())
+            return
         own, theta, used, root, senses = self._split(state)
-        learner, fixed = self.learner, self.fixed
-        p, senses = theta.size, senses.reshape(-1, SENSES)
+        learnable, p = self.learnable, theta.size
+        senses = senses.reshape(-1, SENSES)
         with np.errstate(all="ignore"):
-            far = np.abs(np.array([theta, used]) - learner.taught) > FARTHEST * learner.scales
+            far = np.abs(np.array([theta, used]) - learnable.fitted) > FARTHEST * learnable.scales
             variances = np.diag(covariance_of(root, p))
-            wide = variances > FARTHEST * np.diag(learner.spread)
+            wide = variances > FARTHEST * np.diag(learnable.spread)
         ready, usual = senses[:, READY], senses[:, USUAL]
         wrong = {
             "hysteresis": (np.abs(own) > MOST).any(),
@@ -145,7 +237,7 @@ class Adaptive(Block):
             "covariance": not (root[:p] > 0).all() or wide.any(),
             "readings": not ((ready >= 0) & (ready <= p) & (ready == np.round(ready))).all(),
             "errors": not (senses[:, [USUAL, SQUARED, STOOD]] > 0).all()
-            or (usual > 2 * LARGEST * self.noise).any(),
+            or (usual > 2 * LARGEST * self.core.noise).any(),
         }
         for name, found in wrong.items():
             if found:
@@ -154,22 +246,63 @@ class Adaptive(Block):
                     "Remedy: save the model afresh, or resume what was saved unchanged."
                 )
         for parameters in (theta, used):
-            held = learner.retaught(parameters)
-            if isinstance(held, Adaptable):
-                held.check_invertible()
+            learnable.with_parameters(parameters).inverse()
         if own.size:
+            fixed = self.fixed
             fixed.initial_state(np.zeros(len(fixed.inputs)), own[: fixed.n_states].tolist())
 
-    @property
-    def learner(self) -> Adaptable:
-        """What declares what is learnt: the block undone, or what undoes it.
+    # -- what it is made of ------------------------------------------------------------------
+
+    @cached_property
+    def _place(self) -> int:
+        """Of the part of a series that learns."""
+        parts = self.forward.parts if isinstance(self.forward, Series) else (self.forward,)
+        return next(k for k, part in enumerate(parts) if learnable_of(part) is not None)
+
+    @cached_property
+    def core(self) -> Adaptive:
+        """What learns: this itself, or a part of a series, its noise by the mean slope behind it."""
+        if not isinstance(self.forward, Series):
+            return self
+        part = self.forward.parts[self._place]
+        low, high = (float(end[0]) for end in part.reachable())
+        ends = np.array([low]), np.array([high])
+        for behind in self.forward.parts[self._place + 1 :]:
+            ends = behind.passes(*ends)
+        slope = float(np.abs(ends[1] - ends[0])[0]) / (high - low)
+        core = Adaptive(part, self.time, self.noise / (slope if 0 < slope < np.inf else 1.0))
+        learnt = self.memory is not None and len(self.memory) == core.n_learnt
+        return replace(core, memory=self.memory) if learnt else core
+
+    @cached_property
+    def _around(self) -> tuple[Block | None, Block | None]:
+        """What undoes the parts behind the one that learns, and those before it, where there are any."""
+        if not isinstance(self.forward, Series):
+            return None, None
+        undone = tuple(part.inverse() for part in reversed(self.forward.parts))
+        n_behind = len(undone) - 1 - self._place
+        behind, before = undone[:n_behind], undone[n_behind + 1 :]
+        return Series(behind) if behind else None, Series(before) if before else None
+
+    @cached_property
+    def parts(self) -> tuple[Block, ...]:
+        """Of a series: parts behind undone on reference and measurement, the core, those before."""
+        if self.core is self:
+            return ()
+        behind, before = self._around
+        found = (behind, behind, self.core, before)
+        return tuple(part for part in found if part is not None)
+
+    @cached_property
+    def learnable(self) -> Learnable:
+        """What is learnt.
 
         Raises
         ------
         ModelError
-            Where none does.
+            Where nothing is.
         """
-        found = learner_of(self.forward)
+        found = learnable_of(self.core.forward)
         if found is None:
             raise ModelError(
                 f"{self.forward.title!r} does not learn. Remedy: give a pi, gpi or balance model."
@@ -184,11 +317,12 @@ class Adaptive(Block):
     @property
     def title(self) -> str:
         """That of the block undone, and that it learns."""
-        return f"{self.learner.title}-adaptive"
+        block = self.forward
+        return f"{block.forward.title if isinstance(block, Inverse) else block.title}-adaptive"
 
     @property
     def path_dependent(self) -> bool:  # type: ignore[override]
-        """As the forward block says."""
+        """As the inverse that does not learn says."""
         return self.fixed.path_dependent
 
     @property
@@ -208,100 +342,14 @@ class Adaptive(Block):
 
     @property
     def n_missable(self) -> int:
-        """Measurements: the inverse goes on without."""
-        return len(self.measured)
+        """Measurements: the inverse goes on without, where nothing behind remembers them."""
+        behind = self._around[0]
+        return len(self.measured) if behind is None or behind.n_states == 0 else 0
 
     @property
     def outputs(self) -> tuple[Channel, ...]:
         """The forward block's driven inputs."""
         return self.fixed.outputs
-
-    @property
-    def n_states(self) -> int:
-        """The inverse's, what more learning wants of the last sample, and what is learnt."""
-        return self.fixed.n_states + self.learner.n_more_states + self.learner.n_learning_states
-
-    @property
-    def n_learnt(self) -> int:
-        """Numbers of the state that are learnt."""
-        return self.learner.n_learning_states
-
-    @property
-    def n_scratch(self) -> int:
-        """Three numbers a parameter, what more the family wants, and those of the inverse."""
-        more = self.learner.n_learning_scratch + self.fixed.n_scratch
-        return 3 * self.learner.taught.size + more
-
-    @property
-    def start(self) -> Initial:
-        """Memory to go on from, or the forward block's start."""
-        return self.forward.start if self.memory is None else self.memory
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the state before the first sample: the inverse's, and parameters as fitted.
-
-        An explicit state may be this block's own, the inverse's or the forward block's.
-        """
-        start = self.start if initial is None else initial
-        asked = first[: len(first) - len(self.measured)]
-        if not isinstance(start, str) and len(start) == self.n_states:
-            return explicit_state(self, start)
-        learner = self.learner
-        if not isinstance(start, str) and len(start) == self.n_learnt:
-            learnt = np.array(start)
-            self._split(learnt)[4][READY::SENSES] = 0.0  # the next measurement answers nothing
-            own = self.fixed.initial_state(asked, self.forward.start)
-            return np.concatenate([own, np.zeros(learner.n_more_states), learnt])
-        if isinstance(start, str):
-            return super().initial_state(first, start)
-        state = self.initial_state(first, "first_sample")
-        state[: self.fixed.n_states] = self.fixed.initial_state(asked, start)
-        return state
-
-    def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
-        p = self.learner.taught.size
-        sizes = [len(state) - self.n_learnt, p, p, (p * (p + 1)) // 2]
-        own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
-        return own, theta, used, root, senses
-
-    @property
-    def _fresh(self) -> Array:
-        return start_root(self.learner.spread * TRUSTED**2)
-
-    def _settings(self, sample_time: float | None) -> Array:
-        step = needs_sample_time(self.kind, sample_time)
-        return np.array([min(step / self.time, 0.5), self.noise, 1.0 / len(self.measured)])
-
-    @property
-    def kernel(self) -> Kernel:  # type: ignore[override]
-        """That of the family that learns."""
-        return self.learner.adaptive_kernel
-
-    @property
-    def start_kernel(self) -> Start:  # type: ignore[override]
-        """That of the family that learns."""
-        return self.learner.adaptive_start_kernel
-
-    def coefficients(self, sample_time: float | None) -> Array:
-        """Return [number of parameters, settings, scales, widest, theta, root], then the family's."""
-        learner = self.learner
-        return np.concatenate(
-            [
-                [float(learner.taught.size)],
-                self._settings(sample_time),
-                learner.scales,
-                np.diag(learner.spread),
-                learner.taught,
-                self._fresh,
-                learner.adaptive_numbers(sample_time),
-            ]
-        )
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return that of the inverse, and three operations a number of the covariance."""
-        p = self.learner.taught.size
-        learnt = 6 * p * p + 20 * p
-        return self.fixed.cost(sample_time) + Cost(learnt, learnt)
 
     def reachable(self) -> tuple[Array, Array]:
         """Return what the inverse gives."""
@@ -312,35 +360,221 @@ class Adaptive(Block):
         """The forward block, as fitted."""
         return self.forward
 
-    def present(self, state: Array) -> Block:
-        """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
-        return taught(self.learner, self._split(state)[2])
+    # -- memory ------------------------------------------------------------------------------
 
-    def drift(self, state: Array) -> Drift:
-        """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
-        learner = self.learner
-        limit = alarm_limit(self.time, len(learner.groups))
-        _, theta, _, root, senses = self._split(state)
-        if not senses[READY::SENSES].any():
-            none = (0.0,) * len(learner.groups)
-            return Drift(learner.groups, none, (FIT_ERROR,) * len(none), limit, measured=False)
-        steps = 1e-6 * np.diag(learner.scales)
-        there = learner.group_changes(theta)
-        slopes = np.array([(learner.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
-        covariance = covariance_of(root, theta.size)
-        usual = float(senses[USUAL::SENSES].max())
-        moved = learner.whole_changes
-        left = np.divide(usual, moved, out=np.zeros(moved.size), where=moved > 0)
-        errors = scatter(covariance, slopes, left)
-        return Drift(learner.groups, vector(there), vector(errors), limit)
+    @cached_property
+    def n_learnt(self) -> int:
+        """Numbers of the state that are learnt: theta, used, root, senses."""
+        p = self.learnable.fitted.size
+        return 2 * p + (p * (p + 1)) // 2 + SENSES * len(self.core.forward.outputs)
+
+    @property
+    def n_states(self) -> int:
+        """The inverse's, what more learning wants of the last sample, and what is learnt."""
+        if self.parts:
+            return sum(part.n_states for part in self.parts)
+        return self.fixed.n_states + self.learnable.n_more_states + self.n_learnt
+
+    @property
+    def n_scratch(self) -> int:
+        """Three numbers a parameter, what more the family wants, and those of the inverse."""
+        if self.parts:
+            return sum(part.n_scratch for part in self.parts)
+        more = self.learnable.n_more_scratch + self.fixed.n_scratch
+        return 3 * self.learnable.fitted.size + more
+
+    @property
+    def start(self) -> Initial:
+        """Memory to go on from, or the forward block's start; of a series, every part's own."""
+        if self.parts and (self.memory is None or len(self.memory) == self.n_learnt):
+            return "first_sample"
+        return self.forward.start if self.memory is None else self.memory
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state before the first sample: the inverse's, and parameters as fitted.
+
+        An explicit state may be this block's own or, but of a series, the inverse's or the forward
+        block's.
+        """
+        start = self.start if initial is None else initial
+        if self.parts:
+            named = initial is None and isinstance(start, str)  # each starts by a rule of its own
+            return self._initial_states(first, None if named else start)
+        if isinstance(start, str):
+            return super().initial_state(first, start)
+        asked = first[: len(first) - len(self.measured)]
+        if len(start) == self.n_states:
+            return explicit_state(self, start)
+        if len(start) == self.n_learnt:
+            learnt = np.array(start)
+            self._split(learnt)[4][READY::SENSES] = 0.0  # the next measurement answers nothing
+            own = self.fixed.initial_state(asked, self.forward.start)
+            return np.concatenate([own, np.zeros(self.learnable.n_more_states), learnt])
+        state = self.initial_state(first, "first_sample")
+        state[: self.fixed.n_states] = self.fixed.initial_state(asked, start)
+        return state
+
+    def _initial_states(self, first: Array, start: Initial | None) -> Array:
+        """Return the states of all parts, each started from the first sample that reaches it."""
+        own: Sequence[Initial | None] = [start] * len(self.parts)
+        if start is not None and not isinstance(start, str):
+            own = [share.tolist() for share in self._states(explicit_state(self, start))]
+        left, states = iter(zip(self.parts, own, strict=True)), []
+
+        def given(sample: Array) -> Array:
+            part, initial = next(left)
+            states.append(part.initial_state(sample, initial))
+            outputs = np.empty((1, len(part.outputs)))
+            part.bind(1.0, states[-1].copy(), sample[np.newaxis], outputs)()
+            return outputs[0]
+
+        behind, before = self._around
+        asked = np.array(first, dtype=np.float64)
+        if behind:
+            asked = np.concatenate([given(asked[k : k + 1].copy()) for k in range(2)])
+        found = given(asked)
+        if before:
+            given(found)
+        return np.concatenate(states)
+
+    def _states(self, state: Array) -> list[Array]:
+        """Return the states of the parts of a series, as views."""
+        return np.split(state, np.cumsum([part.n_states for part in self.parts])[:-1])
+
+    def _core_state(self, state: Array) -> Array:
+        return self._states(state)[self.parts.index(self.core)] if self.parts else state
+
+    def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Return what is not learnt of a state of the core, theta, used, root and senses, as views."""
+        p = self.learnable.fitted.size
+        sizes = [len(state) - self.n_learnt, p, p, (p * (p + 1)) // 2]
+        own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
+        return own, theta, used, root, senses
 
     def resumed(self, state: Array, memory: bool = True) -> Self:
         """Return this block, which goes on from a state when it is next started.
 
         Without ``memory`` of its hysteresis it keeps what is learnt alone: muscles were vented since.
         """
-        kept = np.asarray(state, dtype=np.float64)[0 if memory else -self.n_learnt :]
-        return replace(self, memory=tuple(kept.tolist()))
+        numbers = np.asarray(state, dtype=np.float64)
+        return replace(
+            self, memory=vector(numbers if memory else self._core_state(numbers)[-self.n_learnt :])
+        )
+
+    # -- running -----------------------------------------------------------------------------
+
+    @property
+    def kernel(self) -> Kernel | None:  # type: ignore[override]
+        """That of the family that learns; None of a series."""
+        return None if self.parts else self.learnable.step
+
+    @property
+    def start_kernel(self) -> Start | None:  # type: ignore[override]
+        """As `kernel`."""
+        return None if self.parts else self.learnable.start
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return what `mckibben.blocks.adaptive.learning.family_at` names."""
+        if self.parts:
+            return super().coefficients(sample_time)
+        step, learnable = needs_sample_time(self.kind, sample_time), self.learnable
+        settings = [min(step / self.time, 0.5), self.noise, 1.0 / len(self.measured)]
+        return np.concatenate(
+            [
+                [float(learnable.fitted.size), *settings],
+                learnable.scales,
+                np.diag(learnable.spread),
+                learnable.fitted,
+                start_root(learnable.spread * TRUSTED**2),
+                learnable.numbers(sample_time),
+            ]
+        )
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return that of the inverse, and three operations a number of the covariance."""
+        p = self.learnable.fitted.size
+        learnt = 6 * p * p + 20 * p
+        return self.fixed.cost(sample_time) + Cost(learnt, learnt)
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that undoes the parts in order."""
+        if not self.parts:
+            return super().bind(sample_time, state, inputs, outputs)
+        n = inputs.shape[0]
+        behind, before = self._around
+        columns, undone = np.empty((2, n, 1)), np.empty((2, n, 1))
+        asked, given = np.empty((n, 2)), np.empty((n, 1)) if before else outputs
+        states = iter(self._states(state))
+        runs: list[Run] = []
+        if behind:
+            runs = [behind.bind(sample_time, next(states), columns[k], undone[k]) for k in range(2)]
+        learn = self.core.bind(sample_time, next(states), asked, given)
+        last = before.bind(sample_time, next(states), given, outputs) if before else None
+
+        def run() -> None:
+            asked[:] = inputs
+            for k, undo in enumerate(runs):
+                columns[k, :, 0] = inputs[:, k]
+                undo()
+                asked[:, k] = undone[k, :, 0]
+            learn()
+            if last is not None:
+                last()
+
+        return run
+
+    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+        """Lay out the parts; those behind the core twice."""
+        if not self.parts:
+            return super().wired(board, given)
+        behind, before = self._around
+        signals = [behind.wired(board, [signal])[0] for signal in given] if behind else given
+        found = self.core.wired(board, signals)
+        found = before.wired(board, found) if before else found
+        if not isinstance(self.start, str):
+            board.resume(self.start)
+        return found
+
+    def report(self, state: Array) -> None:
+        """Pass on what the parts of a series have to say."""
+        if self.parts:
+            for part, share in zip(self.parts, self._states(state), strict=True):
+                part.report(share)
+
+    def n_clipped(self, state: Array) -> int:
+        """Return the samples that parts of a series clipped."""
+        if not self.parts:
+            return 0
+        shares = zip(self.parts, self._states(state), strict=True)
+        return sum(part.n_clipped(share) for part, share in shares)
+
+    # -- what is learnt ----------------------------------------------------------------------
+
+    def present(self, state: Array) -> Block:
+        """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
+        found = self.learnable.with_parameters(self._split(self._core_state(state))[2])
+        if not isinstance(self.forward, Series):
+            return found
+        parts = self.forward.parts
+        return Series((*parts[: self._place], found, *parts[self._place + 1 :]))
+
+    def drift(self, state: Array) -> Drift:
+        """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
+        learnable, groups = self.learnable, self.learnable.groups
+        limit = alarm_limit(self.time, len(groups))
+        _, theta, _, root, senses = self._split(self._core_state(state))
+        if not senses[READY::SENSES].any():
+            none = (0.0,) * len(groups)
+            return Drift(groups, none, (FIT_ERROR,) * len(none), limit, measured=False)
+        there = learnable.group_changes(theta)
+        steps = 1e-6 * np.diag(learnable.scales)
+        slopes = np.array([(learnable.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
+        usual, moved = float(senses[USUAL::SENSES].max()), learnable.whole_changes
+        left = np.divide(usual, moved, out=np.zeros(moved.size), where=moved > 0)
+        covariance = covariance_of(root, theta.size)
+        learnt = np.einsum("gi,ij,gj->g", slopes, covariance, slopes)
+        errors = np.sqrt(learnt + FIT_ERROR**2 + left**2)
+        return Drift(groups, vector(there), vector(errors), limit)
 
     def equations(self) -> tuple[str, ...]:
         """Return what is undone, and how parameters follow."""
@@ -357,10 +591,39 @@ class Adaptive(Block):
         return cls(PI.example(), 60.0, 0.05)
 
 
-def taught(learner: Adaptable, theta: Array) -> Block:
-    """Return a forward block with other parameters, shape (p,), and behind it what is added."""
-    block, added = learner.retaught(theta), learner.added(theta)
-    if not added:
-        return block
-    output = block.outputs[0]
-    return Series((block, Affine(1.0, added, output, output)))
+def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
+    """Return the inverse of a model that learns while it runs.
+
+    Parameters
+    ----------
+    model : Block
+        Of one part that can learn: pi, gpi, mpi, cpi, balance.
+    time : float
+        How long it takes to learn what the motion shows [s].
+    noise : float, optional
+        Standard deviation of what is measured [unit of the output]; default is a thousandth of what
+        can be reached.
+
+    Raises
+    ------
+    ModelError
+        If nothing of the model can learn, or it has no inverse.
+    """
+    if isinstance(model, Adaptive):
+        raise ModelError(
+            f"{model.title!r} learns already. Remedy: use it as it is, or adapt the model it undoes."
+        )
+    parts = model.parts if isinstance(model, Series) else (model,)
+    learnable = next(filter(None, map(learnable_of, parts)), None)
+    if learnable is None:
+        raise ModelError(
+            f"{model.title!r} cannot learn while it runs. Remedy: adapt a pi, gpi, mpi, cpi or balance "
+            "model."
+        )
+    width = width_of(model, learnable)
+    if noise is None and not 0 < width < np.inf:
+        raise ModelError(
+            f"what {model.title!r} reaches does not tell how exactly it is measured. "
+            "Remedy: give the noise."
+        )
+    return Adaptive(model, float(time), float(width / 1000 if noise is None else noise))

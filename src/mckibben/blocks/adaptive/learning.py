@@ -1,4 +1,4 @@
-"""How parameters are learnt from one measurement: recursive least squares that forget by excitation.
+"""What of a block is learnt while its inverse runs, and how: recursive least squares.
 
 With slopes phi of a measured output over the parameters, each in its scale and by the scatter of errors,
 and P the parameters' covariance,
@@ -7,32 +7,98 @@ and P the parameters' covariance,
     b = l - (1 - l) / r,   l = 1 - sample time / time:
 
 what is known is forgotten along phi alone, as much as comes in (Kulhavy, "Restricted exponential
-forgetting in real-time identification", Automatica 23 (1987), 589). What is not excited is neither
-forgotten nor blown up: r settles at (1 - l) / l, and no variance passes the widest. P is kept as
-U D U', changed by Bierman's recursion, so that it stays positive in single precision.
+forgetting in real-time identification", Automatica 23 (1987), 589): r settles at (1 - l) / l, and no
+variance passes the widest. P is held as U D U', changed by Bierman's recursion, and so stays positive in
+single precision.
 
-The scatter is the usual size of errors, times the root of how many that follow one another tell as
-much as one that is independent: what a model leaves unexplained is alike from sample to sample, and is
-not to be learnt in a moment.
+The scatter is the usual size of errors (it follows their median), times the root of how many that follow
+one another tell as much as an independent one. Errors beyond a few times that size count as that size;
+where many are too large, the plant has stepped, and the covariance is made as wide as at the start.
+Measurements that are not a number teach nothing, nor does one that stands still while the reference
+moves.
 
-Errors beyond a few times their usual size teach no more than that size, which follows their median, so
-a single outlier is nothing. Where many are too large for a twentieth of the time, the plant has
-stepped: the covariance is made as wide as at the start, and what is new is learnt at once. A
-measurement that is not a number teaches nothing, nor does one that stands exactly still while what is
-asked for moves.
-
-What is learnt is used as far as it helps: the fitted parameters foretell too, beside it, and what is
-used lies between them, where late errors would have been least. Where nothing drifts it costs nothing.
+What is learnt is used as far as it helps: the inverse runs with parameters between the fitted and the
+learnt ones, where late errors would have been least.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.kernels import kernel
+from mckibben.blocks.kernels import Step, kernel
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block, Start
+
+
+@dataclass(frozen=True)
+class Group:
+    """Parameters that drift together: their name, and how more and less of it are called."""
+
+    name: str
+    more: str = "higher"
+    less: str = "lower"
+
+
+@dataclass(frozen=True)
+class Learnable:
+    """The linear parameters of a block that are learnt while its inverse runs.
+
+    Parameters
+    ----------
+    step, start : callable
+        Kernels of the adaptive inverse. Inputs of the step are those of the inverse, then the outputs
+        that answer the references of the step before, NaN where absent; it computes in scratch. The
+        state is [the inverse's, ``n_more_states``, theta, used, root, senses]: the parameters as
+        learnt, those that the inverse runs with, the covariance as U D U', and what is remembered
+        of every sensor.
+    fitted : array, shape (p,)
+        The parameters as fitted, in their units.
+    scales : array, shape (p,)
+        Size of a change of each that counts as a whole; positive.
+    spread : array, shape (p, p)
+        Covariance of changes to be expected, in squares of the scales; definite.
+    with_parameters : callable
+        Returns the forward block with other parameters, shape (p,).
+    numbers : callable
+        Returns the coefficients that follow the learner's (see `family_at`), given the sample time.
+    groups : tuple of Group
+        In which drift is reported.
+    group_changes : callable
+        Returns the relative change of every group from the fitted one, given parameters.
+    whole_changes : array, shape (n_groups,)
+        How far an output moves where a group changes by the whole of it; infinite if unknown.
+    known_span : float
+        Largest range of an output where it was fitted; 0 if unknown.
+    compensates : bool
+        Whether the block is itself the compensator that runs, and its inverse the model.
+    n_more_states : int
+        Numbers of the last sample that the step remembers behind the inverse's state.
+    n_more_scratch : int
+        Numbers it computes in, beside three a parameter and those of the inverse.
+    """
+
+    step: Step
+    start: Start
+    fitted: Array
+    scales: Array
+    spread: Array
+    with_parameters: Callable[[Array], Block]
+    numbers: Callable[[float | None], Array]
+    groups: tuple[Group, ...]
+    group_changes: Callable[[Array], Array]
+    whole_changes: Array
+    known_span: float = 0.0
+    compensates: bool = False
+    n_more_states: int = 1
+    n_more_scratch: int = 0
+
 
 SENSES = 12
 """How many numbers are remembered of a sensor: whether it was read, usual error, surprise, last
@@ -69,13 +135,9 @@ SURPRISED = 5.0
 
 @kernel
 def learn(
-    settings: Array,
-    scales: Array,
-    widest: Array,
-    fresh: Array,
-    theta: Array,
-    root: Array,
-    sense: Array,
+    c: Array,
+    learnt: Array,
+    place: int,
     slopes: Array,
     work: Array,
     measured: float,
@@ -83,22 +145,16 @@ def learn(
     asked: float,
     fitted: float,
 ) -> bool:
-    """Teach parameters by one measured output; return whether they were.
+    """Correct the parameters by one measured output; return whether they were changed.
 
     Parameters
     ----------
-    settings : array, shape (3,)
-        [sample time / time, noise of the output, share of this output among those measured].
-    scales, widest : array, shape (p,)
-        Scale of every parameter, and the largest variance, in squares of it.
-    fresh : array, shape (p (p + 1) / 2,)
-        Covariance to learn afresh with, as ``root``.
-    theta : array, shape (p,)
-        Parameters, changed.
-    root : array, shape (p (p + 1) / 2,)
-        [D, columns of U above its diagonal of ones], changed.
-    sense : array, shape (SENSES,)
-        What is remembered of the sensor, changed.
+    c : array
+        Coefficients of a learner, see `family_at`.
+    learnt : array
+        [theta, used, root, senses], changed.
+    place : int
+        Which of the outputs is measured.
     slopes : array, shape (p,)
         Of the output over the parameters.
     work : array, shape (2 p,)
@@ -106,7 +162,11 @@ def learn(
     measured, predicted, asked, fitted : float
         The output, what it is by ``theta``, by what the inverse runs with, and by what was fitted.
     """
-    share, noise = settings[0], settings[1]
+    p, share, noise = int(c[0]), c[1], c[2]
+    scales, widest, fresh = c[4 : 4 + p], c[4 + p : 4 + 2 * p], c[4 + 3 * p : family_at(c)]
+    theta, root = learnt[:p], learnt[2 * p : 2 * p + fresh.size]
+    first = 2 * p + fresh.size + place * SENSES
+    sense = learnt[first : first + SENSES]
     if measured - measured != 0.0:
         sense[IGNORED] += 1.0
         return False
@@ -124,11 +184,10 @@ def learn(
         root[:] = fresh
         sense[SURPRISE] = 1.0
     error = measured - predicted
-    p = theta.size
     f, g = work[:p], work[p : 2 * p]
     r = 0.0
     told = usual * math.sqrt(fewer(sense))
-    _stand_by(told * told, share, settings[2], root[: theta.size], sense)
+    _stand_by(told * told, share, c[3], root[:p], sense)
     for j in range(p):
         f[j] = slopes[j] * scales[j] / told
     for j in range(p - 1, -1, -1):  # U' phi in place
@@ -284,8 +343,9 @@ def root_size(p: int) -> int:
 def family_at(c: Array) -> int:
     """Return where the numbers of the family begin among the coefficients of a learner.
 
-    These are [p, settings (3), scales (p), widest (p), fitted parameters (p), covariance at the start],
-    then the family's.
+    These are [p, sample time / time, noise, share of one output among those measured, scales (p),
+    widest variances in squares of them (p), fitted parameters (p), covariance at the start as root],
+    then the family's. A root is [D, columns of U above its diagonal of ones], p (p + 1) / 2 numbers.
     """
     p = int(c[0])
     return 4 + 3 * p + root_size(p)

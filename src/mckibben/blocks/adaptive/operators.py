@@ -11,18 +11,37 @@ noise does not make the input chatter across the loop.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.adaptable import Adaptable, Group, relative_spread
-from mckibben.blocks.adaptive.learning import GATE, USUAL, family_at, learn, trusted
+from mckibben.blocks.adaptive.learning import (
+    GATE,
+    USUAL,
+    Group,
+    Learnable,
+    family_at,
+    learn,
+    trusted,
+)
 from mckibben.blocks.hysteresis.play_operators import follow
-from mckibben.blocks.kernels import kernel
+from mckibben.blocks.kernels import Step, kernel
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block, Start
+    from mckibben.blocks.hysteresis.gpi import GPI
+    from mckibben.blocks.hysteresis.pi import PI
 
 LEAST = 0.1
 """Share of a fitted partial sum of weights that is left, whatever is measured."""
+
+GROUPS = (
+    Group("gain", "higher (softer springs, or more area)", "lower (stiffer springs, or less area)"),
+    Group("friction"),
+    Group("offset", "up", "down"),
+)
 
 
 @kernel
@@ -47,12 +66,11 @@ def follow_learning(
     Parameters and weights in use are [weights, offset]; ``s`` are the operators; ``last`` is [previous
     reference, samples clipped, direction of travel].
     """
-    n, p = r.size, r.size + 1
-    limits = c[family_at(c) : family_at(c) + 2]
-    least = c[family_at(c) + 2 : inverse_at(c)]
-    fitted, fresh = c[4 + 2 * p : 4 + 3 * p], c[4 + 3 * p : family_at(c)]
-    theta, used, root = learnt[:p], learnt[p : 2 * p], learnt[2 * p : 2 * p + fresh.size]
-    sense = learnt[2 * p + fresh.size :]
+    n, p, family = r.size, r.size + 1, family_at(c)
+    limits, least = c[family : family + 2], c[family + 2 : inverse_at(c)]
+    fitted = c[4 + 2 * p : 4 + 3 * p]
+    theta, used = learnt[:p], learnt[p : 2 * p]
+    sense = learnt[family - 4 - p :]
     work, slopes = scratch[: 2 * p], scratch[2 * p : 3 * p]
     believed, asked, expected = theta[n], used[n], fitted[n]
     for i in range(n):
@@ -61,22 +79,7 @@ def follow_learning(
         asked += used[i] * s[i]
         expected += fitted[i] * s[i]
     slopes[n] = 1.0
-    taught = learn(
-        c[1:4],
-        c[4 : 4 + p],
-        c[4 + p : 4 + 2 * p],
-        fresh,
-        theta,
-        root,
-        sense,
-        slopes,
-        work,
-        measured,
-        believed,
-        asked,
-        expected,
-    )
-    if taught:
+    if learn(c, learnt, 0, slopes, work, measured, believed, asked, expected):
         keep_rising(theta, least)
     if y > last[0]:
         last[2] = 1.0
@@ -123,65 +126,47 @@ def take_over(aim: Array, used: Array, s: Array, y: float, travel: float, band: 
         used[i] = aim[i] if share == 1.0 else used[i] + share * (aim[i] - used[i])
 
 
-class LearntOperators(Adaptable):
-    """A weighted sum of play operators whose weights, and an offset, are learnt."""
+def learnable_operators(
+    model: PI | GPI,
+    limits: tuple[float, float],
+    offset: float,
+    step: Step,
+    start: Start,
+    with_parameters: Callable[[Array], Block],
+) -> Learnable:
+    """Return what is learnt of a weighted sum of play operators: its weights, and an offset.
 
-    groups: ClassVar[tuple[Group, ...]] = (
-        Group(
-            "gain", "higher (softer springs, or more area)", "lower (stiffer springs, or less area)"
-        ),
-        Group("friction"),
-        Group("offset", "up", "down"),
-    )
+    Gain and friction are expected to change by 30 %, each weight by itself by 10 %, the offset by 30 %
+    of the span; ``limits`` are the lowest and highest input of the operators.
+    """
+    r, w = np.array(model.thresholds), np.array(model.weights)
+    n, size, width = len(w), np.abs(w), limits[1] - limits[0]
+    span = float(np.sum(w) * (width if np.isfinite(width) else r.max() or 1.0))
+    weights, sliding = np.append(np.ones(n), 0.0), np.array([0.0, *np.ones(n - 1), 0.0])
+    together = 0.3**2 * np.outer(weights, weights) + 0.3**2 * np.outer(sliding, sliding)
+    lowest = np.where(w >= 0, 0.0, -np.inf)
+    least = np.concatenate([lowest, LEAST * np.cumsum(w)])  # of weights, then of partial sums
 
-    thresholds: tuple[float, ...]
-    weights: tuple[float, ...]
+    def numbers(sample_time: float | None) -> Array:
+        own = model.inverse_numbers(model.coefficients(sample_time))
+        return np.concatenate([limits, least, own])
 
-    @property
-    def learnt_limits(self) -> tuple[float, float]:
-        """Lowest and highest input of the operators."""
-        return self.input_limits
-
-    @property
-    def taught(self) -> Array:
-        """Weights, then the offset."""
-        return np.array([*self.weights, getattr(self, "offset", 0.0)])
-
-    @property
-    def span(self) -> float:
-        """Change of the output over the whole input [its unit]."""
-        low, high = self.learnt_limits
-        width = high - low if np.isfinite(high - low) else max(self.thresholds) or 1.0
-        return float(np.sum(self.weights) * width)
-
-    @property
-    def scales(self) -> Array:
-        """The weights, none below a hundredth of their mean; the change over the whole input."""
-        w = np.abs(self.weights)
-        return np.array([*np.maximum(w, 0.01 * w.mean()), self.span])
-
-    @property
-    def spread(self) -> Array:
-        """Gain and friction by 30 %, every weight by 10 %, the offset by 30 % of the span."""
-        return relative_spread(0.3, 0.3, 0.1, 0.3, len(self.weights))
-
-    @property
-    def least(self) -> Array:
-        """Lowest weights, then lowest partial sums."""
-        w = np.array(self.weights)
-        lowest = np.where(w >= 0, 0.0, -np.inf)
-        return np.concatenate([lowest, LEAST * np.cumsum(w)])
-
-    def adaptive_numbers(self, sample_time: float | None) -> Array:
-        """Return [lowest, highest input of the operators, least], then the inverse's."""
-        own = super().adaptive_numbers(sample_time)
-        return np.concatenate([self.learnt_limits, self.least, own])
-
-    def group_changes(self, theta: Array) -> Array:
-        """Return the relative changes of sum w, of sum w r over sum w, and the offset over the span."""
-        r, w = np.array(self.thresholds), np.array(self.weights)
-        new, old = theta[:-1], w
-        width_new, width_old = new @ r / new.sum(), old @ r / old.sum()
+    def group_changes(theta: Array) -> Array:
+        """Return the changes of sum w, of sum w r over sum w, and of the offset over the span."""
+        new = theta[:-1]
+        width_new, width_old = new @ r / new.sum(), w @ r / w.sum()
         friction = width_new / width_old - 1 if width_old > 0 else 0.0
-        shift = (theta[-1] - self.taught[-1]) / self.span
-        return np.array([new.sum() / old.sum() - 1, friction, shift])
+        return np.array([new.sum() / w.sum() - 1, friction, (theta[-1] - offset) / span])
+
+    return Learnable(
+        step,
+        start,
+        fitted=np.append(w, offset),
+        scales=np.append(np.maximum(size, 0.01 * size.mean()), span),
+        spread=together + np.diag([*np.full(n, 0.1**2), 0.3**2]),
+        with_parameters=with_parameters,
+        numbers=numbers,
+        groups=GROUPS,
+        group_changes=group_changes,
+        whole_changes=np.array([span, 2 * np.dot(w, r), span]),
+    )

@@ -26,8 +26,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks.adaptive.learning import Learnable
 from mckibben.blocks.base import SEVERAL, Cost, Kernel, Ports, Start, needs_sample_time
-from mckibben.blocks.coupled.balance_adapting import balance_adaptive_start, balance_adaptive_step
 from mckibben.blocks.coupled.balance_equations import balance_of_forces
 from mckibben.blocks.coupled.balance_fields import check_fields, number_name, tell_clipped
 from mckibben.blocks.coupled.balance_law import (
@@ -39,9 +39,10 @@ from mckibben.blocks.coupled.balance_law import (
     settle,
     start_balance,
 )
-from mckibben.blocks.coupled.balance_learning import LearntBalance
+from mckibben.blocks.coupled.balance_learning import learnable_balance
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton_cost
@@ -95,7 +96,7 @@ def balance_inverse_start(
 
 
 @dataclass(frozen=True, config=STRICT)
-class Balance(LearntBalance):
+class Balance(Invertible):
     """From displacements of n muscles, and what schedules and loads them, to their pressures.
 
     Forces are in N, or, of a model that knows no force, in bar on muscle 1's area at rest.
@@ -161,8 +162,6 @@ class Balance(LearntBalance):
     start_kernel: ClassVar[Start] = start_balance
     inverse_kernel: ClassVar[Kernel] = balance_inverse_step
     inverse_start_kernel: ClassVar[Start] = balance_inverse_start
-    adaptive_kernel: ClassVar[Kernel] = balance_adaptive_step
-    adaptive_start_kernel: ClassVar[Start] = balance_adaptive_start
     inverse_path_dependent: ClassVar[bool] = True
     increasing = ("limits",)
     parameters: ClassVar[tuple[str, ...]] = (
@@ -289,6 +288,11 @@ class Balance(LearntBalance):
         return int(state[-1]) if state[-1] > 0 else 0
 
     solved: ClassVar[bool] = True
+
+    @property
+    def learnable(self) -> Learnable:
+        """Forces and factors of every muscle."""
+        return learnable_balance(self)
 
     @property
     def n_inverse_states(self) -> int:

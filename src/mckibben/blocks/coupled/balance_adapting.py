@@ -95,21 +95,8 @@ def balance_adaptive_step(
         for i in range(size):
             believed += slopes[i] * (theta[i] - used[i])
             expected += slopes[i] * (as_fitted(which, i) - used[i])
-        one = learn(
-            learner[1:4],
-            scales,
-            widest,
-            fresh,
-            theta,
-            root,
-            senses[k * SENSES : (k + 1) * SENSES],
-            slopes,
-            work,
-            inputs[n + n_x + k],
-            believed,
-            asked,
-            expected,
-        )
+        measured = inputs[n + n_x + k]
+        one = learn(learner, learnt, k, slopes, work, measured, believed, asked, expected)
         taught = taught or one
     if taught:
         pull_back(learner[1], which, scales, widest, root, theta, slopes, work)

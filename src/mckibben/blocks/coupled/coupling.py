@@ -11,11 +11,10 @@ from __future__ import annotations
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel
+from mckibben.blocks.base import Block, Kernel, Ports
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, rows
 from mckibben.blocks.kernels import step
 from mckibben.blocks.linear import LinearSystem
@@ -51,6 +50,7 @@ class Coupling(Block):
     """
 
     kind: ClassVar[str] = "coupling"
+    ports: ClassVar[Ports] = ("driven",), (), ("given",)
     kernel: ClassVar[Kernel] = coupling_step
     parameters: ClassVar[tuple[str, ...]] = ("gains",)
     notation: ClassVar[Notation] = Notation(
@@ -74,16 +74,6 @@ class Coupling(Block):
             )
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Channels driven."""
-        return self.driven
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Channels given."""
-        return self.given
-
-    @property
     def matrix(self) -> Array:
         """G, shape (n, m)."""
         return np.array(self.gains)
@@ -95,7 +85,7 @@ class Coupling(Block):
 
     @property
     def radius(self) -> float:
-        """Spectral radius of I - G^T: `jacobi` converges where it is below 1."""
+        """Spectral radius of I - G^T: the paper's Jacobi iteration, Eq. (28), converges below 1."""
         n, m = self.matrix.shape
         if n != m:
             raise ModelError(
@@ -119,41 +109,6 @@ class Coupling(Block):
             )
         undone = np.linalg.inv if len(self.driven) == len(self.given) else np.linalg.pinv
         return Coupling(rows(undone(self.matrix)), self.given, self.driven)
-
-    def jacobi(
-        self, coupled: ArrayLike, *, tolerance: float = 0.01, max_iterations: int = 1000
-    ) -> Array:
-        """Return v for h = G^T v by the paper's Jacobi iteration, Eqs. (28), (29).
-
-        Parameters
-        ----------
-        coupled : array_like, shape (n,) or (samples, n)
-            h.
-        tolerance : float
-            Iteration stops when no value changes by more; the paper's is 0.01.
-        max_iterations : int
-            Most steps.
-
-        Raises
-        ------
-        ModelError
-            If the iteration diverges: its spectral radius is not below 1.
-        """
-        if not self.radius < 1:
-            raise ModelError(
-                f"Jacobi iteration diverges: its spectral radius is {self.radius:.3g}. "
-                "Remedy: use inverse(), which solves directly."
-            )
-        h = np.asarray(coupled, dtype=np.float64)
-        transposed = self.matrix.T
-        diagonal = np.diag(transposed)
-        off = transposed - np.diag(diagonal)
-        v = h / diagonal
-        for _ in range(max_iterations):
-            before, v = v, (h - v @ off.T) / diagonal
-            if np.abs(v - before).max() <= tolerance:
-                break
-        return np.asarray(v)
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Return the outputs reached over a box of inputs, each by itself."""

@@ -139,28 +139,6 @@ class LoadEstimate(Block):
                 "do not tell them apart. Remedy: identify a balance with fewer loads."
             )
 
-    @classmethod
-    def of(cls, model: Block) -> Self:
-        """Return the estimate of a balance of forces, or of its inverse.
-
-        Raises
-        ------
-        ModelError
-            If the model is another, or its loads cannot be told.
-        """
-        match model:
-            case Balance():
-                return cls(model)
-            case LoadEstimate():
-                raise ModelError("this is an estimate of loads already. Remedy: simulate it.")
-        balance, acting, sensors = parts_of(model)
-        if acting or sensors:
-            raise ModelError(
-                "this model's sensors or pressures count otherwise than its balance's. Remedy: use "
-                "mckibben.blocks.coupled.load_estimate.load_of."
-            )
-        return cls(balance)
-
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
         """Whether the balance is."""
@@ -235,15 +213,16 @@ def load_of(model: Block) -> Block:
     ModelError
         If the model knows no load.
     """
-    if isinstance(model, Balance | LoadEstimate):
-        return LoadEstimate.of(model)
+    if isinstance(model, LoadEstimate):
+        raise ModelError("this is an estimate of loads already. Remedy: simulate it.")
+    if isinstance(model, Balance):
+        return LoadEstimate(model)
     balance, acting, sensors = parts_of(model)
     if acting is None and sensors is None:
-        return LoadEstimate.of(balance)
+        return LoadEstimate(balance)
     shortening = _each(sensors.inverse() if sensors else None, balance.driven)
-    return Series(
-        (PerChannel((*shortening, *_each(acting, balance.given))), LoadEstimate.of(balance))
-    )
+    parts = (*shortening, *_each(acting, balance.given))
+    return Series((PerChannel(parts), LoadEstimate(balance)))
 
 
 def _each(block: Block | None, channels: Sequence[Channel]) -> tuple[Block, ...]:

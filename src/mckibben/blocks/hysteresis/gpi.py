@@ -29,9 +29,10 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import start_learning
-from mckibben.blocks.adaptive.operators import LearntOperators, follow_learning, inverse_at
-from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.adaptive.learning import Learnable, start_learning
+from mckibben.blocks.adaptive.operators import follow_learning, inverse_at, learnable_operators
+from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -39,6 +40,7 @@ from mckibben.blocks.fields import (
     ChannelField,
     StoredInitial,
     Vector,
+    vector,
 )
 from mckibben.blocks.hysteresis.envelopes.base import Envelope, nested_envelope
 from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
@@ -49,8 +51,9 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_operators,
     start_sum,
 )
-from mckibben.blocks.inverse import check_input_range
+from mckibben.blocks.inverse import Invertible, check_input_range
 from mckibben.blocks.kernels import Step, kernel, step, summing_step
+from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -201,7 +204,7 @@ def gpi_matrix(
 
 
 @dataclass(frozen=True, config=STRICT)
-class GPI(LearntOperators):
+class GPI(Invertible):
     """Generalised Prandtl-Ishlinskii model.
 
     Parameters
@@ -267,16 +270,6 @@ class GPI(LearntOperators):
         return self._kernels.inverse_start
 
     @property
-    def adaptive_kernel(self) -> Kernel:  # type: ignore[override]
-        """That of its kinds of envelopes."""
-        return self._kernels.adaptive_step
-
-    @property
-    def adaptive_start_kernel(self) -> Start:  # type: ignore[override]
-        """That of its kinds of envelopes."""
-        return self._kernels.adaptive_start
-
-    @property
     def _kernels(self) -> Kernels:
         return kernels_of(type(self.rising), type(self.falling))
 
@@ -321,11 +314,6 @@ class GPI(LearntOperators):
                 "keeps them in order."
             )
 
-    @property
-    def whole_changes(self) -> Array:
-        """What is reached, the width of the widest loop, and what is reached."""
-        return np.array([self.span, 2 * np.dot(self.weights, self.thresholds), self.span])
-
     def inverse_numbers(self, own: Array) -> Array:
         """Return [lowest, highest input], then this model's."""
         return np.array([*self.input_limits, *own])
@@ -335,18 +323,18 @@ class GPI(LearntOperators):
         return (np.dot(self.weights, state[:-1]),)
 
     @property
-    def learnt_limits(self) -> tuple[float, float]:
-        """What the envelopes make of the lowest and highest input."""
+    def learnable(self) -> Learnable:
+        """Weights, and an offset that the model itself has not."""
         low, high = self.input_range
-        return float(self.falling(low)), float(self.rising(high))
+        limits = float(self.falling(low)), float(self.rising(high))
+        kernels = self._kernels.adaptive_step, self._kernels.adaptive_start
 
-    def retaught(self, theta: Array) -> GPI:
-        """Return the model with other weights; it has no offset."""
-        return replace(self, weights=tuple(theta[:-1].tolist()))
+        def with_parameters(theta: Array) -> Block:
+            changed, offset = replace(self, weights=vector(theta[:-1])), float(theta[-1])
+            shift = Affine(1.0, offset, self.output, self.output)
+            return Series((changed, shift)) if offset else changed
 
-    def added(self, theta: Array) -> float:
-        """Return the offset."""
-        return float(theta[-1])
+        return learnable_operators(self, limits, 0.0, *kernels, with_parameters)
 
     @classmethod
     def example(cls) -> Self:

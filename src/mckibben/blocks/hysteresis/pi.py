@@ -18,8 +18,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import start_learning
-from mckibben.blocks.adaptive.operators import LearntOperators, follow_learning, inverse_at
+from mckibben.blocks.adaptive.learning import Learnable, start_learning
+from mckibben.blocks.adaptive.operators import follow_learning, inverse_at, learnable_operators
 from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.fields import (
     DISPLACEMENT,
@@ -28,6 +28,7 @@ from mckibben.blocks.fields import (
     ChannelField,
     StoredInitial,
     Vector,
+    vector,
 )
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
@@ -36,7 +37,7 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_operators,
     start_sum,
 )
-from mckibben.blocks.inverse import check_input_range
+from mckibben.blocks.inverse import Invertible, check_input_range
 from mckibben.blocks.kernels import kernel, step, summing_step
 from mckibben.blocks.notation import FEW, Notation, summed, tex
 
@@ -117,7 +118,7 @@ def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: 
 
 
 @dataclass(frozen=True, config=STRICT)
-class PI(LearntOperators):
+class PI(Invertible):
     """Classical Prandtl-Ishlinskii model.
 
     Parameters
@@ -141,8 +142,6 @@ class PI(LearntOperators):
     start_kernel: ClassVar[Start] = pi_start
     inverse_kernel: ClassVar[Kernel] = pi_inverse_step
     inverse_start_kernel: ClassVar[Start] = pi_inverse_start
-    adaptive_kernel: ClassVar[Kernel] = pi_adaptive_step
-    adaptive_start_kernel: ClassVar[Start] = pi_adaptive_start
     inverse_remembers = "output"
     increasing = ("thresholds",)
     parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
@@ -184,11 +183,6 @@ class PI(LearntOperators):
         """Demand a first threshold of 0, and partial sums of the weights that are positive."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
 
-    @property
-    def whole_changes(self) -> Array:
-        """What is reached, the width of the widest loop, and what is reached."""
-        return np.array([self.span, 2 * np.dot(self.weights, self.thresholds), self.span])
-
     def inverse_numbers(self, own: Array) -> Array:
         """Return [lowest, highest input, offset, thresholds, weights]."""
         return np.array([*self.input_limits, *own])
@@ -197,9 +191,17 @@ class PI(LearntOperators):
         """Return the output."""
         return (self.offset + np.dot(self.weights, state),)
 
-    def retaught(self, theta: Array) -> PI:
-        """Return the model with other weights and another offset."""
-        return replace(self, weights=tuple(theta[:-1].tolist()), offset=float(theta[-1]))
+    @property
+    def learnable(self) -> Learnable:
+        """Weights and the offset."""
+        return learnable_operators(
+            self,
+            self.input_limits,
+            self.offset,
+            pi_adaptive_step,
+            pi_adaptive_start,
+            lambda theta: replace(self, weights=vector(theta[:-1]), offset=float(theta[-1])),
+        )
 
     def worked(self) -> tuple[str, ...]:
         """Return the sum with its numbers, where it is short."""

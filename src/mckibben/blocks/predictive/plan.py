@@ -1,20 +1,28 @@
-"""The plan of a horizon: pressures of all muscles in so many samples, as near a wish as limits let.
+"""Plans of a horizon: pressures of all muscles in so many samples, as near a wish as limits let.
 
-    min sum_t |G_t (p_t - q_t) - e_t|^2 / 2   where rows of `mckibben.blocks.predictive.supply` hold.
+    min sum_t |G_t (p_t - q_t) - e_t|^2 / 2   where all limits hold.
 
-G_t (n by n) are the model's slopes along the pressures q_t, and e_t is what these leave of the error.
-It is solved by a primal-dual interior-point method with Mehrotra's predictor (Nocedal and Wright,
-"Numerical Optimization", ch. 16): each of few steps is one block-tridiagonal system, so that the time
-grows with the horizon only as its length.
+G_t (n by n) are the model's slopes along the pressures q_t, and e_t is what these leave of the error. A
+limit is a row [whether it is of changes, bound, n weights]: the weighted sum of the n pressures, or of
+how they change in a step, stays at or below the bound. A row with one weight is a muscle's own.
+
+Of several muscles, `plan_several` solves it by a primal-dual interior-point method with Mehrotra's
+predictor (Nocedal and Wright, "Numerical Optimization", ch. 16): each of few steps is one block-
+tridiagonal system, so that the time grows only in proportion to the horizon. Of one muscle, `plan_one`
+solves it exactly, by dynamic programming, in bounded time.
+
+Kernels take tables row after row. A *path* is the n pressures before the horizon, then those of its
+samples, n each.
 """
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.predictive.supply import weighed_at
+from mckibben.blocks.kernels import SLACK, kernel
 
 MOST_STEPS = 30
 """Of the interior-point method; it takes about ten."""
@@ -25,15 +33,123 @@ CLOSED = 1e-11
 STAYS, FLAT = 1e-9, 1e-30
 """Weight of staying where no slope pulls, and mean squared slope below which there is none."""
 
-SINGLE = {"CLOSED": 1e-7, "STAYS": 1e-6, "FLAT": 1e-30}
+STAYING = 1e-6
+"""The same of one muscle: share of the mean squared slope by which pressures stay."""
 
 ROOM = 0.3
 """Least room that limits are given at the start [bar], and their price."""
 
+SINGLE = {"CLOSED": 1e-7, "STAYS": 1e-6, "FLAT": 1e-30, "STAYING": 1e-6}
+
+
+def limit_rows(
+    low: Array, high: Array, change: float, total: float, draw: float, volumes: Array
+) -> Array:
+    """Return all limits, shape (rows, 2 + n); those that are infinite are left out.
+
+    Parameters
+    ----------
+    low, high : array, shape (n,)
+        Of pressures [bar].
+    change : float
+        Furthest change in a step [bar].
+    total : float
+        Highest sum of pressures [bar].
+    draw : float
+        Most air drawn in a step, volume by pressure. Only rises draw: what one muscle vents is lost to
+        the others, so every set of muscles has a row.
+    volumes : array, shape (n,)
+        Of muscles.
+    """
+    n = low.size
+    found: list[list[float]] = []
+    for k in range(n):
+        own = np.eye(n)[k]
+        found += [[0.0, high[k], *own], [0.0, -low[k], *-own]]
+        found += [[1.0, change, *own], [1.0, change, *-own]]
+    found.append([0.0, total, *np.ones(n)])
+    for size in range(1, n + 1):
+        for some in combinations(range(n), size):
+            drawing = np.zeros(n)
+            drawing[list(some)] = volumes[list(some)]
+            found.append([1.0, draw, *drawing])
+    table = np.array(found)
+    table[:, 1:] /= np.linalg.norm(table[:, 2:], axis=1, keepdims=True)
+    return table[np.isfinite(table[:, 1])]
+
+
+@kernel
+def weighed(row: Array, path: Array, t: int) -> float:
+    """Return the weighted sum that a row limits, in sample t of a path."""
+    n, total = row.size - 2, 0.0
+    for k in range(n):
+        from_here = path[t * n + k] if row[0] > 0.0 else 0.0
+        total += row[2 + k] * (path[(t + 1) * n + k] - from_here)
+    return total
+
+
+@kernel
+def own_place(row: Array) -> int:
+    """Return the muscle that a row is of, or -1 if of several."""
+    found = -1
+    for k in range(row.size - 2):
+        if row[2 + k] != 0.0:
+            if found >= 0:
+                return -1
+            found = k
+    return found
+
+
+@kernel
+def allowed(n: int, rows: Array, path: Array, t: int, at_any_rate: bool) -> bool:
+    """Move sample t of a path to where it may be; return whether it was there already.
+
+    Each pressure goes to its own limits; what the supply cannot give is taken from all changes in one
+    share. Limits of changes are left out where it may move at any rate.
+    """
+    there, width = True, n + 2
+    m, now, before = rows.size // width, path[(t + 1) * n :], path[t * n :]
+    for turn in range(2):  # changes first: the range is what counts in the end
+        for i in range(m):
+            row = rows[i * width : (i + 1) * width]
+            own = own_place(row)
+            if own >= 0 and int(row[0]) == 1 - turn and not (at_any_rate and turn == 0):
+                over = weighed(row, path, t) - row[1]
+                if over > 0.0:
+                    now[own] -= over / row[2 + own]
+                    there = there and over <= SLACK
+    share = 1.0
+    for i in range(m):
+        limit = rows[i * width : (i + 1) * width]
+        if own_place(limit) < 0 and not (at_any_rate and limit[0] > 0.0):
+            wanted, was = weighed(limit, path, t), 0.0
+            for k in range(n if limit[0] == 0.0 else 0):
+                was += limit[2 + k] * before[k]
+            if wanted > limit[1]:
+                there = there and wanted - limit[1] <= SLACK
+                if wanted > was:
+                    share = min(share, max(limit[1] - was, 0.0) / (wanted - was))
+    if share < 1.0:
+        for k in range(n):
+            now[k] = before[k] + share * (now[k] - before[k])
+    return there
+
+
+@kernel
+def kept_to(n: int, rows: Array, path: Array) -> bool:
+    """Clip a path to all limits, sample by sample; return whether it kept to them."""
+    there = True
+    for t in range(path.size // n - 1):
+        one = allowed(n, rows, path, t, False)
+        there = there and one
+    return there
+
 
 @kernel
 def plan_scratch(length: int, n: int, rows: int) -> int:
-    """Return how many numbers `plan` computes in."""
+    """Return how many numbers a plan is computed in."""
+    if n == 1:
+        return 9 * length + 4
     return length * (3 * n * n + 3 * n + 6 * rows) + 2 * n * n + 2 * n
 
 
@@ -68,20 +184,12 @@ def applied(n: int, matrix: Array, x: Array, scale: float, y: Array) -> None:
 
 
 @kernel
-def factored(
-    n: int,
-    rows: Array,
-    hessian: Array,
-    room: Array,
-    price: Array,
-    off: Array,
-    factors: Array,
-    work: Array,
-) -> None:
-    """Factor the system of one step: ``factors`` are inverses along the diagonal, ``off`` beside it."""
-    width, block = n + 2, n * n
-    m = rows.size // width
-    length = room.size // m
+def factored(n: int, rows: Array, hessian: Array, duals: Array, system: Array, work: Array) -> None:
+    """Factor the system of one step, [beside the diagonal, inverses along it], n by n a sample."""
+    width, block, count = n + 2, n * n, duals.size // 6
+    m, length = rows.size // width, hessian.size // block
+    room, price = duals[:count], duals[count : 2 * count]
+    off, factors = system[: length * block], system[length * block :]
     matrix, product = work[:block], work[block : 2 * block]
     for t in range(length):
         beside = off[t * block : (t + 1) * block]
@@ -118,63 +226,50 @@ def factored(
 
 @kernel
 def moved(
-    n: int,
-    rows: Array,
-    factors: Array,
-    off: Array,
-    right: Array,
-    step: Array,
-    room: Array,
-    price: Array,
-    goal: Array,
-    room_step: Array,
-    price_step: Array,
-    short: Array,
-    point: Array,
+    n: int, rows: Array, system: Array, right: Array, step: Array, duals: Array, work: Array
 ) -> None:
-    """Solve for one step of pressures, of the room that limits leave, and of their prices.
+    """Solve for one step of a path, of the room that limits leave, and of their prices.
 
-    ``right`` is what the pressures' gradient lacks; ``goal`` what room times price shall become, over
-    room; ``short`` what rooms are off.
+    ``right`` is what the pressures' gradient lacks; ``duals`` are [room, price, what rooms are off, what
+    room times price shall become over room, step of room, step of price], all rows of each sample.
     """
     width, block, length = n + 2, n * n, right.size // n
-    m = rows.size // width
-    none, forward = point[:n], point[n : 2 * n]
+    m, count = rows.size // width, duals.size // 6
+    room, price, short = duals[:count], duals[count : 2 * count], duals[2 * count : 3 * count]
+    goal, room_step = duals[3 * count : 4 * count], duals[4 * count : 5 * count]
+    price_step, forward = duals[5 * count :], work[:n]
+    off, factors = system[: length * block], system[length * block :]
     for k in range(n):
-        none[k] = 0.0
-    for t in range(length):
-        for k in range(n):
-            step[t * n + k] = right[t * n + k]
+        step[k] = 0.0
+    for i in range(right.size):
+        step[n + i] = right[i]
     for t in range(length):
         for i in range(m):
             row, at = rows[i * width : (i + 1) * width], t * m + i
             pull = goal[at] - price[at] + price[at] / room[at] * short[at]
             for k in range(n):
-                step[t * n + k] -= pull * row[2 + k]
+                step[(t + 1) * n + k] -= pull * row[2 + k]
                 if t > 0 and row[0] > 0.0:
-                    step[(t - 1) * n + k] += pull * row[2 + k]
+                    step[t * n + k] += pull * row[2 + k]
     for t in range(length):
-        now = step[t * n : (t + 1) * n]
+        now = step[(t + 1) * n : (t + 2) * n]
         for k in range(n):
             forward[k] = now[k]
         if t > 0:
-            beside = off[t * block : (t + 1) * block]
-            applied(n, beside, step[(t - 1) * n : t * n], -1.0, forward)
+            applied(n, off[t * block : (t + 1) * block], step[t * n : (t + 1) * n], -1.0, forward)
         for k in range(n):
             now[k] = 0.0
         applied(n, factors[t * block : (t + 1) * block], forward, 1.0, now)
     for t in range(length - 2, -1, -1):
         for k in range(n):
             forward[k] = 0.0
-        after = step[(t + 1) * n : (t + 2) * n]
+        after, here = step[(t + 2) * n : (t + 3) * n], step[(t + 1) * n : (t + 2) * n]
         applied(n, off[(t + 1) * block : (t + 2) * block], after, 1.0, forward)
-        own = factors[t * block : (t + 1) * block]
-        applied(n, own, forward, -1.0, step[t * n : (t + 1) * n])
+        applied(n, factors[t * block : (t + 1) * block], forward, -1.0, here)
     for t in range(length):
         for i in range(m):
             at = t * m + i
-            change = weighed_at(n, rows[i * width : (i + 1) * width], none, step, t)
-            room_step[at] = -short[at] - change
+            room_step[at] = -short[at] - weighed(rows[i * width : (i + 1) * width], step, t)
             price_step[at] = goal[at] - price[at] - price[at] / room[at] * room_step[at]
 
 
@@ -189,32 +284,29 @@ def furthest(values: Array, steps: Array) -> float:
 
 
 @kernel
-def plan(
-    n: int,
-    rows: Array,
-    before: Array,
-    slopes: Array,
-    nominal: Array,
-    errors: Array,
-    p: Array,
-    scratch: Array,
+def plan_several(
+    n: int, rows: Array, slopes: Array, nominal: Array, errors: Array, path: Array, scratch: Array
 ) -> int:
-    """Find the pressures of a horizon, N by n in a row, from those before it; return the steps taken.
+    """Find the pressures of a horizon from those before it; return the steps taken.
 
-    ``slopes`` are N by n by n in a row; ``nominal`` (q), ``errors`` (e) and ``p`` are N by n.
+    ``slopes`` are N by n by n, ``nominal`` (q) and ``errors`` (e) N by n.
     """
-    width, block, length = n + 2, n * n, p.size // n
+    width, block, length = n + 2, n * n, nominal.size // n
     m = rows.size // width
-    hessian, off = scratch[: length * block], scratch[length * block : 2 * length * block]
-    factors, rest = scratch[2 * length * block : 3 * length * block], scratch[3 * length * block :]
-    wished, right = rest[: length * n], rest[length * n : 2 * length * n]
-    step, tables = rest[2 * length * n : 3 * length * n], rest[3 * length * n :]
-    room, price = tables[: length * m], tables[length * m : 2 * length * m]
-    short, goal = tables[2 * length * m : 3 * length * m], tables[3 * length * m : 4 * length * m]
-    room_step = tables[4 * length * m : 5 * length * m]
-    price_step, work = tables[5 * length * m : 6 * length * m], tables[6 * length * m :]
+    count, size_of = length * m, length * block
+    hessian, system = scratch[:size_of], scratch[size_of : 3 * size_of]
+    wished, right = (
+        scratch[3 * size_of : 3 * size_of + length * n],
+        scratch[3 * size_of + length * n : 3 * size_of + 2 * length * n],
+    )
+    rest = scratch[3 * size_of + 2 * length * n :]
+    step, duals = rest[: (length + 1) * n], rest[(length + 1) * n : (length + 1) * n + 6 * count]
+    work = rest[(length + 1) * n + 6 * count :]
+    room, price, short = duals[:count], duals[count : 2 * count], duals[2 * count : 3 * count]
+    goal, room_step = duals[3 * count : 4 * count], duals[4 * count : 5 * count]
+    price_step, p = duals[5 * count :], path[n:]
     size = 0.0
-    for i in range(length * block):
+    for i in range(size_of):
         size += slopes[i] * slopes[i]
     size = max(size / (length * n), FLAT)
     for t in range(length):
@@ -236,7 +328,7 @@ def plan(
             p[t * n + k] = nominal[t * n + k]
         for i in range(m):
             row = rows[i * width : (i + 1) * width]
-            room[t * m + i] = max(row[1] - weighed_at(n, row, before, p, t), ROOM)
+            room[t * m + i] = max(row[1] - weighed(row, path, t), ROOM)
             price[t * m + i] = ROOM
     for taken in range(MOST_STEPS):
         gap, amiss = 0.0, 0.0
@@ -248,66 +340,135 @@ def plan(
         for t in range(length):
             for i in range(m):
                 limit, at = rows[i * width : (i + 1) * width], t * m + i
-                short[at] = weighed_at(n, limit, before, p, t) + room[at] - limit[1]
+                short[at] = weighed(limit, path, t) + room[at] - limit[1]
                 amiss = max(amiss, abs(short[at]))
                 gap += room[at] * price[at]
                 for k in range(n):
                     right[t * n + k] -= price[at] * limit[2 + k]
                     if t > 0 and limit[0] > 0.0:
                         right[(t - 1) * n + k] += price[at] * limit[2 + k]
-        gap /= length * m
+        gap /= count
         if gap <= CLOSED and amiss * amiss <= CLOSED:
             return taken
-        factored(n, rows, hessian, room, price, off, factors, work)
-        for i in range(length * m):
+        factored(n, rows, hessian, duals, system, work)
+        for i in range(count):
             goal[i] = 0.0
-        moved(
-            n,
-            rows,
-            factors,
-            off,
-            right,
-            step,
-            room,
-            price,
-            goal,
-            room_step,
-            price_step,
-            short,
-            work,
-        )
+        moved(n, rows, system, right, step, duals, work)
         share, dear = furthest(room, room_step), furthest(price, price_step)
         then = 0.0
-        for i in range(length * m):
+        for i in range(count):
             then += (room[i] + share * room_step[i]) * (price[i] + dear * price_step[i])
-        then = then / (length * m) / gap
+        then = then / count / gap
         centre = gap * then * then * then
-        for i in range(length * m):
+        for i in range(count):
             goal[i] = (centre - room_step[i] * price_step[i]) / room[i]
-        moved(
-            n,
-            rows,
-            factors,
-            off,
-            right,
-            step,
-            room,
-            price,
-            goal,
-            room_step,
-            price_step,
-            short,
-            work,
-        )
+        moved(n, rows, system, right, step, duals, work)
         share = 0.99 * min(furthest(room, room_step), furthest(price, price_step))
         size = 0.0
         for i in range(length * n):
-            size += abs(step[i])
+            size += abs(step[n + i])
         if not size < np.inf:  # as near as rounding lets it come
             return taken
         for i in range(length * n):
-            p[i] += share * step[i]
-        for i in range(length * m):
+            p[i] += share * step[n + i]
+        for i in range(count):
             room[i] += share * room_step[i]
             price[i] += share * price_step[i]
     return MOST_STEPS
+
+
+@kernel
+def plan_one(
+    n: int, rows: Array, slopes: Array, nominal: Array, errors: Array, path: Array, scratch: Array
+) -> int:
+    """Find the pressures of a horizon, as `plan_several`, of one muscle; return 0 steps.
+
+        V_t(p) = |g_t (p - q_t) - e_t|^2 / 2 + min V_{t+1}(p')   over   p - fall <= p' <= p + rise
+
+    is convex and piecewise quadratic, so that its derivative is kept as knots: what lies below the
+    minimum moves by the furthest rise, what lies above by the furthest fall, and between them nothing is
+    lost. The minima of all V, each approached as far as limits let, are the plan.
+    """
+    length, m = nominal.size, rows.size // 3
+    most = 4 * length + 2
+    x, d, best = scratch[:most], scratch[most : 2 * most], scratch[2 * most :]
+    low, high = -1e30, 1e30
+    for i in range(m):
+        end = rows[3 * i + 1] / rows[3 * i + 2]
+        if not rows[3 * i] > 0.0:
+            if rows[3 * i + 2] > 0.0:
+                high = min(high, end)
+            else:
+                low = max(low, end)
+    fall = high - low
+    rise = fall
+    for i in range(m):
+        if rows[3 * i] > 0.0:
+            if rows[3 * i + 2] > 0.0:
+                rise = min(rise, rows[3 * i + 1] / rows[3 * i + 2])
+            else:
+                fall = min(fall, -rows[3 * i + 1] / rows[3 * i + 2])
+    size = 0.0
+    for t in range(length):
+        size += slopes[t] * slopes[t]
+    staying = STAYING * max(size / length, STAYING)
+    count = 2
+    x[0], x[1] = low, high
+    d[0], d[1] = 0.0, 0.0
+    for t in range(length - 1, -1, -1):
+        if t + 1 < length:
+            place, at = turned(count, x, d, low, high, best, t + 1)
+            under, over = min(at, 0.0), max(at, 0.0)
+            for i in range(count - 1, place - 1, -1):
+                x[i + 4], d[i + 4] = x[i] + fall, max(d[i], 0.0)
+            for i in range(place):
+                x[i], d[i] = x[i] - rise, min(d[i], 0.0)
+            least = best[t + 1]
+            x[place], d[place] = least - rise, under
+            x[place + 1], d[place + 1] = least - rise, 0.0
+            x[place + 2], d[place + 2] = least + fall, 0.0
+            x[place + 3], d[place + 3] = least + fall, over
+            count += 4
+        weight = slopes[t] * slopes[t] + staying
+        wished = weight * nominal[t] + slopes[t] * errors[t]
+        for i in range(count):
+            d[i] += weight * x[i] - wished
+    _, _ = turned(count, x, d, low, high, best, 0)
+    last = path[0]
+    for t in range(length):
+        near = min(max(best[t], last - fall), last + rise)
+        last = min(max(near, low), high)
+        path[1 + t] = last
+    return 0
+
+
+@kernel
+def turned(
+    count: int, x: Array, d: Array, low: float, high: float, best: Array, t: int
+) -> tuple[int, float]:
+    """Find where the derivative passes 0, within the range; return the knot beyond, and the value."""
+    place = 0
+    while place < count and not d[place] > 0.0:
+        place += 1
+    if place == 0:
+        least = x[0]
+    elif place == count:
+        least = x[count - 1]
+    else:
+        rest, rate = x[place] - x[place - 1], d[place] - d[place - 1]
+        least = x[place - 1] - d[place - 1] * rest / rate
+    inside = min(max(least, low), high)
+    at = 0.0
+    if inside != least or place == 0 or place == count:
+        place = 0
+        while place < count and not x[place] > inside:
+            place += 1
+        if place == 0:
+            at = d[0]
+        elif place == count:
+            at = d[count - 1]
+        else:
+            share = (inside - x[place - 1]) / (x[place] - x[place - 1])
+            at = d[place - 1] + share * (d[place] - d[place - 1])
+    best[t] = inside
+    return place, at

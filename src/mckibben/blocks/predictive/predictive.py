@@ -12,8 +12,8 @@ References come ``horizon - 1`` samples ahead, one a sample, and are kept until 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
-from typing import Annotated, ClassVar, Self
+from functools import cache, cached_property
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt, Interval, Le
@@ -22,22 +22,23 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Cost, Kernel, Run, Start, explicit_state, needs_sample_time
+from mckibben.blocks.compose import PerChannel, Series
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.inverse import drives
-from mckibben.blocks.kernels import Step
+from mckibben.blocks.inverse import Inverse, drives
+from mckibben.blocks.kernels import Step, in_scratch, kernel, step
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.predictive.horizon import (
-    PASSES,
-    STILL,
-    horizon_scratch,
-    kernels_of,
-    plan_for_one,
+from mckibben.blocks.predictive.plan import (
+    MOST_STEPS,
+    allowed,
+    kept_to,
+    limit_rows,
+    plan_one,
+    plan_scratch,
+    plan_several,
 )
-from mckibben.blocks.predictive.memory import memory_of, resume_of, undoing
-from mckibben.blocks.predictive.plan import MOST_STEPS, plan, plan_scratch
-from mckibben.blocks.predictive.plan_one import one_scratch
-from mckibben.blocks.predictive.supply import allowed, limit_rows
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -47,7 +48,282 @@ NUDGE = 1e-3
 MOST = 1e6
 """Of limits: bar, or bar/s."""
 
+HEAD = 7
+"""Coefficients before the nudges."""
+
+PASSES = 2
+"""Times that a plan is made, each along what the model makes of the one before."""
+
+STILL = 0.1
+"""By the nudge: what moves less counts as going on as before."""
+
 Limit = Annotated[FiniteFloat, Gt(0), Le(MOST)]
+
+
+# -- the memory that a model and its inverse share -------------------------------------------------
+
+
+def model_state(compensator: Block, state: Array) -> Array:
+    """Return the model's state as a compensator's tells it.
+
+    Raises
+    ------
+    ModelError
+        If the compensator is no exact inverse, or its state does not tell the model's.
+    """
+    match compensator:
+        case Inverse() if compensator.n_states >= compensator.forward.n_states:
+            return state[: compensator.forward.n_states].copy()
+        case Series() | PerChannel():
+            parts = compensator.parts
+            shares = np.split(state, np.cumsum([part.n_states for part in parts])[:-1])
+            found = [model_state(part, own) for part, own in zip(parts, shares, strict=True)]
+            return np.concatenate(found[:: -1 if isinstance(compensator, Series) else 1])
+    if isinstance(compensator, Balance) or compensator.n_states == 0:
+        return state.copy()
+    raise ModelError(
+        f"{compensator.title!r} is no exact inverse whose memory could be foreseen. Remedy: invert a "
+        "model such as pi, gpi, mpi or balance (mckibben invert), and give that."
+    )
+
+
+def undoing_state(compensator: Block) -> Callable[[Array], Array]:
+    """Return what makes a compensator's state of its model's."""
+    match compensator:
+        case Inverse():
+            return compensator.forward.inverse_state
+        case Series() | PerChannel():
+            turn = -1 if isinstance(compensator, Series) else 1
+            parts = compensator.parts[::turn]  # in the order of the model
+            ways = [undoing_state(part) for part in parts]
+            ends = np.cumsum([part.inverse().n_states for part in parts])[:-1]
+
+            def joined(memory: Array) -> Array:
+                shares = zip(ways, np.split(memory, ends), strict=True)
+                return np.concatenate([way(share) for way, share in shares][::turn])
+
+            return joined
+    return np.copy
+
+
+Resume = Callable[[Array, Array, Array], None]
+
+
+@kernel
+def pi_resume(coefficients: Array, memory: Array, state: Array) -> None:
+    """Fill the state of a PI model's inverse from that of the model, which has these coefficients."""
+    n, y = memory.size, 0.0
+    for i in range(n):
+        state[i] = memory[i]
+        y += coefficients[1 + n + i] * memory[i]
+    state[n] = coefficients[0] + y
+    state[n + 1] = 0.0
+
+
+@kernel
+def gpi_resume(coefficients: Array, memory: Array, state: Array) -> None:
+    """Fill the state of a GPI model's inverse from that of the model, which has these coefficients."""
+    n, y = memory.size - 1, 0.0
+    for i in range(n):
+        state[i] = memory[i]
+        y += coefficients[4 + n + i] * memory[i]
+    state[n], state[n + 1], state[n + 2] = memory[n], y, 0.0
+
+
+@kernel
+def same_resume(coefficients: Array, memory: Array, state: Array) -> None:
+    """Fill a state that is that of the model."""
+    state[:] = memory
+
+
+def resume_of(compensator: Block) -> Resume | None:
+    """Return the kernel that fills a compensator's state from its model's; None where there is none."""
+    match compensator:
+        case Inverse(forward=PI()):
+            return pi_resume
+        case Inverse(forward=GPI()):
+            return gpi_resume
+        case Balance():
+            return same_resume
+    return None
+
+
+# -- its kernel ------------------------------------------------------------------------------------
+
+
+def _in_room(function: Any) -> Any:
+    """Return a step that is given scratch, whether it takes some or not."""
+
+    @kernel
+    def without_scratch(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+    ) -> None:
+        """Run what needs no scratch."""
+        function(coefficients, state, inputs, outputs)
+
+    return function if in_scratch(function) else without_scratch
+
+
+def _start_in_room(function: Any) -> Any:
+    """Return a start that is given scratch, whether it takes some or not."""
+
+    @kernel
+    def start_without_scratch(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+    ) -> None:
+        """Start what needs no scratch."""
+        function(coefficients, state, inputs, virgin)
+
+    return function if in_scratch(function) else start_without_scratch
+
+
+@cache
+def kernels_of(
+    model_step: Step, undo_step: Step, undo_start: Start, resume: Resume, *, one: bool
+) -> tuple[Step, Start]:
+    """Return the step and the start of a compensator that looks ahead, of one muscle or several.
+
+    They are made of the kernels of a model and of its inverse; ``resume`` fills the inverse's state
+    from the model's. Coefficients are [n, horizon, limits, the model's states, the inverse's, the
+    model's coefficients, the inverse's], nudges (n), lowest pressures (n), limits, and the coefficients
+    of both. The state is [the model's, references to come (horizon by n), last pressures (n), whether
+    there are some, plans made].
+    """
+    answers, undoes, begins = _in_room(model_step), _in_room(undo_step), _start_in_room(undo_start)
+    predictive_step = step_of(answers, undoes, resume, one=one, decorate=kernel)
+
+    @kernel
+    def predictive_start(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, virgin: bool
+    ) -> None:
+        """Start as the inverse does: as if its first reference had been there all along."""
+        c = coefficients
+        numbers = c[HEAD + 2 * int(c[0]) + int(c[2]) * (int(c[0]) + 2) + int(c[5]) :]
+        undoing = scratch[: int(c[4])]
+        begins(numbers, undoing, scratch[int(c[4]) :], inputs, virgin)
+        state[:] = 0.0
+        state[: int(c[3])] = undoing[: int(c[3])]
+
+    return step(predictive_step), predictive_start
+
+
+def step_of(
+    answers: Any, undoes: Any, resume: Any, *, one: bool, decorate: Callable[[Any], Any]
+) -> Callable[..., None]:
+    """Return the step of `kernels_of`, uncompiled; what it calls is compiled, or decorated.
+
+    Where a model is of several kernels, ``answers``, ``undoes`` and ``resume`` are not compiled either.
+    """
+    planner: Any = plan_one if one else plan_several
+
+    @decorate
+    def linearise(
+        n: int,
+        model: Array,
+        nudges: Array,
+        memory: Array,
+        wished: Array,
+        path: Array,
+        given: Array,
+        tables: Array,
+        states: Array,
+        room: Array,
+    ) -> None:
+        """Find the errors along a path, and the model's slopes where the motion goes on.
+
+        ``tables`` become [slopes, errors]; they are followed by three vectors to compute in.
+        """
+        size, count = memory.size, wished.size
+        trial, kept, after = states[:size], states[size : 2 * size], states[2 * size : 3 * size]
+        slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
+        vectors = tables[(n + 1) * count :]
+        way, answer, change = vectors[:n], vectors[n : 2 * n], vectors[2 * n : 3 * n]
+        way[:] = 1.0
+        kept[:] = memory
+        for t in range(count // n):
+            for k in range(n):
+                p = path[(t + 1) * n + k]
+                moved = p - path[t * n + k]
+                if abs(moved) > STILL * nudges[k]:
+                    way[k] = 1.0 if moved > 0.0 else -1.0
+                given[k] = p
+            trial[:] = kept
+            answers(model, trial, room, given, answer)
+            after[:] = trial
+            for k in range(n):
+                given[k] = path[(t + 1) * n + k] + way[k] * nudges[k]
+                trial[:] = kept
+                answers(model, trial, room, given, change)
+                for i in range(n):
+                    slopes[(t * n + i) * n + k] = (change[i] - answer[i]) / (way[k] * nudges[k])
+                given[k] = path[(t + 1) * n + k]
+            for k in range(n):
+                errors[t * n + k] = wished[t * n + k] - answer[k]
+            kept[:] = after
+
+    def predictive_step(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+    ) -> None:
+        """Give the first pressures of a horizon within all limits, and take that step."""
+        c = coefficients
+        n, count, size, n_undoing = int(c[0]), int(c[1]) * int(c[0]), int(c[3]), int(c[4])
+        nudges, lowest, numbers = c[HEAD : HEAD + n], c[HEAD + n : HEAD + 2 * n], c[HEAD + 2 * n :]
+        n_limits = int(c[2]) * (n + 2)
+        rows, own = numbers[:n_limits], numbers[n_limits:]
+        model, undo = own[: int(c[5])], own[int(c[5]) : int(c[5]) + int(c[6])]
+        memory, wished, last = state[:size], state[size : size + count], state[size + count :]
+        states, undoing = scratch[: 3 * size], scratch[3 * size : 3 * size + n_undoing]
+        given = scratch[3 * size + n_undoing : 3 * size + n_undoing + inputs.size]
+        rest = scratch[3 * size + n_undoing + inputs.size :]
+        path, nominal = rest[: n + count], rest[n + count : 2 * (n + count)]
+        tables = rest[2 * (n + count) : 2 * (n + count) + (n + 1) * count + 3 * n]
+        room = rest[2 * (n + count) + (n + 1) * count + 3 * n :]
+        first = last[n] == 0.0
+        for i in range(count - n):
+            wished[i] = inputs[i % n] if first else wished[i + n]
+        wished[count - n :] = inputs[:n]
+        resume(model, memory, undoing)
+        given[:] = inputs
+        for t in range(int(c[1])):
+            given[:n] = wished[t * n : (t + 1) * n]
+            undoes(undo, undoing, room, given, path[(t + 1) * n : (t + 2) * n])
+        if first:  # whatever the rate
+            nominal[:n] = lowest
+            nominal[n : 2 * n] = path[n : 2 * n]
+            _ = allowed(n, rows, nominal, 0, True)
+            last[:n] = nominal[n : 2 * n]
+            last[n] = 1.0
+        path[:n] = last[:n]
+        nominal[:] = path
+        if not kept_to(n, rows, path):
+            slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
+            for _ in range(PASSES):
+                linearise(n, model, nudges, memory, wished, nominal, given, tables, states, room)
+                _ = planner(n, rows, slopes, nominal[n:], errors, path, room)
+                _ = kept_to(n, rows, path)
+                nominal[:] = path
+            last[n + 1] += 1.0
+        last[:n] = path[n : 2 * n]
+        given[:n] = last[:n]
+        answers(model, memory, room, given, nominal[:n])
+        outputs[:] = last[:n]
+
+    return predictive_step
+
+
+def one_step_of(block: Block, sample_time: float) -> Callable[..., None]:
+    """Return what runs a block of several kernels as their steps in scratch are run."""
+    state = np.empty(block.n_states)
+    given, found = np.empty((1, len(block.inputs))), np.empty((1, len(block.outputs)))
+    run = block.bind(sample_time, state, given, found)
+
+    def answers(numbers: Array, memory: Array, room: Array, inputs: Array, outputs: Array) -> None:
+        del numbers, room
+        state[:], given[0] = memory, inputs
+        run()
+        memory[:], outputs[:] = state, found[0]
+
+    return answers
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -96,7 +372,7 @@ class Predictive(Block):
     volumes: Vector = ()
 
     def __post_init__(self) -> None:
-        memory_of(self.compensator)
+        model_state(self.compensator, np.zeros(self.compensator.n_states))
         n = len(self.outputs)
         if strange := [c.name for c in self.outputs if not drives(c)]:
             raise ModelError(
@@ -161,7 +437,7 @@ class Predictive(Block):
         return self.undone.n_states + self.horizon * n + n + 2
 
     def rows(self, sample_time: float) -> Array:
-        """Return all limits, as `mckibben.blocks.predictive.supply` says."""
+        """Return all limits, as `mckibben.blocks.predictive.plan` says."""
         low, high = self.pressures
         most = [self.rate_limit, self.total_limit, self.flow_limit]
         rate, total, flow = (np.inf if limit is None else limit for limit in most)
@@ -173,7 +449,7 @@ class Predictive(Block):
         if initial is not None and not isinstance(initial, str):
             return explicit_state(self, initial)
         n = len(self.outputs)
-        own = memory_of(self.compensator)(self.compensator.initial_state(first, initial))
+        own = model_state(self.compensator, self.compensator.initial_state(first, initial))
         return np.concatenate([own, np.zeros(self.horizon * n + n + 2)])
 
     @property
@@ -184,8 +460,11 @@ class Predictive(Block):
     @property
     def n_scratch(self) -> int:
         """States to try, pressures, slopes, and what a plan computes in."""
-        rows = len(self.rows(1.0))
-        return horizon_scratch(self.undone, self.compensator, self.horizon, rows)
+        n, model, undo = len(self.outputs), self.undone, self.compensator
+        planned = plan_scratch(self.horizon, n, len(self.rows(1.0)))
+        own = 3 * model.n_states + undo.n_states + len(undo.inputs) + 2 * n + 3 * n
+        room = max(planned, model.n_scratch, undo.n_scratch)
+        return own + self.horizon * n * (3 + n) + room
 
     @cached_property
     def _kernels(self) -> tuple[Step, Start] | None:
@@ -208,7 +487,7 @@ class Predictive(Block):
         return self._kernels[1] if self._kernels else None
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the coefficients that `mckibben.blocks.predictive.horizon` names.
+        """Return the coefficients that `kernels_of` names.
 
         Raises
         ------
@@ -220,13 +499,16 @@ class Predictive(Block):
                 f"{self.compensator.title!r} cannot be run ahead in C. Remedy: export pi, gpi or "
                 "balance that starts at its first sample, or stream this one from Python."
             )
+        blocks = (self.undone, self.compensator)
+        return self._numbers(sample_time, [block.coefficients(sample_time) for block in blocks])
+
+    def _numbers(self, sample_time: float | None, own: list[Array]) -> Array:
+        """Return the coefficients, of these of the model and the inverse."""
         rows = self.rows(needs_sample_time(self.kind, sample_time))
         low, high = self.pressures
-        own = self.undone.coefficients(sample_time), self.compensator.coefficients(sample_time)
-        blocks = (self.undone, self.compensator)
-        head = [len(low), self.horizon, len(rows), *(block.n_states for block in blocks)]
-        head += map(len, own)
-        return np.concatenate([head, NUDGE * (high - low), low, rows.ravel(), *own])
+        head = [len(low), self.horizon, len(rows), self.undone.n_states, self.compensator.n_states]
+        sizes = [len(numbers) for numbers in own]
+        return np.concatenate([[*head, *sizes], NUDGE * (high - low), low, rows.ravel(), *own])
 
     @property
     def needs_double(self) -> str:
@@ -248,11 +530,21 @@ class Predictive(Block):
         """Return a function that looks ahead at every sample."""
         if self._kernels is not None:
             return super().bind(sample_time, state, inputs, outputs)
-        horizon = _Horizon(self, needs_sample_time(self.kind, sample_time), state)
+        numbers = self._numbers(sample_time, [np.empty(0), np.empty(0)])
+        scratch, undoing = np.empty(self.n_scratch), undoing_state(self.compensator)
+        own_time = needs_sample_time(self.kind, sample_time)
+        answers, undoes = (one_step_of(b, own_time) for b in (self.undone, self.compensator))
+
+        def resume(model: Array, memory: Array, own: Array) -> None:
+            del model
+            own[:] = undoing(memory)
+
+        one = len(self.outputs) == 1
+        advance = step_of(answers, undoes, resume, one=one, decorate=lambda function: function)
 
         def run() -> None:
             for t in range(len(inputs)):
-                outputs[t] = horizon.step(inputs[t])
+                advance(numbers, state, scratch, inputs[t], outputs[t])
 
         return run
 
@@ -260,101 +552,3 @@ class Predictive(Block):
     def example(cls) -> Self:
         """Return the inverse of a Prandtl-Ishlinskii model behind a slow valve."""
         return cls(PI.example().inverse(), horizon=8, rate_limit=10.0)
-
-
-class _Horizon:
-    """What a compensator of several kernels computes in, bound to its state."""
-
-    def __init__(self, block: Predictive, sample_time: float, state: Array) -> None:
-        model, undo = block.undone, block.compensator
-        n, length = len(block.outputs), block.horizon
-        self.n, self.length = n, length
-        self.rows = block.rows(sample_time)
-        low, high = block.pressures
-        self.lowest, self.nudges = low, NUDGE * (high - low)
-        ends = np.cumsum([model.n_states, length * n, n, 1])
-        self.memory, wished, self.before, self.started, self.planned = np.split(state, ends)
-        self.wished = wished.reshape(length, n)
-        self.undoing: Callable[[Array], Array] = undoing(undo)
-        self.undoing_state = np.empty(undo.n_states)
-        self.given = np.empty((length, len(undo.inputs)))
-        self.inverted = np.empty((length, n))
-        self.invert = undo.bind(sample_time, self.undoing_state, self.given, self.inverted)
-        self.trial, self.kept = np.empty((2, model.n_states))
-        self.driven, self.answer = np.empty((1, len(model.inputs))), np.empty((1, n))
-        self.answers = model.bind(sample_time, self.trial, self.driven, self.answer)
-        self.slopes = np.empty((length, n, n))
-        self.errors, self.planning = np.empty((2, length, n))
-        needed = one_scratch(length) if n == 1 else plan_scratch(length, n, len(self.rows))
-        self.scratch = np.empty(needed)
-
-    def step(self, inputs: Array) -> Array:
-        """Return the pressures of a sample, shape (n,), and take the step."""
-        first = not self.started[0]
-        self.wished[:-1] = inputs[: self.n] if first else self.wished[1:]
-        self.wished[-1] = inputs[: self.n]
-        self.given[:, : self.n] = self.wished
-        self.given[:, self.n :] = self.driven[0, self.n :] = inputs[self.n :]
-        self.undoing_state[:] = self.undoing(self.memory)
-        self.invert()
-        if first:  # whatever the rate
-            self.before[:] = self.inverted[0]
-            allowed(self.rows[self.rows[:, 0] == 0.0].ravel(), self.lowest, self.before)
-            self.started[0] = 1.0
-        pressures = self.inverted.copy()
-        if not self._kept_to(pressures):
-            pressures = self._planned()
-            self.planned[0] += 1.0
-        self.before[:] = pressures[0]
-        self.trial[:] = self.memory
-        self._answered(self.before)
-        self.memory[:] = self.trial
-        return self.before
-
-    def _kept_to(self, pressures: Array) -> bool:
-        """Clip pressures of a horizon to all limits, in turn; tell whether they kept to them."""
-        there, before = True, self.before
-        for row in pressures:
-            there = allowed(self.rows.ravel(), before, row) and there
-            before = row
-        return there
-
-    def _planned(self) -> Array:
-        """Return the pressures of a horizon that come nearest to the references, within limits."""
-        pressures = self.inverted
-        for _ in range(PASSES):
-            self._linearised(pressures)
-            slopes, nominal, errors, planned = (
-                table.reshape(-1) for table in (self.slopes, pressures, self.errors, self.planning)
-            )
-            given = (slopes, nominal, errors, planned, self.scratch)
-            planner = plan_for_one if self.n == 1 else plan
-            planner(self.n, self.rows.ravel(), self.before, *given)
-            pressures = self.planning.copy()
-            self._kept_to(pressures)
-        return pressures
-
-    def _answered(self, pressures: Array) -> Array:
-        self.driven[0, : self.n] = pressures
-        self.answers()
-        return self.answer[0]
-
-    def _linearised(self, pressures: Array) -> None:
-        """Find the errors along pressures, and the model's slopes where the motion goes on."""
-        way, before = np.ones(self.n), self.before
-        self.kept[:] = self.memory
-        for t, row in enumerate(pressures):
-            moved = row - before
-            way = np.where(np.abs(moved) > STILL * self.nudges, np.sign(moved), way)
-            self.trial[:] = self.kept
-            answer = self._answered(row).copy()
-            after = self.trial.copy()
-            for k in range(self.n):
-                nudged = row.copy()
-                nudged[k] += way[k] * self.nudges[k]
-                self.trial[:] = self.kept
-                change = self._answered(nudged) - answer
-                self.slopes[t, :, k] = change / (way[k] * self.nudges[k])
-            self.errors[t] = self.wished[t] - answer
-            self.kept[:] = after
-            before = row

@@ -1,19 +1,47 @@
-"""A fuzzy network as identification sees it: sets, what fires, and consequents.
+"""Identification of fuzzy networks: antecedents searched on some samples, consequents solved for on all.
 
 Consequents are linear and solved for by least squares, whatever the antecedents; only the centres and
-widths of the sets are searched.
+widths of the sets are searched: by variable projection (Kaufman's form, with Levenberg-Marquardt steps
+from even sets), or by the particle swarm of "Modeling and Compensation of Stiffness-Dependent Hysteresis
+Coupling Behavior for Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator", Algorithm 1. There
+centres and widths start from N(0, 1), in the inputs' own units; the consequents' printed start is of no
+effect, and the inertia is not printed.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
+from mckibben.estimators.optimisers.multi_start import trust_region
+from mckibben.estimators.optimisers.tracker import Tracker
 
 LIGHTEST = 1e-11
 """Damping of every consequent, relative to the size of what it multiplies."""
+
+NARROWEST, WIDEST = 0.15, 1.5
+"""Widths of sets, relative to the range of their input."""
+
+MOST_STEPS = 15
+"""Of variable projection."""
+
+LEAST_GAIN = 2e-4
+"""Share of the squared error that a step has to gain for another to follow."""
+
+ATTRACTION, INERTIA = 0.5, 0.7
+"""Of the swarm: c_1 and c_2 as printed, and the inertia."""
+
+LEAST_WIDTH = 1e-3
+"""Of a set in the swarm; the sign of a width means nothing, since only its square is used."""
+
+PART = 8192
+"""Samples whose regressors are in memory at once."""
+
+Method = Literal["ls", "pso"]
 
 
 @dataclass(frozen=True)
@@ -38,19 +66,15 @@ class Sets:
 
     def replaced(self, values: Array) -> Sets:
         """Return sets of the same shape from `vector`."""
-        n = self.centres.size
-        shape = self.centres.shape
-        return Sets(values[:n].reshape(shape), values[n:].reshape(shape))
+        return Sets(*values.reshape(2, *self.centres.shape))
 
 
 def memberships(x: Array, sets: Sets) -> Array:
     """Return memberships normalised input by input, shape (n, inputs, sets)."""
     z = (x[:, :, np.newaxis] - sets.centres) / sets.widths
     exponent = -0.5 * z**2
-    exponent -= exponent.max(axis=2, keepdims=True)
-    fired = np.exp(exponent)
-    normalised: Array = fired / fired.sum(axis=2, keepdims=True)
-    return normalised
+    fired = np.exp(exponent - exponent.max(axis=2, keepdims=True))
+    return np.asarray(fired / fired.sum(axis=2, keepdims=True))
 
 
 def firing(phi: Array) -> Array:
@@ -87,8 +111,7 @@ class Consequents:
     def solve(self, gram: Array, right: Array, n_terms: int) -> Array:
         """Return consequents from normal equations, shape (rules * terms, outputs)."""
         n_rules = len(gram) // n_terms
-        common = np.tile(np.eye(n_terms), (n_rules, 1))
-        parts = np.hstack([common, np.eye(len(gram))])
+        parts = np.hstack([np.tile(np.eye(n_terms), (n_rules, 1)), np.eye(len(gram))])
         whole = parts.T @ gram @ parts
         size = np.diag(whole)[:n_terms]
         unit = np.tile(1.0 / np.sqrt(np.where(size > 0, size, 1.0)), 1 + n_rules)
@@ -96,7 +119,7 @@ class Consequents:
         damping = np.repeat([0.0, self.ridge], [n_terms, len(gram)])
         whole[np.diag_indices_from(whole)] += damping + LIGHTEST
         found = np.linalg.solve(whole, unit[:, np.newaxis] * (parts.T @ right))
-        return np.asarray(parts @ (unit[:, np.newaxis] * found), dtype=np.float64)
+        return np.asarray(parts @ (unit[:, np.newaxis] * found))
 
     def fit(self, x: Array, columns: Array, y: Array) -> Array:
         """Return consequents by damped least squares, shape (rules * terms, outputs)."""
@@ -111,12 +134,6 @@ class Fitted:
     sets: Sets
     consequents: Array
 
-    def predict(self, x: Array, constants: bool) -> Array:
-        """Return the outputs."""
-        columns = regressors(x, firing(memberships(x, self.sets)), constants)
-        result: Array = columns @ self.consequents
-        return result
-
 
 @dataclass(frozen=True)
 class Problem:
@@ -126,18 +143,163 @@ class Problem:
     y: Array
     solver: Consequents
 
-    def fitted(self, sets: Sets) -> Fitted:
-        """Return the antecedents with consequents solved for."""
-        columns = regressors(self.x, firing(memberships(self.x, sets)), self.solver.constants)
-        return Fitted(sets, self.solver.fit(self.x, columns, self.y))
+    def columns(self, sets: Sets) -> Array:
+        """Return what the consequents multiply, shape (n, rules * terms)."""
+        return regressors(self.x, firing(memberships(self.x, sets)), self.solver.constants)
 
-    def errors(self, sets: Sets) -> Array:
-        """Return the errors, shape (n, outputs), the consequents solved for."""
-        return self.fitted(sets).predict(self.x, self.solver.constants) - self.y
+    def errors(self, sets: Sets, held: Problem | None = None) -> Array:
+        """Return the errors, consequents solved for, here or on held-out data, shape (n, outputs)."""
+        columns = self.columns(sets)
+        consequents = self.solver.fit(self.x, columns, self.y)
+        if held is None:
+            return np.asarray(columns @ consequents - self.y)
+        return np.asarray(held.columns(sets) @ consequents - held.y)
 
-    def cost(self, sets: Sets) -> float:
-        """Return the root of the mean square over all outputs, the consequents solved for.
+    def cost(self, sets: Sets, held: Problem | None = None) -> float:
+        """Return the root of the mean square over all outputs: the order of the paper's Eq. (26)."""
+        return float(np.sqrt(np.mean(self.errors(sets, held) ** 2)))
 
-        It orders antecedents as the paper's loss does, Eq. (26): the plain sum of squares.
-        """
-        return float(np.sqrt(np.mean(self.errors(sets) ** 2)))
+
+@dataclass(frozen=True)
+class Search:
+    """How antecedents are searched.
+
+    Parameters
+    ----------
+    method : {"ls", "pso"}
+        By variable projection, or by the paper's particle swarm.
+    samples : int
+        On how many samples, spread evenly.
+    swarm : Swarm
+        Of the particle swarm.
+    seed : int
+        Of the particle swarm.
+    """
+
+    method: Method
+    samples: int
+    swarm: Swarm
+    seed: int
+
+
+def printed_swarm(particles: int = 20, iterations: int = 50) -> Swarm:
+    """Return the paper's swarm, of its size or another."""
+    return Swarm(particles, iterations, (INERTIA, INERTIA), ATTRACTION, ATTRACTION)
+
+
+def fit_network(
+    x: Array,
+    y: Array,
+    n_sets: int,
+    solver: Consequents,
+    search: Search,
+    *,
+    tracker: Tracker,
+    validation: tuple[Array, Array] | None = None,
+) -> Fitted:
+    """Fit a network to inputs x (n, inputs) and outputs y (n, outputs).
+
+    Variable projection keeps the step that does best on the validation data, if there are any.
+    """
+
+    def thinned(x: Array, y: Array) -> Problem:
+        keep = np.linspace(0, len(x) - 1, min(len(x), search.samples)).round().astype(int)
+        return Problem(x[keep], y[keep], solver)
+
+    problem = thinned(x, y)
+    if search.method == "pso":
+        sets = swarmed(problem, n_sets, search.swarm, search.seed, tracker)
+    else:
+        held = None if validation is None else thinned(*validation)
+        sets = project(problem, n_sets, x.min(axis=0), x.max(axis=0), held, tracker)
+    gram: Array | float = 0.0
+    right: Array | float = 0.0
+    for start in range(0, len(x), PART):
+        part = slice(start, start + PART)
+        columns = Problem(x[part], y[part], solver).columns(sets)
+        gram, right = gram + columns.T @ columns, right + columns.T @ y[part]
+    n_terms = x.shape[1] + solver.constants
+    return Fitted(sets, solver.solve(np.asarray(gram), np.asarray(right), n_terms))
+
+
+def project(
+    problem: Problem, n_sets: int, low: Array, high: Array, held: Problem | None, tracker: Tracker
+) -> Sets:
+    """Return antecedents by variable projection from sets spread evenly between low and high.
+
+    Among the steps taken, the one that does best on held-out data, if there are any, is returned.
+    """
+    scale = np.where(high > low, high - low, 1.0)
+    start = Sets.even(low, low + scale, n_sets)
+    if n_sets == 1:  # it fires alone, wherever it is
+        return start
+    wide, lowest = np.repeat(scale, n_sets), np.repeat(low, n_sets)
+    lower = np.concatenate([lowest - 0.2 * wide, NARROWEST * wide])
+    upper = np.concatenate([lowest + 1.2 * wide, WIDEST * wide])
+    unit = np.concatenate([wide, wide])
+
+    def errors(theta: Array) -> Array:
+        return problem.errors(start.replaced(theta)).ravel()
+
+    def slopes(theta: Array) -> Array:
+        sets = start.replaced(theta)
+        by_theta, left = sensitivities(problem, sets)
+        cost = float(np.sqrt(np.mean(left**2)))
+        tracker.saw(theta, cost if held is None else problem.cost(sets, held))
+        return by_theta
+
+    tracker.budget = MOST_STEPS + 1
+    with tracker.searching():
+        trust_region(
+            errors,
+            slopes,
+            start.vector,
+            scale=unit,
+            bounds=(lower, upper),
+            least_gain=LEAST_GAIN,
+            max_evaluations=MOST_STEPS + 1,
+        )
+    return start if tracker.best is None else start.replaced(tracker.best)
+
+
+def sensitivities(problem: Problem, sets: Sets) -> tuple[Array, Array]:
+    """Return the derivatives of the errors by centres and widths, projected, and the errors."""
+    x, y, solver = problem.x, problem.y, problem.solver
+    n, n_in = x.shape
+    n_sets, n_out = sets.centres.shape[1], y.shape[1]
+    phi = memberships(x, sets)
+    fired = firing(phi)
+    columns = regressors(x, fired, solver.constants)
+    terms = linear_terms(x, solver.constants)
+    consequents = solver.fit(x, columns, y).reshape(-1, terms.shape[1], n_out)
+    weighted = np.einsum("nt,rto->nro", terms, consequents) * fired[:, :, np.newaxis]
+    f = weighted.sum(axis=1)
+    grid = weighted.reshape(n, *[n_sets] * n_in, n_out)
+    derivative = np.empty((n, n_out, 2, n_in, n_sets))
+    for i in range(n_in):
+        # what fires through each set of this input, (n, sets, outputs)
+        own = grid.sum(axis=tuple(1 + k for k in range(n_in) if k != i))
+        change = own - phi[:, i, :, np.newaxis] * f[:, np.newaxis, :]
+        away = x[:, i, np.newaxis] - sets.centres[i]
+        for place, slope in enumerate((away / sets.widths[i] ** 2, away**2 / sets.widths[i] ** 3)):
+            derivative[:, :, place, i] = np.moveaxis(change * slope[:, :, np.newaxis], 2, 1)
+    flat = derivative.reshape(n, -1)
+    projected = flat - columns @ solver.fit(x, columns, flat)  # less what consequents can take up
+    return projected.reshape(n * n_out, -1), (f - y).ravel()
+
+
+def swarmed(problem: Problem, n_sets: int, swarm: Swarm, seed: int, tracker: Tracker) -> Sets:
+    """Return the best antecedents that a swarm without bounds finds."""
+    rng = np.random.default_rng(seed)
+    shape = (problem.x.shape[1], n_sets)
+    start = rng.standard_normal((swarm.particles, 2 * shape[0] * shape[1]))
+    nowhere = np.full(start.shape[1], np.inf)
+
+    def sets(place: Array) -> Sets:
+        centres, widths = place.reshape(2, *shape)
+        return Sets(centres, np.maximum(np.abs(widths), LEAST_WIDTH))
+
+    def costs(places: Array) -> Array:
+        return np.array([problem.cost(sets(place)) for place in places])
+
+    return sets(particle_swarm(costs, -nowhere, nowhere, swarm, tracker, rng, start=start))

@@ -1,7 +1,9 @@
 """Identification of MPI-NARMAX: rate-dependent hysteresis, then a recurrent network with the load.
 
 Two steps: the hysteresis on the runs without load; then the network, which takes in the hysteresis, the
-measured force, and its own past output, running free.
+measured force, and its own past output, running free. Its consequents are solved for by least squares,
+with measured outputs for past ones and then, step by step, with its own; antecedents and feedbacks are
+searched.
 
 Source: "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle Using 3D
 PI-NARMAX Model", Sections 3 and 4.
@@ -9,7 +11,9 @@ PI-NARMAX Model", Sections 3 and 4.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -17,18 +21,34 @@ from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
 from mckibben import registry
+from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.errors import DataError
+from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
+from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.blocks.kernels import kernel
+from mckibben.errors import DataError, MckibbenError, ModelError, ModelWarning
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
-from mckibben.estimators.coupled.fuzzy import Sets
-from mckibben.estimators.coupled.recurrent_fit import RecurrentProblem, Shape
+from mckibben.estimators.coupled.fuzzy import Consequents, Sets, firing, regressors
+from mckibben.estimators.coupled.swarm import Swarm, particle_swarm
 from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
 from mckibben.recording import Recording
 
 UNLOADED = 0.05
 """A run is without load where its largest stays below this share of the largest of all runs."""
+
+SWARM = Swarm(20, 30, (0.9, 0.4), 2.0, 2.0, fastest=0.5, stops=False)
+"""Both attractions and the inertia are the paper's, which does not print the size."""
+
+ROUNDS = 8
+"""Times that consequents are solved for with the network's own free-running past."""
+
+SETTLING = 3000
+"""Samples for which inputs are held to see whether the network settles."""
+
+SEARCH_SAMPLES = 6000
+"""Samples of all runs on which the swarm compares free runs, from the start of each."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -87,24 +107,13 @@ class MPINarmaxEstimator(CoupledEstimator):
         free, loaded = _parted(data)
         hysteresis = self.hysteresis(free)
         known = loaded if self.learns_from == "loaded" and loaded.runs else data
-        shape = Shape(
-            self.n_sets,
-            self.output_lags,
-            self.input_lags,
-            self.scheduling_lags,
-            self.constants,
-            self.ridge,
-        )
-        problem = RecurrentProblem.of(shape, known, hysteresis)
-        low, high = problem.ranges
-        even = Sets.even(low, high, self.n_sets)
-        still = np.zeros_like(even.centres)
-        chosen = (even, still)
+        problem = RecurrentProblem.of(self, known, hysteresis)
+        even = Sets.even(*problem.ranges, self.n_sets)
+        chosen = (even, np.zeros_like(even.centres))
         if self.method == "pso":
             chosen = problem.swarm(even, self.seed, tracker)
         tracker.reached(0.9)
-        network = problem.best(*chosen)
-        return Series((hysteresis, network))
+        return Series((hysteresis, problem.best(*chosen)))
 
     def hysteresis(self, data: TrainingData) -> Block:
         """Return the hysteresis from runs without load."""
@@ -138,3 +147,195 @@ def _parted(data: TrainingData) -> tuple[TrainingData, TrainingData]:
         return replace(data, runs=runs)
 
     return those(free), those(~free)
+
+
+@kernel
+def remembered(
+    x: Array, centres: Array, widths: Array, feedbacks: Array, memberships: Array
+) -> None:
+    """Fill memberships (n, inputs, sets) of given inputs; each set remembers its last one."""
+    for t in range(x.shape[0]):
+        for i in range(x.shape[1]):
+            for s in range(centres.shape[1]):
+                last = memberships[t - 1, i, s] if t > 0 else 0.0
+                z = (x[t, i] - centres[i, s] + feedbacks[i, s] * last) / widths[i, s]
+                memberships[t, i, s] = np.exp(-0.5 * z * z)
+
+
+@dataclass(frozen=True)
+class RecurrentProblem:
+    """Runs as the network sees them: what drives and schedules it, (n, 1 + s), and the target."""
+
+    settings: MPINarmaxEstimator
+    inputs: tuple[Array, ...]
+    targets: tuple[Array, ...]
+    step: float
+    free: Channel
+    data: TrainingData
+
+    @classmethod
+    def of(
+        cls, settings: MPINarmaxEstimator, data: TrainingData, hysteresis: Block
+    ) -> RecurrentProblem:
+        """Return the problem on runs, behind a hysteresis that is known."""
+        inputs = []
+        for run in data.runs:
+            f = hysteresis.simulate(run.driven[:, 0], sample_time=run.sample_time)
+            inputs.append(np.ascontiguousarray(np.column_stack([f, run.scheduled])))
+        targets = tuple(run.outputs[:, 0] for run in data.runs)
+        step = float(data.runs[0].sample_time or 1.0)
+        return cls(settings, tuple(inputs), targets, step, hysteresis.outputs[0], data)
+
+    def regress(self, inputs: Array, past: Array) -> Array:
+        """Return all x over a run, with given outputs for past ones."""
+        e = self.settings
+
+        def back(values: Array, lag: int) -> Array:
+            return np.concatenate([np.full(lag, values[0]), values[: len(values) - lag]])
+
+        columns = [back(past, lag) for lag in range(1, e.output_lags + 1)]
+        columns += [back(inputs[:, 0], lag) for lag in range(e.input_lags + 1)]
+        for s in range(1, inputs.shape[1]):
+            columns += [back(inputs[:, s], lag) for lag in range(e.scheduling_lags + 1)]
+        return np.ascontiguousarray(np.column_stack(columns))
+
+    @property
+    def ranges(self) -> tuple[Array, Array]:
+        """Lowest and highest of every x."""
+        x = np.concatenate(list(map(self.regress, self.inputs, self.targets)))
+        low, high = x.min(axis=0), x.max(axis=0)
+        return low, np.where(high > low, high, low + 1.0)
+
+    def solved(
+        self, sets: Sets, feedbacks: Array, pasts: tuple[Array, ...]
+    ) -> RecurrentFuzzyNetwork:
+        """Return the network whose consequents are solved for with given past outputs."""
+        e, constants = self.settings, self.settings.constants
+        solver = Consequents(constants, e.ridge)
+        gram: Array | float = 0.0
+        right: Array | float = 0.0
+        n_terms = 0
+        for inputs, past, y in zip(self.inputs, pasts, self.targets, strict=True):
+            x = self.regress(inputs, past)
+            phi = np.empty((len(x), *sets.centres.shape))
+            remembered(x, sets.centres, sets.widths, feedbacks, phi)
+            fired = firing(phi)
+            fired = fired / np.maximum(fired.sum(axis=1, keepdims=True), 1e-290)
+            columns = regressors(x, fired, constants=constants)
+            gram = gram + columns.T @ columns
+            right = right + columns.T @ y[:, np.newaxis]
+            n_terms = x.shape[1] + constants
+        consequents = solver.solve(np.asarray(gram), np.asarray(right), n_terms)
+        if not constants:
+            consequents = np.pad(consequents.reshape(-1, n_terms), ((0, 0), (0, 1)))
+        return RecurrentFuzzyNetwork(
+            rows(sets.centres),
+            rows(sets.widths),
+            rows(feedbacks),
+            vector(consequents.ravel()),
+            self.step,
+            (self.free,),
+            self.data.scheduled,
+            self.data.outputs,
+            e.output_lags,
+            e.input_lags,
+            e.scheduling_lags,
+        )
+
+    def free_run(self, network: RecurrentFuzzyNetwork, inputs: Array) -> Array:
+        """Return the network's own output over inputs."""
+        output = np.empty((len(inputs), 1))
+        network.bind(self.step, network.initial_state(inputs[0]), inputs, output)()
+        return output[:, 0]
+
+    def free_runs(self, network: RecurrentFuzzyNetwork) -> list[Array]:
+        """Return the network's own outputs over all runs."""
+        return [self.free_run(network, inputs) for inputs in self.inputs]
+
+    def cost(self, outputs: list[Array]) -> float:
+        """Return the RMSE of free runs; infinite where they leave all bounds."""
+        errors = np.concatenate([z - y for z, y in zip(outputs, self.targets, strict=True)])
+        with np.errstate(over="ignore", invalid="ignore"):
+            value = float(np.sqrt(np.mean(errors**2)))
+        return value if np.isfinite(value) else np.inf
+
+    def best(self, sets: Sets, feedbacks: Array) -> RecurrentFuzzyNetwork:
+        """Return the network that runs free best, of those that learn from their own past.
+
+        Raises
+        ------
+        ModelError
+            If every one of them leaves all bounds.
+        """
+        pasts = self.targets
+        found, least = None, np.inf
+        for _ in range(ROUNDS):
+            network = self.solved(sets, feedbacks, pasts)
+            outputs = self.free_runs(network)
+            cost = self.cost(outputs)
+            if cost < least:
+                found, least = network, cost
+            if not np.isfinite(cost):
+                break
+            # halfway from what was measured to what it makes of itself: whole steps may circle
+            pasts = tuple(0.5 * (a + b) for a, b in zip(pasts, outputs, strict=True))
+        if found is None:
+            raise ModelError(
+                "the network leaves all bounds when it runs free. Remedy: raise ridge, lower n_sets, or "
+                "fit balance."
+            )
+        if not self.settles(found):
+            warnings.warn(
+                "the network does not settle while its inputs are held: do not run it free for long",
+                ModelWarning,
+                stacklevel=4,
+            )
+        return found
+
+    def settles(self, network: RecurrentFuzzyNetwork) -> bool:
+        """Tell whether outputs stay near the data's while inputs are held anywhere in their range."""
+        every = np.concatenate(self.inputs)
+        low, high = every.min(axis=0), every.max(axis=0)
+        y = np.concatenate(self.targets)
+        span = float(np.ptp(y))
+        for share, load in product((0.0, 0.5, 1.0), (0.0, 1.0)):
+            first = low + np.append(share, np.full(low.size - 1, load)) * (high - low)
+            output = self.free_run(network, np.tile(first, (SETTLING, 1)))
+            if not np.isfinite(output).all() or np.abs(output - y.mean()).max() > 2 * span:
+                return False
+        return True
+
+    def swarm(self, even: Sets, seed: int, tracker: Tracker) -> tuple[Sets, Array]:
+        """Return centres, widths and feedbacks by particle swarm on the free-running error."""
+        rng = np.random.default_rng(seed)
+        low, high = self.ranges
+        span, base = (np.repeat(end, self.settings.n_sets) for end in (high - low, low))
+        lower = np.concatenate([base, 0.15 * span, -0.3 * span])
+        upper = np.concatenate([base + span, span, 0.3 * span])
+        start = rng.uniform(lower, upper, (SWARM.particles, lower.size))
+        start[0] = np.concatenate([even.vector, np.zeros(span.size)])
+        most = max(SEARCH_SAMPLES // len(self.inputs), 100)
+        thin = replace(
+            self,
+            inputs=tuple(np.ascontiguousarray(u[:most]) for u in self.inputs),
+            targets=tuple(y[:most] for y in self.targets),
+        )
+
+        def split(place: Array) -> tuple[Sets, Array]:
+            n = even.vector.size
+            return even.replaced(place[:n]), place[n:].reshape(even.centres.shape)
+
+        def cost(place: Array) -> float:
+            try:
+                network = thin.solved(*split(place), thin.targets)
+                return thin.cost(thin.free_runs(network))
+            except (MckibbenError, np.linalg.LinAlgError):
+                return np.inf
+
+        def costs(places: Array) -> Array:
+            return np.array([cost(place) for place in places])
+
+        own = tracker.part(0.1, 0.9)
+        found = particle_swarm(costs, lower, upper, SWARM, own, rng, start=start)
+        tracker.saw_all(own)
+        return split(found)

@@ -27,9 +27,14 @@ from mckibben.blocks.hysteresis.pi import PI
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.base import CoupledEstimator
-from mckibben.estimators.coupled.fuzzy import Consequents, Fitted
-from mckibben.estimators.coupled.fuzzy_fit import Method, Search, fit_network
-from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm
+from mckibben.estimators.coupled.fuzzy import (
+    Consequents,
+    Fitted,
+    Method,
+    Search,
+    fit_network,
+    printed_swarm,
+)
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker, whole_searches

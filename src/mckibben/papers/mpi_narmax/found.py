@@ -12,7 +12,6 @@ from mckibben.blocks.base import Block
 from mckibben.control import (
     Tracked,
 )
-from mckibben.estimators.coupled.force_estimate import ForceEstimate
 from mckibben.papers.mpi_narmax.models import FREE, HELD_RUNS, TOLD
 from mckibben.papers.mpi_narmax.protocol import HELD_CYCLE, PULLED_FROM
 from mckibben.papers.reproduction import Cell, rms
@@ -27,7 +26,8 @@ class Found:
     models: Mapping[str, Block]
     displacements: Mapping[str, Mapping[str, Array]]
     facts: list[tuple[Cell, ...]]
-    estimate: ForceEstimate
+    estimate: Block
+    half_width: float
     loops: Mapping[str, Tracked]
     drift: Mapping[str, float]
     warned: list[str]
@@ -65,7 +65,7 @@ class Found:
     def forces(self) -> dict[str, tuple[Array, Array]]:
         """Measured and estimated force of the runs with a load that is not held."""
         return {
-            name: (recording["force"], self.estimate.estimate(recording)["force_model"])
+            name: (recording["force"], self.estimate.simulate(recording)["force"])
             for name, recording in self.recordings.items()
             if name not in FREE and name not in HELD_RUNS
         }

@@ -15,9 +15,7 @@ from mckibben.blocks.feedback import PIDFeedback
 from mckibben.comparison.kept import Kept
 from mckibben.control import Controller, Tracked, control_law, track, tune_pid
 from mckibben.errors import ModelWarning
-from mckibben.estimators.coupled.fuzzy import Consequents
-from mckibben.estimators.coupled.fuzzy_fit import Search, fit_network
-from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm
+from mckibben.estimators.coupled.fuzzy import Consequents, Search, fit_network, printed_swarm
 from mckibben.estimators.coupled.sdchm import SDCHMEstimator, as_block, stacked_inputs
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.papers.reproduction import Cell, Figure, Table, thinned

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.kernels import summing_kernel
+from mckibben.system.compiling import deferred
 
 LARGEST = 1e6
 """State, in units of the output's scale, that is out of all bounds: the run ends there."""
 
 
-@summing_kernel
+@partial(deferred, fastmath={"reassoc", "contract"})
 def follow_network(
     linear: Array,
     hidden: Array,

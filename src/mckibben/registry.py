@@ -26,7 +26,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "band": "mckibben.blocks.bands.band:Band",
         "banded": "mckibben.blocks.bands.banded:Banded",
         "bouc-wen": "mckibben.blocks.hysteresis.bouc_wen:BoucWen",
-        "bouc-wen-oscillator": ("mckibben.blocks.hysteresis.bouc_wen_oscillator:BoucWenOscillator"),
+        "bouc-wen-oscillator": ("mckibben.blocks.hysteresis.oscillators:BoucWenOscillator"),
         "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
         "contact": "mckibben.blocks.memoryless.contact:Contact",
@@ -34,7 +34,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "coupling": "mckibben.blocks.coupled.coupling:Coupling",
         "creep": "mckibben.blocks.dynamics.creep:Creep",
         "duhem": "mckibben.blocks.hysteresis.duhem:Duhem",
-        "duhem-oscillator": "mckibben.blocks.hysteresis.duhem_oscillator:DuhemOscillator",
+        "duhem-oscillator": "mckibben.blocks.hysteresis.oscillators:DuhemOscillator",
         "eupi": "mckibben.blocks.hysteresis.eupi:EUPI",
         "exponential": "mckibben.blocks.memoryless.logarithm:Exponential",
         "feedforward-feedback": "mckibben.blocks.feedback.feedforward_feedback:FeedforwardFeedback",
@@ -46,9 +46,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         ),
         "gpi": "mckibben.blocks.hysteresis.gpi:GPI",
         "inverse": "mckibben.blocks.inverse:Inverse",
-        "krasnoselskii-pokrovskii": (
-            "mckibben.blocks.hysteresis.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskii"
-        ),
+        "krasnoselskii-pokrovskii": ("mckibben.blocks.hysteresis.preisach:KrasnoselskiiPokrovskii"),
         "load-estimate": "mckibben.blocks.coupled.load_estimate:LoadEstimate",
         "logarithm": "mckibben.blocks.memoryless.logarithm:Logarithm",
         "maxwell-slip": "mckibben.blocks.hysteresis.maxwell_slip:MaxwellSlip",
@@ -61,7 +59,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "pi": "mckibben.blocks.hysteresis.pi:PI",
         "pid": "mckibben.blocks.feedback.pid:PIDFeedback",
         "piecewise-linear": "mckibben.blocks.memoryless.piecewise_linear:PiecewiseLinear",
-        "play": "mckibben.blocks.hysteresis.play:Play",
+        "play": "mckibben.blocks.hysteresis.play_operators:Play",
         "polynomial": "mckibben.blocks.memoryless.polynomial:Polynomial",
         "polynomial-force": "mckibben.blocks.force.polynomial_force:PolynomialForce",
         "predictive": "mckibben.blocks.predictive.predictive:Predictive",
@@ -83,9 +81,9 @@ PLUGINS: dict[str, dict[str, str]] = {
         "pid": "mckibben.control.laws:pid",
     },
     "envelopes": {
-        "exponential": "mckibben.blocks.hysteresis.envelopes.exponential:Exponential",
-        "piecewise-linear": "mckibben.blocks.hysteresis.envelopes.piecewise_linear:PiecewiseLinear",
-        "tanh": "mckibben.blocks.hysteresis.envelopes.tanh:Tanh",
+        "exponential": "mckibben.blocks.hysteresis.envelopes:Exponential",
+        "piecewise-linear": "mckibben.blocks.hysteresis.envelopes:PiecewiseLinear",
+        "tanh": "mckibben.blocks.hysteresis.envelopes:Tanh",
     },
     "estimators": {
         "activation-memory": (

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
-from mckibben.blocks.hysteresis.duhem_oscillator import DuhemOscillator
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator, DuhemOscillator
 from mckibben.estimators.hysteresis.bouc_wen_oscillator import BoucWenOscillatorEstimator
 from mckibben.estimators.hysteresis.duhem_oscillator import DuhemOscillatorEstimator
 from mckibben.estimators.hysteresis.oscillator_slopes import follow_bouc_wen, follow_duhem

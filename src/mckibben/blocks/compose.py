@@ -355,7 +355,7 @@ class Parallel(Composition):
     def example(cls) -> Self:
         """Return the sum of a PI model and a play operator."""
         from mckibben.blocks.hysteresis.pi import PI
-        from mckibben.blocks.hysteresis.play import Play
+        from mckibben.blocks.hysteresis.play_operators import Play
 
         return cls((PI.example(), Play.example()))
 

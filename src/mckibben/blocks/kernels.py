@@ -16,9 +16,8 @@ from mckibben.system.compiling import deferred
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-SUMS: dict[str, Any] = {"fastmath": {"reassoc", "contract"}, "_nrt": False}
-"""Of the compiler in weighted sums: freedom of their order, and no reference counts of arrays, which
-would take longer than a short sum; so these kernels neither allocate nor copy arrays."""
+SUMS = {"reassoc", "contract"}
+"""Freedom of the compiler in weighted sums."""
 
 
 ROUNDING, BRACKET, SLACK = 1e-14, 1e-15, 1e-9
@@ -42,7 +41,7 @@ def summing_kernel(function: Function) -> Function:
 
     Minima, maxima, NaN and infinity keep their meaning.
     """
-    return deferred(function, **SUMS)
+    return deferred(function, fastmath=SUMS)
 
 
 def inlined(function: Function) -> Function:
@@ -111,8 +110,11 @@ def step(function: Callable[..., None], **options: Any) -> Step:
 
 
 def summing_step(function: Callable[..., None]) -> Step:
-    """Compile a `step` with the freedom of a `summing_kernel`."""
-    return step(function, **SUMS)
+    """Compile a `step` with the freedom of a `summing_kernel`.
+
+    Arrays are not reference-counted, which would take longer than a short sum; so it may not copy any.
+    """
+    return step(function, fastmath=SUMS, _nrt=False)
 
 
 def in_scratch(kernel: Callable[..., Any]) -> bool:

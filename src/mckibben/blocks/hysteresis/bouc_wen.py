@@ -16,7 +16,7 @@ the exponents offered, it is integrated in closed form.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from annotated_types import Ge, Gt
@@ -24,21 +24,12 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    Coefficients,
-    StoredInitial,
-)
-from mckibben.blocks.hysteresis.bouc_wen_flow import flow
-from mckibben.blocks.hysteresis.differential_loop import BoucWenLoop, bouc_wen_start
-from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
+from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, StoredInitial
+from mckibben.blocks.hysteresis.differential import bouc_wen_start, flow, loop_kernels
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.memoryless.reversible import Reversible, least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import solve_sample, solved_start
 
 
 @kernel
@@ -56,39 +47,8 @@ def _output(u: float, z: float, c: Array) -> float:
     return polynomial_at((u - c[4]) / c[5], c, 6, c.size - 6) + c[3] * z
 
 
-@kernel
-def _advance(u: float, c: Array, state: Array) -> None:
-    state[0] = _moved(u, c, state)
-    state[1] = u
-
-
-@kernel
-def _trial(u: float, memory: tuple[Array, Array]) -> float:
-    c, state = memory
-    return _output(u, _moved(u, c, state), c)
-
-
-@step
-def bouc_wen_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; coefficients are [rate, sigma, n, weight, centre, scale, polynomial].
-
-    The state is [z, previous input].
-    """
-    _advance(inputs[0], coefficients, state)
-    outputs[0] = _output(inputs[0], state[0], coefficients)
-
-
-@step
-def bouc_wen_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Solve for the input; see `mckibben.blocks.solving`."""
-    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
-
-
-bouc_wen_inverse_start = solved_start(_trial, bouc_wen_start)
-
-
 @dataclass(frozen=True, config=STRICT)
-class BoucWen(BoucWenLoop):
+class BoucWen(Invertible):
     """Normalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
@@ -114,12 +74,14 @@ class BoucWen(BoucWenLoop):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "bouc-wen"
-    kernel: ClassVar[Kernel] = bouc_wen_step
-    inverse_kernel: ClassVar[Kernel] = bouc_wen_inverse_step
-    inverse_start_kernel: ClassVar[Start] = bouc_wen_inverse_start
-    parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "sigma")
-    notation: ClassVar[Notation] = Notation(
+    kind = "bouc-wen"
+    solved = True
+    inverse_remembers = "input"
+    n_states = 2
+    start_kernel = bouc_wen_start
+    kernel, inverse_kernel, inverse_start_kernel = loop_kernels(_moved, _output, bouc_wen_start)
+    parameters = ("polynomial", "weight", "rate", "sigma")
+    notation = Notation(
         r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
         r"\frac{dz}{du} = \rho \left(1 - |z|^n \left[\sigma \operatorname{sgn}(z\, du) + "
         r"1 - \sigma\right]\right)",
@@ -131,7 +93,7 @@ class BoucWen(BoucWenLoop):
         scale="s [{u}]",
     )
 
-    polynomial: Coefficients
+    polynomial: Reversible
     weight: FiniteFloat
     rate: Annotated[FiniteFloat, Gt(0)]
     sigma: Annotated[FiniteFloat, Ge(0.5)]
@@ -142,6 +104,9 @@ class BoucWen(BoucWenLoop):
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_input_range(self.kind, self.input_range)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [rate, sigma, exponent, weight, centre, scale, polynomial]."""
@@ -154,6 +119,10 @@ class BoucWen(BoucWenLoop):
         steepest = self.rate * max(1.0, 2.0 * self.sigma)
         reversible = least_slope(self.polynomial, self.centre, self.scale, self.input_limits)
         return reversible + min(0.0, self.weight * steepest)
+
+    def peaks(self) -> Array:
+        """Return peaks spread over the input range."""
+        return np.linspace(*self.input_limits, 33)
 
     @classmethod
     def example(cls) -> Self:

@@ -14,7 +14,7 @@ stretch y = P(x) + (y_0 - P(x_0)) exp(-alpha |x - x_0|), exactly.
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
 from annotated_types import Gt
@@ -23,27 +23,26 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Coefficients,
     StoredInitial,
 )
-from mckibben.blocks.hysteresis.differential_loop import Loop
-from mckibben.blocks.inverse import check_input_range
-from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.memoryless.reversible import polynomial_at
+from mckibben.blocks.hysteresis.differential import loop_kernels
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.memoryless.reversible import Reversible, polynomial_at
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import solve_sample, solved_start
-from mckibben.errors import ModelError
 
 
 @kernel
 def _moved(u: float, c: Array, state: Array) -> float:
-    """Return the output after the input has gone on to ``u``."""
+    """Return the output after the input has gone on to ``u``.
+
+    Coefficients are [alpha, centre, scale, P rising, P falling, f].
+    """
     y, before = state[0], state[1]
     if u == before:
         return y
@@ -55,31 +54,9 @@ def _moved(u: float, c: Array, state: Array) -> float:
 
 
 @kernel
-def _advance(u: float, c: Array, state: Array) -> None:
-    state[0] = _moved(u, c, state)
-    state[1] = u
-
-
-@kernel
-def _trial(u: float, memory: tuple[Array, Array]) -> float:
-    c, state = memory
-    return _moved(u, c, state)
-
-
-@step
-def duhem_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model; coefficients are [alpha, centre, scale, P rising, P falling, f].
-
-    The state is [output, previous input].
-    """
-    _advance(inputs[0], coefficients, state)
-    outputs[0] = state[0]
-
-
-@step
-def duhem_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Solve for the input; see `mckibben.blocks.solving`."""
-    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
+def _output(u: float, y: float, c: Array) -> float:
+    """Return the memory: it is the output."""
+    return y
 
 
 @kernel
@@ -91,21 +68,8 @@ def duhem_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) 
     state[1] = inputs[0]
 
 
-duhem_inverse_start = solved_start(_trial, duhem_start)
-
-
 def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: float) -> Array:
-    """Return the polynomial that the output tends to in one direction, ascending coefficients.
-
-    Parameters
-    ----------
-    alpha : float
-        Rate.
-    target, slope : array_like
-        Ascending coefficients of f and g.
-    direction : {1.0, -1.0}
-        Of the input.
-    """
+    """Return P for the directions 1 or -1 of the input: all polynomials by ascending coefficients."""
     f, g = np.atleast_1d(np.asarray(target, float)), np.atleast_1d(np.asarray(slope, float))
     size = max(f.size, g.size)
     f, g = np.pad(f, (0, size - f.size)), np.pad(g, (0, size - g.size))
@@ -116,7 +80,7 @@ def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: flo
 
 
 @dataclass(frozen=True, config=STRICT)
-class Duhem(Loop):
+class Duhem(Invertible):
     """Duhem model with a polynomial to tend to and a polynomial slope.
 
     Parameters
@@ -138,13 +102,14 @@ class Duhem(Loop):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "duhem"
-    kernel: ClassVar[Kernel] = duhem_step
-    start_kernel: ClassVar[Start] = duhem_start
-    inverse_kernel: ClassVar[Kernel] = duhem_inverse_step
-    inverse_start_kernel: ClassVar[Start] = duhem_inverse_start
-    parameters: ClassVar[tuple[str, ...]] = ("target", "slope", "alpha")
-    notation: ClassVar[Notation] = Notation(
+    kind = "duhem"
+    solved = True
+    inverse_remembers = "input"
+    n_states = 2
+    start_kernel = duhem_start
+    kernel, inverse_kernel, inverse_start_kernel = loop_kernels(_moved, _output, duhem_start)
+    parameters = ("target", "slope", "alpha")
+    notation = Notation(
         r"\frac{dy}{dx} = \alpha \operatorname{sgn}(dx) \left(f(x) - y\right) + "
         r"g(x),\quad x = \frac{u - m}{s}",
         r"f(x) = \sum_k f_k x^k,\quad g(x) = \sum_k g_k x^k",
@@ -155,8 +120,8 @@ class Duhem(Loop):
         scale="s [{u}]",
     )
 
-    target: Coefficients
-    slope: Coefficients
+    target: Reversible
+    slope: Reversible
     alpha: Annotated[FiniteFloat, Gt(0)]
     centre: FiniteFloat = 0.0
     scale: Annotated[FiniteFloat, Gt(0)] = 1.0
@@ -167,19 +132,13 @@ class Duhem(Loop):
 
     def __post_init__(self) -> None:
         check_input_range(self.kind, self.input_range)
-        if not self.target or not self.slope:
-            raise ModelError(
-                f"{self.kind!r} has an empty polynomial. Remedy: give one coefficient or more to each."
-            )
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [alpha, centre, scale, P rising, P falling, f], filled up to as many numbers as P."""
         del sample_time
-        both = [particular(self.alpha, self.target, self.slope, way) for way in (1.0, -1.0)]
-        filled = [0.0] * (both[0].size - len(self.target))
-        return np.array(
-            [self.alpha, self.centre, self.scale, *both[0], *both[1], *self.target, *filled]
-        )
+        up, down = (particular(self.alpha, self.target, self.slope, way) for way in (1.0, -1.0))
+        filled = [0.0] * (up.size - len(self.target))
+        return np.array([self.alpha, self.centre, self.scale, *up, *down, *self.target, *filled])
 
     def least_slope(self) -> float:
         """Return a lower bound of the slope of the output by the input, on loops within the range.
@@ -193,6 +152,10 @@ class Duhem(Loop):
         low, high = np.minimum(*ends), np.maximum(*ends)
         rising, falling = self.alpha * (f - high) + g, -self.alpha * (f - low) + g
         return float(min(rising.min(), falling.min())) / self.scale
+
+    def peaks(self) -> Array:
+        """Return peaks spread over the input range."""
+        return np.linspace(*self.input_limits, 33)
 
     @classmethod
     def example(cls) -> Self:

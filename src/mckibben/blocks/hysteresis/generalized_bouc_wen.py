@@ -17,7 +17,7 @@ centre.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from annotated_types import Gt
@@ -25,22 +25,19 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Coefficients,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.hysteresis.bouc_wen_flow import flow
-from mckibben.blocks.hysteresis.differential_loop import BoucWenLoop, bouc_wen_start
-from mckibben.blocks.kernels import kernel, step
-from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
+from mckibben.blocks.hysteresis.differential import bouc_wen_start, flow, loop_kernels
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.memoryless.reversible import Reversible, least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import solve_sample, solved_start
 from mckibben.errors import ModelError
 
 
@@ -63,7 +60,10 @@ def _stretch(z: float, du: float, side: float, c: Array) -> float:
 
 @kernel
 def _moved(u: float, c: Array, state: Array) -> float:
-    """Return z after the input has gone on to ``u``."""
+    """Return z after the input has gone on to ``u``.
+
+    Coefficients are [rate, n, weight, centre, scale, 1, b2 to b6, polynomial].
+    """
     z, before, centre = state[0], state[1], c[3]
     if (before - centre) * (u - centre) < 0.0:
         z = _stretch(z, centre - before, 1.0 if before > centre else -1.0, c)
@@ -76,43 +76,8 @@ def _output(u: float, z: float, c: Array) -> float:
     return polynomial_at((u - c[3]) / c[4], c, 11, c.size - 11) + c[2] * z
 
 
-@kernel
-def _advance(u: float, c: Array, state: Array) -> None:
-    state[0] = _moved(u, c, state)
-    state[1] = u
-
-
-@kernel
-def _trial(u: float, memory: tuple[Array, Array]) -> float:
-    c, state = memory
-    return _output(u, _moved(u, c, state), c)
-
-
-@step
-def generalized_bouc_wen_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
-    """Run the model; the state is [z, previous input].
-
-    Coefficients are [rate, n, weight, centre, scale, 1, b2 to b6, polynomial].
-    """
-    _advance(inputs[0], coefficients, state)
-    outputs[0] = _output(inputs[0], state[0], coefficients)
-
-
-@step
-def generalized_bouc_wen_inverse_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
-    """Solve for the input; see `mckibben.blocks.solving`."""
-    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
-
-
-generalized_bouc_wen_inverse_start = solved_start(_trial, bouc_wen_start)
-
-
 @dataclass(frozen=True, config=STRICT)
-class GeneralizedBoucWen(BoucWenLoop):
+class GeneralizedBoucWen(Invertible):
     """Generalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
@@ -138,12 +103,14 @@ class GeneralizedBoucWen(BoucWenLoop):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "generalized-bouc-wen"
-    kernel: ClassVar[Kernel] = generalized_bouc_wen_step
-    inverse_kernel: ClassVar[Kernel] = generalized_bouc_wen_inverse_step
-    inverse_start_kernel: ClassVar[Start] = generalized_bouc_wen_inverse_start
-    parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "shape")
-    notation: ClassVar[Notation] = Notation(
+    kind = "generalized-bouc-wen"
+    solved = True
+    inverse_remembers = "input"
+    n_states = 2
+    start_kernel = bouc_wen_start
+    kernel, inverse_kernel, inverse_start_kernel = loop_kernels(_moved, _output, bouc_wen_start)
+    parameters = ("polynomial", "weight", "rate", "shape")
+    notation = Notation(
         r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
         r"\frac{dz}{du} = \rho \left(1 - |z|^n \psi\right)",
         r"\psi = \operatorname{sgn}(z\,du) + b_2 \operatorname{sgn}(x\,du) + b_3 "
@@ -157,7 +124,7 @@ class GeneralizedBoucWen(BoucWenLoop):
         scale="s [{u}]",
     )
 
-    polynomial: Coefficients
+    polynomial: Reversible
     weight: FiniteFloat
     rate: Annotated[FiniteFloat, Gt(0)]
     shape: Vector
@@ -170,7 +137,7 @@ class GeneralizedBoucWen(BoucWenLoop):
     output: ChannelField = DISPLACEMENT
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        check_input_range(self.kind, self.input_range)
         if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
             raise ModelError(
                 f"the shape of {self.kind!r} is {self.shape}. Remedy: give five numbers whose sizes add "
@@ -207,16 +174,12 @@ class GeneralizedBoucWen(BoucWenLoop):
         smallest = 1.0 + min(float(np.dot(self.shape, sign)) for sign in signs)
         return float(smallest ** (-1.0 / self.exponent))
 
+    def peaks(self) -> Array:
+        """Return peaks spread over the input range."""
+        return np.linspace(*self.input_limits, 33)
+
     @classmethod
     def example(cls) -> Self:
         """Return a saturating loop over 0 to 5 bar."""
-        return cls(
-            (14.0, 16.0, -1.0, -1.0),
-            -0.9,
-            1.2,
-            (0.1, -0.1, 0.15, 0.05, -0.1),
-            1,
-            2.5,
-            2.5,
-            (0.0, 5.0),
-        )
+        polynomial, shape = (14.0, 16.0, -1.0, -1.0), (0.1, -0.1, 0.15, 0.05, -0.1)
+        return cls(polynomial, -0.9, 1.2, shape, 1, 2.5, 2.5, (0.0, 5.0))

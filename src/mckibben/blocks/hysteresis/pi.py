@@ -11,7 +11,7 @@ when a reference has to be clipped.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -20,7 +20,6 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.learning import start_learning
 from mckibben.blocks.adaptive.operators import LearntOperators, follow_learning, inverse_at
-from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -45,16 +44,20 @@ from mckibben.blocks.notation import FEW, Notation, summed, tex
 def pi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run a PI model; coefficients are [offset, thresholds, weights]."""
     n = state.size
-    offset = coefficients[0]
-    r = coefficients[1 : n + 1]
-    w = coefficients[n + 1 :]
+    r, w = coefficients[1 : n + 1], coefficients[n + 1 :]
     u = inputs[0]
     y = 0.0
     for i in range(n):
         s = min(max(state[i], u - r[i]), u + r[i])
         state[i] = s
         y += w[i] * s
-    outputs[0] = offset + y
+    outputs[0] = coefficients[0] + y
+
+
+@kernel
+def pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start a PI model before its first sample."""
+    start_operators(coefficients[1 : state.size + 1], inputs[0], inputs[0], virgin, state)
 
 
 @step
@@ -65,22 +68,13 @@ def pi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: A
     """
     n = state.size - 2
     lowest, highest, offset = coefficients[0], coefficients[1], coefficients[2]
-    r = coefficients[3 : n + 3]
-    w = coefficients[n + 3 :]
-    s = state[:n]
+    r, w = coefficients[3 : n + 3], coefficients[n + 3 :]
     y = inputs[0]
-    _, clipped = follow(y - offset, state[n] - offset, lowest, highest, r, w, s)
+    _, clipped = follow(y - offset, state[n] - offset, lowest, highest, r, w, state[:n])
     if clipped:
         state[n + 1] += 1.0
     state[n] = y
-    outputs[0] = s[0]
-
-
-@kernel
-def pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start a PI model before its first sample."""
-    n = state.size
-    start_operators(coefficients[1 : n + 1], inputs[0], inputs[0], virgin, state)
+    outputs[0] = state[0]
 
 
 @kernel
@@ -88,11 +82,9 @@ def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: b
     """Start the inverse of a PI model before its first reference."""
     n = state.size - 2
     lowest, highest, offset = coefficients[0], coefficients[1], coefficients[2]
-    r = coefficients[3 : n + 3]
-    w = coefficients[n + 3 :]
+    r, w = coefficients[3 : n + 3], coefficients[n + 3 :]
     start_sum(inputs[0] - offset, lowest, highest, r, w, virgin, state[:n])
-    state[n] = inputs[0]
-    state[n + 1] = 0.0
+    state[n], state[n + 1] = inputs[0], 0.0
 
 
 @step
@@ -136,17 +128,17 @@ class PI(LearntOperators):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "pi"
-    kernel: ClassVar[Kernel] = pi_step
-    start_kernel: ClassVar[Start] = pi_start
-    inverse_kernel: ClassVar[Kernel] = pi_inverse_step
-    inverse_start_kernel: ClassVar[Start] = pi_inverse_start
-    adaptive_kernel: ClassVar[Kernel] = pi_adaptive_step
-    adaptive_start_kernel: ClassVar[Start] = pi_adaptive_start
+    kind = "pi"
+    kernel = pi_step
+    start_kernel = pi_start
+    inverse_kernel = pi_inverse_step
+    inverse_start_kernel = pi_inverse_start
+    adaptive_kernel = pi_adaptive_step
+    adaptive_start_kernel = pi_adaptive_start
     inverse_remembers = "output"
     increasing = ("thresholds",)
-    parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("weights", "offset")
+    notation = Notation(
         r"y = y_0 + \sum_i w_i F_{r_i}[u]",
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
         thresholds="r_i [{u}]",

@@ -14,7 +14,7 @@ the inverse then runs into the input limits and says so. A longer `rate_time_con
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
 from annotated_types import Ge
@@ -22,7 +22,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.base import needs_sample_time
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -153,16 +153,16 @@ class RateDependentPI(Invertible):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "rate-dependent-pi"
-    solved: ClassVar[bool] = True
-    kernel: ClassVar[Kernel] = rate_dependent_pi_step
-    start_kernel: ClassVar[Start] = rate_dependent_pi_start
-    inverse_kernel: ClassVar[Kernel] = rate_dependent_pi_inverse_step
-    inverse_start_kernel: ClassVar[Start] = rate_dependent_pi_inverse_start
-    rate_dependent: ClassVar[bool] = True
+    kind = "rate-dependent-pi"
+    solved = True
+    kernel = rate_dependent_pi_step
+    start_kernel = rate_dependent_pi_start
+    inverse_kernel = rate_dependent_pi_inverse_step
+    inverse_start_kernel = rate_dependent_pi_inverse_start
+    rate_dependent = True
     increasing = ("thresholds",)
-    parameters: ClassVar[tuple[str, ...]] = ("rate_weights", "weights", "offset")
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("rate_weights", "weights", "offset")
+    notation = Notation(
         r"y = y_0 + \sum_i (d_i + k_i v) F_{r_i}[u],\quad T \dot{v} = \dot{u} - v",
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
         thresholds="r_i [{u}]",

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
+from annotated_types import MinLen
 
 from mckibben.arrays import Array
+from mckibben.blocks.fields import Coefficients
 from mckibben.blocks.kernels import kernel
+
+Reversible = Annotated[Coefficients, MinLen(1)]
+"""Ascending coefficients of such a polynomial, as a field of a block."""
 
 
 @kernel

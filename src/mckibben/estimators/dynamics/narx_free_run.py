@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.dynamics.narx import Narx
-from mckibben.blocks.hysteresis.play import play_matrix
+from mckibben.blocks.hysteresis.play_operators import play_matrix
 from mckibben.blocks.kernels import kernel
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.hysteresis.pi import play_operators

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.system.compiling import deferred
+from mckibben.blocks.kernels import summing_kernel
 
 LARGEST = 1e6
 """State, in units of the output's scale, that is out of all bounds: the run ends there."""
 
 
-@partial(deferred, fastmath={"reassoc", "contract"})
+@summing_kernel
 def follow_network(
     linear: Array,
     hidden: Array,

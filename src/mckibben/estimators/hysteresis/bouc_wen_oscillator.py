@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
-from mckibben.blocks.hysteresis.oscillator import Oscillator
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator, Oscillator
 from mckibben.estimators.hysteresis.oscillator import OscillatorEstimator
 from mckibben.estimators.hysteresis.oscillator_slopes import follow_bouc_wen
 

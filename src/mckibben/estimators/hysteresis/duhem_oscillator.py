@@ -11,8 +11,7 @@ from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.duhem_oscillator import DuhemOscillator
-from mckibben.blocks.hysteresis.oscillator import Oscillator
+from mckibben.blocks.hysteresis.oscillators import DuhemOscillator, Oscillator
 from mckibben.estimators.hysteresis.oscillator import OscillatorEstimator
 from mckibben.estimators.hysteresis.oscillator_slopes import follow_duhem
 

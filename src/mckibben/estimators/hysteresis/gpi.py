@@ -12,10 +12,7 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.envelopes.base import Envelope
-from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
-from mckibben.blocks.hysteresis.envelopes.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
+from mckibben.blocks.hysteresis.envelopes import Envelope, Exponential, PiecewiseLinear, Tanh
 from mckibben.blocks.hysteresis.gpi import GPI, gpi_matrix, smallest_gap
 from mckibben.blocks.hysteresis.play_operators import started
 from mckibben.estimators.core.data import Run, TrainingData

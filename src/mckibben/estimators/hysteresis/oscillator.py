@@ -18,7 +18,7 @@ from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.hysteresis.oscillator import Oscillator
+from mckibben.blocks.hysteresis.oscillators import Oscillator
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.single import SingleEstimator

@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.hysteresis.oscillator import Oscillator
+from mckibben.blocks.hysteresis.oscillators import Oscillator
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.dynamics.paths import Path

@@ -1,6 +1,6 @@
 """Free runs of oscillators with exact derivatives by all their parameters, one pass for both.
 
-The Runge-Kutta steps of `mckibben.blocks.hysteresis.oscillator`, and the tangents of each stage.
+The Runge-Kutta steps of `mckibben.blocks.hysteresis.oscillators`, and the tangents of each stage.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.hysteresis.bouc_wen_oscillator import bouc_wen_slope
-from mckibben.blocks.hysteresis.duhem_oscillator import knot_before
+from mckibben.blocks.hysteresis.oscillators import bouc_wen_slope, knot_before
 from mckibben.blocks.kernels import inlined, kernel
 
 OWN = 3

@@ -13,8 +13,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.hysteresis.play import play_matrix
-from mckibben.blocks.hysteresis.play_operators import started
+from mckibben.blocks.hysteresis.play_operators import play_matrix, started
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators

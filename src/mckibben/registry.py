@@ -98,7 +98,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "balance": "mckibben.estimators.coupled.balance:BalanceEstimator",
         "balance-force": "mckibben.estimators.coupled.balance_force:BalanceForceEstimator",
         "bj": "mckibben.estimators.dynamics.linear_models:BJ",
-        "bouc-wen": "mckibben.estimators.hysteresis.bouc_wen:BoucWenEstimator",
+        "bouc-wen": "mckibben.estimators.hysteresis.loops:BoucWenEstimator",
         "bouc-wen-oscillator": (
             "mckibben.estimators.hysteresis.bouc_wen_oscillator:BoucWenOscillatorEstimator"
         ),
@@ -116,11 +116,11 @@ PLUGINS: dict[str, dict[str, str]] = {
         "force-petrovic": "mckibben.estimators.force.static:FORCE_PETROVIC",
         "force-schindele": "mckibben.estimators.force.static:FORCE_SCHINDELE",
         "force-tondu": "mckibben.estimators.force.static:TonduLopezEstimator",
-        "gbw": "mckibben.estimators.hysteresis.generalized_bouc_wen:GeneralizedBoucWenEstimator",
+        "gbw": "mckibben.estimators.hysteresis.loops:GBW",
         "gpi": "mckibben.estimators.hysteresis.gpi:GPIEstimator",
         "kp": "mckibben.estimators.hysteresis.preisach:KP",
-        "maxwell-slip": "mckibben.estimators.hysteresis.maxwell_slip:MAXWELL_SLIP",
-        "mms": "mckibben.estimators.hysteresis.maxwell_slip:MMS",
+        "maxwell-slip": "mckibben.estimators.hysteresis.loops:MAXWELL_SLIP",
+        "mms": "mckibben.estimators.hysteresis.loops:MMS",
         "mpi": "mckibben.estimators.hysteresis.mpi:MPIEstimator",
         "mpi-narmax": "mckibben.estimators.coupled.mpi_narmax:MPINarmaxEstimator",
         "multistate": "mckibben.estimators.force.multistate:MULTISTATE",

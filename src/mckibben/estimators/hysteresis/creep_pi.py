@@ -23,8 +23,7 @@ from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.output_maps import PolynomialMap
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, counting
 from mckibben.estimators.hysteresis.creeping import CreepingEstimator, creep_moves, with_creep
-from mckibben.estimators.hysteresis.pi import play_operators
-from mckibben.estimators.hysteresis.thresholds import spread
+from mckibben.estimators.hysteresis.pi import play_operators, spread
 
 RAISED = 1e-5
 """Step either way, of the logarithm of what is added to the input, for its derivative."""

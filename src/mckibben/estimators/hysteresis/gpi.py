@@ -18,7 +18,7 @@ from mckibben.blocks.hysteresis.play_operators import started
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.hysteresis.thresholds import spread
+from mckibben.estimators.hysteresis.pi import Spacing, spread
 
 Range = tuple[float, float]
 
@@ -68,7 +68,7 @@ class GPIEstimator(SeparableEstimator):
     envelope: Literal["tanh", "piecewise-linear", "exponential"] = "tanh"
     n_knots: Annotated[int, Interval(ge=3, le=100)] = 6
     threshold_rule: Literal["envelope", "paper"] = "envelope"
-    spacing: Literal["even", "dense"] = "even"
+    spacing: Spacing = "even"
 
     @property
     def shape(self) -> EnvelopeShape:

@@ -19,8 +19,7 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.output_maps import OutputMap, output_map
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
-from mckibben.estimators.hysteresis.pi import play_operators
-from mckibben.estimators.hysteresis.thresholds import spread
+from mckibben.estimators.hysteresis.pi import Spacing, play_operators, spread
 from mckibben.estimators.optimisers.linear import solve_linear
 
 LEAST_PIECE = 1e-6
@@ -48,7 +47,7 @@ class MappedPIEstimator(SeparableEstimator):
     """
 
     n_operators: Operators = 10
-    spacing: Literal["even", "dense"] = "even"
+    spacing: Spacing = "even"
     output_map: Literal["piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"] = (
         "polynomial"
     )

@@ -33,8 +33,8 @@ from .errors import ModelWarning as ModelWarning
 from .estimators.hysteresis.eupi import EUPIEstimator as EUPIEstimator
 from .estimators.hysteresis.gpi import GPIEstimator as GPIEstimator
 from .estimators.hysteresis.mpi import MPIEstimator as MPIEstimator
+from .estimators.hysteresis.mpi import RDPIEstimator as RDPIEstimator
 from .estimators.hysteresis.pi import PIEstimator as PIEstimator
-from .estimators.hysteresis.rdpi import RDPIEstimator as RDPIEstimator
 from .excitation.planning import plan as plan
 from .excitation.telling import untold as untold
 from .files import read as read

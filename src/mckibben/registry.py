@@ -100,15 +100,13 @@ PLUGINS: dict[str, dict[str, str]] = {
         "bj": "mckibben.estimators.dynamics.linear_models:BJ",
         "bouc-wen": "mckibben.estimators.hysteresis.loops:BoucWenEstimator",
         "bouc-wen-oscillator": (
-            "mckibben.estimators.hysteresis.bouc_wen_oscillator:BoucWenOscillatorEstimator"
+            "mckibben.estimators.hysteresis.oscillators:BoucWenOscillatorEstimator"
         ),
         "coupled-memory": "mckibben.estimators.coupled.memory:CoupledMemoryEstimator",
         "coupled-pi": "mckibben.estimators.coupled.sdchm:COUPLED_PI",
         "cpi": "mckibben.estimators.hysteresis.creep_pi:CreepPIEstimator",
         "duhem": "mckibben.estimators.hysteresis.duhem:DuhemEstimator",
-        "duhem-oscillator": (
-            "mckibben.estimators.hysteresis.duhem_oscillator:DuhemOscillatorEstimator"
-        ),
+        "duhem-oscillator": ("mckibben.estimators.hysteresis.oscillators:DuhemOscillatorEstimator"),
         "eupi": "mckibben.estimators.hysteresis.eupi:EUPIEstimator",
         "force-bilinear": "mckibben.estimators.force.static:FORCE_BILINEAR",
         "force-chou": "mckibben.estimators.force.static:ChouHannafordEstimator",
@@ -139,7 +137,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "p3": "mckibben.estimators.dynamics.process_model:P3",
         "pi": "mckibben.estimators.hysteresis.pi:PIEstimator",
         "preisach": "mckibben.estimators.hysteresis.preisach:PREISACH",
-        "rdpi": "mckibben.estimators.hysteresis.rdpi:RDPIEstimator",
+        "rdpi": "mckibben.estimators.hysteresis.mpi:RDPIEstimator",
         "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",
         "sdchm-published": "mckibben.estimators.coupled.sdchm:SDCHM_PUBLISHED",
         "state-network": "mckibben.estimators.dynamics.state_network:StateNetworkEstimator",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Interval
@@ -20,7 +20,102 @@ from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.pi import Spacing, spread
 
-Range = tuple[float, float]
+
+class Shape(NamedTuple):
+    """How a pair of envelopes is parametrised for the search, up to height and scale."""
+
+    lower: list[float]
+    upper: list[float]
+    """Bounds of the shape parameters of both envelopes."""
+
+    guesses: list[list[float]]
+    """Sensible shape parameters."""
+
+    envelopes: Callable[[Array], list[Envelope]]
+    """Gives the rising and the falling envelope of shape parameters."""
+
+    own_lower: list[float]
+    own_upper: list[float]
+    """Bounds of one envelope's own parameters, as its ``pack`` orders them."""
+
+
+def tanh_shape(low: float, high: float, n_knots: int) -> Shape:
+    """Return the shape of tangents: the logarithm of the slope and the centre of each."""
+    span, centre = high - low, 0.5 * (low + high)
+
+    def envelopes(shape: Array) -> list[Envelope]:
+        slopes, centres = np.exp(shape[[0, 2]]).tolist(), shape[[1, 3]].tolist()
+        return [Tanh(a, -a * c) for a, c in zip(slopes, centres, strict=True)]
+
+    return Shape(
+        [np.log(0.2 / span), low - span] * 2,
+        [np.log(16 / span), high + span] * 2,
+        [
+            [np.log(steepness / span), centre, np.log(steepness / span), centre - 0.02 * span]
+            for steepness in (1.0, 2.0, 4.0)
+        ],
+        envelopes,
+        [0.2 / span, -4.0, -1.0],
+        [6.0 / span, 1.0, 1.0],
+    )
+
+
+def exponential_shape(low: float, high: float, n_knots: int) -> Shape:
+    """Return the shape of exponentials: both rates, and the logarithm of their relative steepness.
+
+    The rising one has unit mean slope over the range.
+    """
+    span = high - low
+
+    def envelopes(shape: Array) -> list[Envelope]:
+        found: list[Envelope] = []
+        for rate, steepness in ((shape[0], 0.0), (shape[1], shape[2])):
+            bent = float(np.copysign(max(abs(rate), 1e-3 / span), rate))
+            rise = abs(np.exp(-bent * low) - np.exp(-bent * high))
+            found.append(Exponential(bent, float(steepness - np.log(rise))))
+        return found
+
+    return Shape(
+        [-4 / span, -4 / span, -1.5],
+        [4 / span, 4 / span, 1.5],
+        [[rate / span, rate / span, 0.0] for rate in (-1.5, -0.5, 0.5, 1.5)],
+        envelopes,
+        [1e-3 / span, -2.0, -2.0],
+        [4 / span, 2.0, 2.0],
+    )
+
+
+def piecewise_linear_shape(low: float, high: float, n_knots: int) -> Shape:
+    """Return the shape of lines between equally spaced knots: the logarithms of all their rises.
+
+    The rising envelope's rises are scaled to add up to one.
+    """
+    n = n_knots - 1
+    middle, places = -np.log(n), (np.arange(n) + 0.5) / n
+
+    def envelopes(shape: Array) -> list[Envelope]:
+        knots, rises = vector(np.linspace(low, high, n_knots)), np.exp(shape).reshape(2, -1)
+        heights = [np.cumsum(rise / rises[0].sum()) for rise in rises]
+        return [PiecewiseLinear(knots, (0.0, *vector(height))) for height in heights]
+
+    return Shape(
+        [middle - 4.0] * 2 * n,
+        [middle + 2.0] * 2 * n,
+        [
+            np.tile(np.log(rise / rise.sum()), 2).tolist()
+            for rise in (np.ones(n), 0.2 + np.sin(np.pi * places))
+        ],
+        envelopes,
+        [k - 0.45 for k in range(n_knots)],  # disjoint, so that values increase
+        [k + 0.45 for k in range(n_knots)],
+    )
+
+
+SHAPES: dict[str, Callable[[float, float, int], Shape]] = {
+    "tanh": tanh_shape,
+    "piecewise-linear": piecewise_linear_shape,
+    "exponential": exponential_shape,
+}
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -70,30 +165,26 @@ class GPIEstimator(SeparableEstimator):
     threshold_rule: Literal["envelope", "paper"] = "envelope"
     spacing: Spacing = "even"
 
-    @property
-    def shape(self) -> EnvelopeShape:
-        """How the envelopes are parametrised for the search."""
-        return SHAPES[self.envelope](self.n_knots)
+    def shape(self, data: TrainingData) -> Shape:
+        """Return how the envelopes are parametrised for the search."""
+        return SHAPES[self.envelope](*data.input_range, self.n_knots)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the envelopes' shapes, the gap between them, and a virgin one's height."""
-        lower, upper = self.shape.bounds(data.input_range)
+        shape = self.shape(data)
         highest = [] if self.solves_offset else [2.0 * self.highest(data)]
-        return (
-            np.concatenate([lower, [0.0], -np.array(highest)]),
-            np.concatenate([upper, [1.0], highest]),
-        )
+        lowest = [-height for height in highest]
+        return np.array([*shape.lower, 0.0, *lowest]), np.array([*shape.upper, 1.0, *highest])
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return near-equal envelopes of a few curvatures."""
-        shapes = self.shape.guesses(data.input_range)
         heights: list[list[float]] = [[]]
         if not self.solves_offset:
             heights = [[share * self.highest(data)] for share in (-0.5, 0.0, 0.5)]
         return [
-            np.concatenate([shape, [gap], height])
+            np.array([*shape, gap, *height])
             for height in heights
-            for shape in shapes
+            for shape in self.shape(data).guesses
             for gap in (0.0, 0.1)
         ]
 
@@ -115,13 +206,11 @@ class GPIEstimator(SeparableEstimator):
 
         def made() -> tuple[Envelope, Envelope]:
             n = theta.size - 1 if self.solves_offset else theta.size - 2
-            rising, falling = self.shape.envelopes(theta[:n], data.input_range)
+            rising, falling = self.shape(data).envelopes(theta[:n])
             gap, _ = smallest_gap(rising, falling, data.input_range)
             height = 0.0 if self.solves_offset else float(theta[-1])
-            return (
-                rising.shifted(height),
-                falling.shifted(height + float(theta[n]) - gap + 1e-9),
-            )
+            above = height + float(theta[n]) - gap + 1e-9
+            return rising.shifted(height), falling.shifted(above)
 
         return data.latest("envelopes", theta, made)
 
@@ -135,17 +224,20 @@ class GPIEstimator(SeparableEstimator):
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the generalised play operators over the run's history, shape (n, N + 1)."""
         rising, falling = self.envelopes(theta, data)
-        return gpi_operators(
-            run.history, rising, falling, self.radii(rising, falling, data), self.starting_rule
+        u, radii = np.ascontiguousarray(run.history), self.radii(rising, falling, data)
+        up, down = rising(u), falling(u)
+        operators = np.empty((u.size, radii.size))
+        gpi_matrix(
+            u, up, down, radii, started(radii, up[0], down[0], self.starting_rule), operators
         )
+        return operators
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> GPI:
         """Return the GPI model; the offset becomes a common height of the envelopes."""
         rising, falling = self.envelopes(theta, data)
-        radii = self.radii(rising, falling, data)
         height = offset / linear.sum() if linear.sum() != 0 else 0.0
         return GPI(
-            vector(radii),
+            vector(self.radii(rising, falling, data)),
             vector(linear),
             rising.shifted(height),
             falling.shifted(height),
@@ -156,147 +248,11 @@ class GPIEstimator(SeparableEstimator):
 
     def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
         """Return a GPI model, with bounds wide enough for any loop that fills the data's ranges."""
-        guess = self.guesses(data)[0]
-        rising, falling = self.envelopes(guess, data)
-        radii = self.radii(rising, falling, data)
-        template = self.build(guess, np.ones(radii.size), 0.0, data)
-        low, high = self.shape.parameter_bounds(data.input_range)
-        span = data.output_range[1] - data.output_range[0]
-        heaviest = [0.5 * span] * radii.size
+        guess, shape = self.guesses(data)[0], self.shape(data)
+        n = self.radii(*self.envelopes(guess, data), data).size
+        low, high = data.output_range
         return (
-            template,
-            np.concatenate([np.zeros(radii.size), low, low]),
-            np.concatenate([heaviest, high, high]),
+            self.build(guess, np.ones(n), 0.0, data),
+            np.array([*np.zeros(n), *shape.own_lower, *shape.own_lower]),
+            np.array([*[0.5 * (high - low)] * n, *shape.own_upper, *shape.own_upper]),
         )
-
-
-def gpi_operators(u: Array, rising: Envelope, falling: Envelope, radii: Array, rule: str) -> Array:
-    """Return generalised play operators side by side over an input, shape (n, N)."""
-    u = np.ascontiguousarray(u)
-    up, down = rising(u), falling(u)
-    operators = np.empty((u.size, radii.size))
-    gpi_matrix(u, up, down, radii, started(radii, up[0], down[0], rule), operators)
-    return operators
-
-
-class EnvelopeShape(ABC):
-    """How a pair of envelopes is parametrised for the search, up to height and scale."""
-
-    def __init__(self, n_knots: int) -> None:
-        self.n_knots = n_knots
-
-    @abstractmethod
-    def bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of the shape parameters of both envelopes."""
-
-    @abstractmethod
-    def guesses(self, input_range: Range) -> list[Array]:
-        """Return sensible shape parameters of both envelopes."""
-
-    @abstractmethod
-    def envelopes(self, shape: Array, input_range: Range) -> tuple[Envelope, Envelope]:
-        """Return both envelopes."""
-
-    @abstractmethod
-    def parameter_bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of one envelope's own parameters, as its ``pack`` orders them."""
-
-
-class TanhShape(EnvelopeShape):
-    """Steepness (as a logarithm) and centre of each tangent."""
-
-    def bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of [log slope, centre] twice."""
-        low, high = input_range
-        span = high - low
-        lower, upper = [np.log(0.2 / span), low - span], [np.log(16 / span), high + span]
-        return np.array(lower * 2), np.array(upper * 2)
-
-    def guesses(self, input_range: Range) -> list[Array]:
-        """Return centred tangents of a few slopes."""
-        low, high = input_range
-        span, centre = high - low, 0.5 * (low + high)
-        slopes = [np.log(steepness / span) for steepness in (1.0, 2.0, 4.0)]
-        return [np.array([slope, centre, slope, centre - 0.02 * span]) for slope in slopes]
-
-    def envelopes(self, shape: Array, input_range: Range) -> tuple[Envelope, Envelope]:
-        slopes, centres = np.exp(shape[[0, 2]]).tolist(), shape[[1, 3]].tolist()
-        rising, falling = (Tanh(a, -a * c) for a, c in zip(slopes, centres, strict=True))
-        return rising, falling
-
-    def parameter_bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of [slope, shift, offset]."""
-        span = input_range[1] - input_range[0]
-        return np.array([0.2 / span, -4.0, -1.0]), np.array([6.0 / span, 1.0, 1.0])
-
-
-class ExponentialShape(EnvelopeShape):
-    """Rate of each exponential, and the steepness of the falling one relative to the rising one."""
-
-    def bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of [rate, rate, log of relative steepness]."""
-        span = input_range[1] - input_range[0]
-        return np.array([-4 / span, -4 / span, -1.5]), np.array([4 / span, 4 / span, 1.5])
-
-    def guesses(self, input_range: Range) -> list[Array]:
-        """Return like exponentials of a few curvatures, convex and concave."""
-        span = input_range[1] - input_range[0]
-        return [np.array([rate / span, rate / span, 0.0]) for rate in (-1.5, -0.5, 0.5, 1.5)]
-
-    def envelopes(self, shape: Array, input_range: Range) -> tuple[Envelope, Envelope]:
-        """Return both exponentials, the rising one of unit mean slope over the range."""
-        low, high = input_range
-        least = 1e-3 / (high - low)
-        envelopes = []
-        for rate, steepness in ((shape[0], 0.0), (shape[1], shape[2])):
-            bent = float(np.copysign(max(abs(rate), least), rate))
-            rise = abs(np.exp(-bent * low) - np.exp(-bent * high))
-            envelopes.append(Exponential(bent, float(steepness - np.log(rise))))
-        return envelopes[0], envelopes[1]
-
-    def parameter_bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of [rate, shift, offset], for concave envelopes."""
-        span = input_range[1] - input_range[0]
-        return np.array([1e-3 / span, -2.0, -2.0]), np.array([4 / span, 2.0, 2.0])
-
-
-class PiecewiseLinearShape(EnvelopeShape):
-    """Logarithms of the rise between knots, the rising envelope's adding up to one."""
-
-    def bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of the logarithms of all rises."""
-        n = 2 * (self.n_knots - 1)
-        middle = -np.log(self.n_knots - 1)
-        return np.full(n, middle - 4.0), np.full(n, middle + 2.0)
-
-    def guesses(self, input_range: Range) -> list[Array]:
-        """Return straight envelopes, and S-shaped ones."""
-        pieces = self.n_knots - 1
-        middle = (np.arange(pieces) + 0.5) / pieces
-        return [
-            np.tile(np.log(rise / rise.sum()), 2)
-            for rise in (np.ones(pieces), 0.2 + np.sin(np.pi * middle))
-        ]
-
-    def envelopes(self, shape: Array, input_range: Range) -> tuple[Envelope, Envelope]:
-        """Return both envelopes on equally spaced knots."""
-        knots = np.linspace(*input_range, self.n_knots)
-        rising, falling = np.exp(shape).reshape(2, -1)
-        scale = rising.sum()
-        first, second = (
-            PiecewiseLinear(vector(knots), (0.0, *vector(np.cumsum(rise / scale))))
-            for rise in (rising, falling)
-        )
-        return first, second
-
-    def parameter_bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return disjoint bounds of the values at the knots, so that they increase."""
-        steps = np.arange(self.n_knots, dtype=float)
-        return steps - 0.45, steps + 0.45
-
-
-SHAPES: dict[str, type[EnvelopeShape]] = {
-    "tanh": TanhShape,
-    "piecewise-linear": PiecewiseLinearShape,
-    "exponential": ExponentialShape,
-}

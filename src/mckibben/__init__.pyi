@@ -14,8 +14,8 @@ from .blocks.fields import Channel as Channel
 from .blocks.hysteresis.eupi import EUPI as EUPI
 from .blocks.hysteresis.gpi import GPI as GPI
 from .blocks.hysteresis.pi import PI as PI
+from .blocks.hysteresis.pi import RateDependentPI as RateDependentPI
 from .blocks.hysteresis.play_operators import Play as Play
-from .blocks.hysteresis.rate_dependent_pi import RateDependentPI as RateDependentPI
 from .blocks.laws.check import check_block as check_block
 from .blocks.memoryless.affine import Affine as Affine
 from .blocks.memoryless.piecewise_linear import PiecewiseLinear as PiecewiseLinear

@@ -25,7 +25,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "balance": "mckibben.blocks.coupled.balance:Balance",
         "band": "mckibben.blocks.bands.band:Band",
         "banded": "mckibben.blocks.bands.banded:Banded",
-        "bouc-wen": "mckibben.blocks.hysteresis.bouc_wen:BoucWen",
+        "bouc-wen": "mckibben.blocks.hysteresis.differential:BoucWen",
         "bouc-wen-oscillator": ("mckibben.blocks.hysteresis.oscillators:BoucWenOscillator"),
         "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
@@ -33,7 +33,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "coupled-memory": "mckibben.blocks.coupled.coupled_memory:CoupledMemory",
         "coupling": "mckibben.blocks.coupled.coupling:Coupling",
         "creep": "mckibben.blocks.dynamics.creep:Creep",
-        "duhem": "mckibben.blocks.hysteresis.duhem:Duhem",
+        "duhem": "mckibben.blocks.hysteresis.differential:Duhem",
         "duhem-oscillator": "mckibben.blocks.hysteresis.oscillators:DuhemOscillator",
         "eupi": "mckibben.blocks.hysteresis.eupi:EUPI",
         "exponential": "mckibben.blocks.memoryless.logarithm:Exponential",
@@ -41,9 +41,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "force-balance": "mckibben.blocks.coupled.force_balance:ForceBalance",
         "force-feedforward": "mckibben.blocks.force.feedforward:ForceFeedforward",
         "fuzzy-network": "mckibben.blocks.coupled.fuzzy_network:FuzzyNetwork",
-        "generalized-bouc-wen": (
-            "mckibben.blocks.hysteresis.generalized_bouc_wen:GeneralizedBoucWen"
-        ),
+        "generalized-bouc-wen": ("mckibben.blocks.hysteresis.differential:GeneralizedBoucWen"),
         "gpi": "mckibben.blocks.hysteresis.gpi:GPI",
         "inverse": "mckibben.blocks.inverse:Inverse",
         "krasnoselskii-pokrovskii": ("mckibben.blocks.hysteresis.preisach:KrasnoselskiiPokrovskii"),
@@ -65,7 +63,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "predictive": "mckibben.blocks.predictive.predictive:Predictive",
         "preisach": "mckibben.blocks.hysteresis.preisach:Preisach",
         "process-model": "mckibben.blocks.dynamics.process_model:ProcessModel",
-        "rate-dependent-pi": "mckibben.blocks.hysteresis.rate_dependent_pi:RateDependentPI",
+        "rate-dependent-pi": "mckibben.blocks.hysteresis.pi:RateDependentPI",
         "recurrent-fuzzy-network": (
             "mckibben.blocks.coupled.recurrent_fuzzy_network:RecurrentFuzzyNetwork"
         ),

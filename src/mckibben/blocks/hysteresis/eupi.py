@@ -166,7 +166,6 @@ class EUPI(Invertible):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights]."""
-        del sample_time
         edges = (self.input_range[0], self.falling_slope, self.falling_threshold)
         shape = (self.offset, *self.polynomial)
         return np.array([*edges, *shape, *self.thresholds, *self.weights])

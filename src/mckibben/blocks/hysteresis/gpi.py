@@ -273,7 +273,6 @@ class GPI(LearntOperators):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [kind and size of rising, of falling, thresholds, weights, rising, falling]."""
-        del sample_time
         up, down = self.rising.coefficients(), self.falling.coefficients()
         head = [self.rising.number, up.size, self.falling.number, down.size]
         return np.array([*head, *self.thresholds, *self.weights, *up, *down])
@@ -312,7 +311,6 @@ class GPI(LearntOperators):
         return np.array([*self.input_limits, *own])
 
     def remembered(self, state: Array) -> tuple[float, ...]:
-        """Return the output."""
         return (np.dot(self.weights, state[:-1]),)
 
     @property

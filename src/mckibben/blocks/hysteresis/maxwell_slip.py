@@ -208,13 +208,11 @@ class MaxwellSlip(Invertible):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [size, kappa, lambda, centre, scale, polynomial, limits, weights]."""
-        del sample_time
         head = [len(self.polynomial), self.stiffness_ratio, self.limit_ratio]
         tail = [*self.polynomial, *self.breakaways, *self.weights]
         return np.array([*head, self.centre, self.scale, *tail])
 
     def least_slope(self) -> float:
-        """Return a lower bound of the slope of the output by the input."""
         softening = float(np.minimum(self.weights, 0.0).sum()) * max(1.0, self.stiffness_ratio)
         return least_slope(self.polynomial, self.centre, self.scale, self.input_limits) + softening
 

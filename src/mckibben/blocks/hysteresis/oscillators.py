@@ -204,7 +204,6 @@ class Oscillator(Repeating):
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what a step costs: four slopes a substep."""
-        del sample_time
         operations = self.substeps * 4 * (18 + self.element.size)
         return Cost(operations, operations)
 

@@ -321,18 +321,15 @@ class Preisach(Invertible):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [number of levels, levels, Everett table, offset]."""
-        del sample_time
         return np.array([len(self.levels), *self.levels, *self.table().ravel(), self.offset])
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what it costs to find the place of an input in the table."""
-        del sample_time
         once = self._look_up()
         return Cost(once, once + 64)
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
         """Return what it costs to walk along the levels, half of them usually."""
-        del sample_time
         once, levels = self._look_up(), len(self.levels)
         return Cost(once * max(1, levels // 2), once * levels + 64)
 
@@ -348,7 +345,6 @@ class Preisach(Invertible):
             )
 
     def peaks(self) -> Array:
-        """Return the levels."""
         return np.array(self.levels)
 
     @classmethod
@@ -489,7 +485,6 @@ class KrasnoselskiiPokrovskii(Invertible):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [number of intervals, offset, levels, weights]."""
-        del sample_time
         return np.array([len(self.levels) - 1, self.offset, *self.levels, *self.weights])
 
     def least_slope(self) -> float:
@@ -504,7 +499,6 @@ class KrasnoselskiiPokrovskii(Invertible):
         return (float(np.clip(state[-1], *self.input_range)),)
 
     def peaks(self) -> Array:
-        """Return the levels."""
         return np.array(self.levels)
 
     @classmethod

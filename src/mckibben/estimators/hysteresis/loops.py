@@ -18,8 +18,7 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.bouc_wen import BoucWen
-from mckibben.blocks.hysteresis.generalized_bouc_wen import GeneralizedBoucWen
+from mckibben.blocks.hysteresis.differential import BoucWen, GeneralizedBoucWen
 from mckibben.blocks.hysteresis.maxwell_slip import MaxwellSlip, slip_matrix
 from mckibben.estimators.core.best_of import best_of_settings
 from mckibben.estimators.core.data import Run, TrainingData

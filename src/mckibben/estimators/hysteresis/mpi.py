@@ -12,8 +12,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.hysteresis.rate_dependent_pi import RateDependentPI
+from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.estimators.core.best_of import best_of_settings
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import DefaultFor, InverseKind, Operators, Purpose

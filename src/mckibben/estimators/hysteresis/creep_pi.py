@@ -91,10 +91,7 @@ class CreepPIEstimator(SeparableEstimator):
     cannot = "Its loops' shape does not change with rate or load; needs time."
     inverse_kind = "exact"
     quick = True
-    param_grid: ClassVar[Grid] = {
-        "n_operators": (4, 6, 8),
-        "n_creep": (1, 2, 3),
-    }
+    param_grid: ClassVar[Grid] = {"n_operators": (4, 6, 8), "n_creep": (1, 2, 3)}
     makes = ("logarithm pi polynomial creep",)
     effort: ClassVar[float] = 1.0
     needs_time: ClassVar[bool] = True
@@ -322,23 +319,16 @@ class CreepPIEstimator(SeparableEstimator):
         given = data.inputs[0]
         result = data.outputs[0]
         scale = 1.0 / (top - bottom)
-        parts = (
-            Logarithm(raised, given, given),
-            PI(
-                vector(radii),
-                vector(weights * scale),
-                -bottom * scale,
-                (low, high),
-                self.starting_rule,
-                given,
-                result,
-            ),
-            PolynomialMap(self.map_size).build(
-                linear, offset / (1.0 + compliances.sum()), 0.0, 1.0, result
-            ),
-            *self.creep_parts(theta, result),
+        memory = (vector(radii), vector(weights * scale), -bottom * scale, (low, high))
+        settled = offset / (1.0 + compliances.sum())
+        return Series(
+            (
+                Logarithm(raised, given, given),
+                PI(*memory, self.starting_rule, given, result),
+                PolynomialMap(self.map_size).build(linear, settled, 0.0, 1.0, result),
+                *self.creep_parts(theta, result),
+            )
         )
-        return Series(parts)
 
     def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
         """Return the series solved for, and bounds that keep it valid."""

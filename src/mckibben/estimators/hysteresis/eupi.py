@@ -101,12 +101,7 @@ class EUPIEstimator(SeparableEstimator):
         span, reach = high - low, data.input_range[1] - data.input_range[0]
         linear = np.full(CUBIC.size + radii.size, span / radii.size)
         template = self.build(np.ones(2), linear, low, data)
-        lower = [*np.zeros(radii.size), 0.3, 0.0, *(-span / reach ** np.arange(1, 4)), low - span]
-        upper = [
-            *np.full(radii.size, span / reach),
-            3.0,
-            3.0,
-            *(span / reach ** np.arange(1, 4)),
-            high,
-        ]
+        shape, weights = span / reach ** np.arange(1, 4), np.full(radii.size, span / reach)
+        lower = [*np.zeros(radii.size), 0.3, 0.0, *-shape, low - span]
+        upper = [*weights, 3.0, 3.0, *shape, high]
         return template, np.array(lower), np.array(upper)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
@@ -15,7 +16,7 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.estimators.core.best_of import best_of_settings
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.estimator import DefaultFor, InverseKind, Operators, Purpose
+from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.output_maps import OutputMap, output_map
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
 from mckibben.estimators.hysteresis.pi import Spacing, play_operators, spread
@@ -30,8 +31,8 @@ RATE_SHARE = 0.5
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class MPIEstimator(SeparableEstimator):
-    """Modified Prandtl-Ishlinskii model by variable projection: PI, then a memoryless map.
+class MappedPIEstimator(SeparableEstimator):
+    """Prandtl-Ishlinskii operators and a memoryless map behind them, by variable projection.
 
     The weights of the operators are searched, scaled so that the PI part spans the output's range; the
     map behind them is solved for.
@@ -48,22 +49,6 @@ class MPIEstimator(SeparableEstimator):
     map_size : int
         Straight lines of the map, or degree of the polynomial.
     """
-
-    title = "Modified Prandtl–Ishlinskii model (MPI)"
-    purpose: ClassVar[Purpose | None] = "memory"
-    can = (
-        "Prandtl-Ishlinskii memory behind an increasing map: asymmetric by saturation; small "
-        "and quick."
-    )
-    cannot = (
-        "Loops that are narrow at one end and wide at the other for other reasons than the "
-        "map; no rate, no creep."
-    )
-    inverse_kind: ClassVar[InverseKind] = "exact"
-    quick = True
-    default_for: ClassVar[DefaultFor | None] = "load"
-    makes = ("pi polynomial",)
-    effort: ClassVar[float] = 0.2
 
     n_operators: Operators = 10
     spacing: Spacing = "even"
@@ -171,16 +156,9 @@ class MPIEstimator(SeparableEstimator):
         channel = data.outputs[0]
         return Series((first, self.map.build(linear, offset, bottom, top, channel)))
 
+    @abstractmethod
     def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
         """Return the hysteresis part."""
-        return PI(
-            vector(self.radii(data)),
-            vector(weights),
-            offset,
-            data.input_range,
-            self.starting_rule,
-            **self.channels(data),
-        )
 
     def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
         """Return a series, with a PI part within twice the output's range and a map of like size."""
@@ -200,7 +178,38 @@ class MPIEstimator(SeparableEstimator):
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class RDPIEstimator(MPIEstimator):
+class MPIEstimator(MappedPIEstimator):
+    """Modified Prandtl-Ishlinskii model by variable projection."""
+
+    title = "Modified Prandtl–Ishlinskii model (MPI)"
+    purpose = "memory"
+    can = (
+        "Prandtl-Ishlinskii memory behind an increasing map: asymmetric by saturation; small "
+        "and quick."
+    )
+    cannot = (
+        "Loops that are narrow at one end and wide at the other for other reasons than the "
+        "map; no rate, no creep."
+    )
+    inverse_kind = "exact"
+    quick = True
+    default_for = "load"
+    makes = ("pi polynomial",)
+    effort: ClassVar[float] = 0.2
+
+    def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
+        return PI(
+            vector(self.radii(data)),
+            vector(weights),
+            offset,
+            data.input_range,
+            self.starting_rule,
+            **self.channels(data),
+        )
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class RDPIEstimator(MappedPIEstimator):
     """Rate-dependent modified Prandtl-Ishlinskii model by variable projection.
 
     Weights are linear in the rate of the input, as in "High-Precision Displacement and Force Hybrid
@@ -222,8 +231,6 @@ class RDPIEstimator(MPIEstimator):
     )
     caution = "weights that follow the rate are arbitrary at other rates"
     inverse_kind = "solved"
-    quick = False
-    default_for = None
     makes = ("rate-dependent-pi polynomial",)
     needs_time: ClassVar[bool] = True
 

@@ -89,11 +89,11 @@ def cut_off(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-5])
 
 
-def unknown_type(path: Path) -> None:
-    """Have an element of unknown type, where SciPy would follow a pointer that it chooses."""
+def wrong_type(path: Path, kind: int) -> None:
+    """Have an element of a type that numbers cannot have, where SciPy would follow any pointer."""
     mat(path, pressure=np.arange(40.0), displacement=np.arange(40.0))
     content = bytearray(path.read_bytes())
-    content[content.index(b"\x09\x00\x00\x00\x40\x01\x00\x00")] = 250  # the tag of 40 doubles
+    content[content.index(b"\x09\x00\x00\x00\x40\x01\x00\x00")] = kind  # the tag of 40 doubles
     path.write_bytes(content)
 
 
@@ -172,7 +172,8 @@ CASES: list[Case] = [
     Case("scalars.mat", partial(mat, pressure=2.0, displacement=7.0)),
     Case("nan.mat", partial(mat, pressure=HOLE, displacement=MOVED), P, 5, "1 of 30", UNITS),
     Case("no_units.mat", partial(mat, pressure=200 * PRESSURE), X),
-    Case("unknown_type.mat", unknown_type),
+    Case("unknown_type.mat", partial(wrong_type, kind=250)),
+    Case("matrix_of_numbers.mat", partial(wrong_type, kind=14)),
     # HDF5
     Case("huge.h5", partial(hdf5, pressure_bar=(10**14,)), names="memory"),
     Case("unequal.h5", partial(hdf5, pressure_bar=PRESSURE, displacement_mm=PRESSURE[:20]), X),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,10 @@ _TYPES = {*range(1, 8), 9, *range(12, 19)}
 """Types of elements in "MAT-File Format" (MathWorks)."""
 
 _MATRIX, _COMPRESSED = 14, 15
+_OUTER = {_MATRIX, _COMPRESSED}
+
+_OF_MATRICES = {1, 2, 3, 16, 17}
+"""Classes of arrays that hold arrays: cells, structs, objects, functions, opaque ones."""
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -51,8 +55,8 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     return [tree.table(found, path)]
 
 
-def _checked(data: bytes, order: str) -> Iterator[bytes]:
-    """Yield the elements of version 5, unless one in them has an unknown type.
+def _checked(data: bytes, order: str, outer: Collection[int] = _OUTER) -> Iterator[bytes]:
+    """Yield the elements of version 5, unless one in them has a type that cannot stand there.
 
     SciPy indexes a C array by the type unchecked, so that a received file could make it follow a pointer
     of its choice; see scipy/scipy#25829.
@@ -63,13 +67,16 @@ def _checked(data: bytes, order: str) -> Iterator[bytes]:
         start, end = at + 8, at + 8 + size + (-size % 8 if kind != _COMPRESSED else 0)
         if kind >> 16:  # a small element, whose few bytes are in its tag
             kind, size, end = kind & 0xFFFF, 0, start
-        if kind not in _TYPES:
-            raise ValueError(f"it has an element of the unknown type {kind}")
+        if kind not in _TYPES or kind in _OUTER - set(outer):
+            raise ValueError(f"it has an element of type {kind} where none can be")
         inside = data[start : start + size]
         if kind == _COMPRESSED:
             inside = zlib.decompressobj().decompress(inside)
-        if kind in (_MATRIX, _COMPRESSED):
-            list(_checked(inside, order))
+        if kind == _COMPRESSED:
+            list(_checked(inside, order, {_MATRIX}))
+        elif kind == _MATRIX and inside:
+            flags = struct.unpack_from(f"{order}I", inside, 8)[0]
+            list(_checked(inside, order, {_MATRIX} if flags & 0xFF in _OF_MATRICES else ()))
         yield data[at:end]
         at = end
 

@@ -30,7 +30,7 @@ from mckibben import (
     registry,
 )
 from mckibben.blocks.base import Block
-from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
+from mckibben.blocks.hysteresis.envelopes import Tanh
 from mckibben.rigs import record
 from mckibben.signals import decaying_triangle
 from mckibben.signals.protocol import protocol

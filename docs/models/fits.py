@@ -21,7 +21,7 @@ import numpy as np
 
 import mckibben
 from mckibben import registry
-from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.saving import load
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.estimators.hysteresis.gpi import GPIEstimator
-from mckibben.estimators.hysteresis.rdpi import RDPIEstimator
+from mckibben.estimators.hysteresis.mpi import RDPIEstimator
 from mckibben.metrics import err
 from mckibben.papers.field_models.published import prandtl_ishlinskii
 from mckibben.papers.mpi_narmax.protocol import HIGH, LOW

@@ -126,7 +126,7 @@ class ElasticPlastic(Invertible):
         threshold="r [{u}]",
     )
     # --- Where time matters: rate_dependent: ClassVar[bool] = True, and coefficients() turns the
-    # --- sample time into what the kernel needs; see blocks/hysteresis/rate_dependent_pi.py.
+    # --- sample time into what the kernel needs; see blocks/hysteresis/pi.py.
 
     gain: Annotated[FiniteFloat, Gt(0)]
     weight: FiniteFloat

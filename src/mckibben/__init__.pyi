@@ -14,8 +14,8 @@ from .blocks.fields import Channel as Channel
 from .blocks.hysteresis.eupi import EUPI as EUPI
 from .blocks.hysteresis.gpi import GPI as GPI
 from .blocks.hysteresis.pi import PI as PI
-from .blocks.hysteresis.play import Play as Play
-from .blocks.hysteresis.rate_dependent_pi import RateDependentPI as RateDependentPI
+from .blocks.hysteresis.pi import RateDependentPI as RateDependentPI
+from .blocks.hysteresis.play_operators import Play as Play
 from .blocks.laws import check_block as check_block
 from .blocks.memoryless import Affine as Affine
 from .blocks.memoryless import PiecewiseLinear as PiecewiseLinear
@@ -33,8 +33,8 @@ from .errors import ModelWarning as ModelWarning
 from .estimators.hysteresis.eupi import EUPIEstimator as EUPIEstimator
 from .estimators.hysteresis.gpi import GPIEstimator as GPIEstimator
 from .estimators.hysteresis.mpi import MPIEstimator as MPIEstimator
+from .estimators.hysteresis.mpi import RDPIEstimator as RDPIEstimator
 from .estimators.hysteresis.pi import PIEstimator as PIEstimator
-from .estimators.hysteresis.rdpi import RDPIEstimator as RDPIEstimator
 from .excitation.planning import plan as plan
 from .excitation.telling import untold as untold
 from .files import read as read

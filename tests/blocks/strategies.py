@@ -11,12 +11,8 @@ from numpy.typing import NDArray
 from mckibben import EUPI, GPI, PI, RateDependentPI, Series
 from mckibben import PiecewiseLinear as Curve
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.envelopes.base import Envelope
-from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
-from mckibben.blocks.hysteresis.envelopes.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
-from mckibben.blocks.hysteresis.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
-from mckibben.blocks.hysteresis.preisach import Preisach
+from mckibben.blocks.hysteresis.envelopes import Envelope, Exponential, PiecewiseLinear, Tanh
+from mckibben.blocks.hysteresis.preisach import KrasnoselskiiPokrovskii, Preisach
 from mckibben.blocks.laws import through
 
 Array = NDArray[np.float64]

@@ -18,10 +18,8 @@ from numpy.typing import NDArray
 from mckibben import ModelError, Parallel, Recording
 from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EIGHTEEN, MultistateFriction
-from mckibben.blocks.hysteresis.bouc_wen import BoucWen
-from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
-from mckibben.blocks.hysteresis.duhem_oscillator import DuhemOscillator
-from mckibben.blocks.hysteresis.generalized_bouc_wen import GeneralizedBoucWen
+from mckibben.blocks.hysteresis.differential import BoucWen, GeneralizedBoucWen
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator, DuhemOscillator
 from mckibben.papers.multistate_friction.published import multistate_friction, static_force
 
 Array = NDArray[np.float64]

@@ -23,8 +23,8 @@ from mckibben.blocks.dynamics.narx import NarxPolynomial
 from mckibben.blocks.dynamics.state_network import StateNetwork
 from mckibben.blocks.fields import vector
 from mckibben.blocks.force.multistate_friction import deflected
-from mckibben.blocks.hysteresis.bouc_wen_flow import flow
-from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
+from mckibben.blocks.hysteresis.differential import flow
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach, _output, _solve, everett
 from mckibben.blocks.laws import wander
 from mckibben.blocks.solving import eliminate, solve_near

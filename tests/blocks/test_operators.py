@@ -17,7 +17,7 @@ from mckibben import EUPI, GPI, PiecewiseLinear, Play
 from mckibben.blocks.hysteresis.eupi import eupi_matrix
 from mckibben.blocks.hysteresis.gpi import gpi_matrix
 from mckibben.blocks.hysteresis.maxwell_slip import slip_matrix
-from mckibben.blocks.hysteresis.play import play_matrix
+from mckibben.blocks.hysteresis.play_operators import play_matrix
 from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach
 from tests.blocks.strategies import LOW, eupi_models, gpi_models, numbers, paths
 

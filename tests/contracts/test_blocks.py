@@ -24,9 +24,8 @@ from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.dynamics.air import LONGEST_DEAD_TIME, Air
 from mckibben.blocks.dynamics.state_network import StateNetwork
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
-from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
-from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
+from mckibben.blocks.hysteresis.envelopes import Exponential, Tanh
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.laws import examples
 
 EXAMPLES = examples()

@@ -14,9 +14,8 @@ from mckibben.blocks.adaptive.adaptive import adaptive
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.fields import DISPLACEMENT
-from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
-from mckibben.blocks.hysteresis.envelopes.piecewise_linear import PiecewiseLinear as Lines
-from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
+from mckibben.blocks.hysteresis.envelopes import Exponential, Tanh
+from mckibben.blocks.hysteresis.envelopes import PiecewiseLinear as Lines
 from mckibben.registry import load
 
 Make = Callable[[], object]

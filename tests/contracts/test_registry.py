@@ -52,7 +52,7 @@ def concrete(base: type, folder: str) -> set[Any]:
 
 ON_DISK: dict[str, Callable[[], set[Any]]] = {
     "blocks": lambda: concrete(Block, "blocks"),
-    "envelopes": lambda: concrete(Envelope, "blocks/hysteresis/envelopes"),
+    "envelopes": lambda: concrete(Envelope, "blocks/hysteresis"),
     "estimators": lambda: concrete(Estimator, "estimators"),
     "faces": lambda: concrete(Face, "report/notebook"),
     "setups": lambda: concrete(Rig, "rigs"),

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.bouc_wen_oscillator import BoucWenOscillator
-from mckibben.blocks.hysteresis.duhem_oscillator import DuhemOscillator
-from mckibben.estimators.hysteresis.bouc_wen_oscillator import BoucWenOscillatorEstimator
-from mckibben.estimators.hysteresis.duhem_oscillator import DuhemOscillatorEstimator
-from mckibben.estimators.hysteresis.oscillator_slopes import follow_bouc_wen, follow_duhem
+from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator, DuhemOscillator
+from mckibben.estimators.hysteresis.oscillators import (
+    BoucWenOscillatorEstimator,
+    DuhemOscillatorEstimator,
+    follow_bouc_wen,
+    follow_duhem,
+)
 from tests.recordings import MEASURED
 
 Array = NDArray[np.float64]

@@ -12,8 +12,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.hysteresis.gpi import GPI
-from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.hysteresis.rate_dependent_pi import RateDependentPI
+from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.blocks.memoryless import PiecewiseLinear
 from mckibben.characterization import characterize
 from mckibben.comparison.results import Leaderboard

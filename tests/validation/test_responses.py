@@ -7,7 +7,7 @@ import numpy as np
 from mckibben import Recording
 from mckibben.arrays import Array
 from mckibben.blocks.dynamics.process_model import ProcessModel
-from mckibben.blocks.hysteresis.play import Play
+from mckibben.blocks.hysteresis.play_operators import Play
 from mckibben.validation.parameters import residuals, sureness
 from mckibben.validation.responses import describing_functions, frequency_responses
 

@@ -110,8 +110,11 @@ def step(function: Callable[..., None], **options: Any) -> Step:
 
 
 def summing_step(function: Callable[..., None]) -> Step:
-    """Compile a `step` with the freedom of a `summing_kernel`."""
-    return step(function, fastmath=SUMS)
+    """Compile a `step` with the freedom of a `summing_kernel`.
+
+    Arrays are not reference-counted, which would take longer than a short sum; so it may not copy any.
+    """
+    return step(function, fastmath=SUMS, _nrt=False)
 
 
 def in_scratch(kernel: Callable[..., Any]) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, MinLen
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
@@ -208,6 +208,10 @@ class PiecewiseLinear(Block):
 
 
 # -- polynomials -----------------------------------------------------------------------------
+
+
+Reversible = Annotated[Coefficients, MinLen(1)]
+"""Ascending coefficients of a polynomial that increases, as a field of a block."""
 
 
 @kernel

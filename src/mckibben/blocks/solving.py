@@ -21,9 +21,11 @@ from mckibben.blocks.kernels import (
     NOTHING,
     ROUNDING,
     SLACK,
+    Step,
     improved,
     inlined,
     kernel,
+    step,
 )
 
 MOST_STEPS = 200
@@ -122,14 +124,19 @@ def solve_input(trial: Any, coefficients: Array, state: Array, inputs: Array) ->
     return u
 
 
-@inlined
-def solve_sample(
-    trial: Any, advance: Any, coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
-    """Give the input for which the forward block follows the reference, and take that step."""
-    u = solve_input(trial, coefficients, state, inputs)
-    advance(u, coefficients[:-2], state[:-2])
-    outputs[0] = u
+def solved_inverse(
+    trial: Callable[..., float], advance: Callable[..., None], start: Start
+) -> tuple[Step, Start]:
+    """Return the step and the start of a block's inverse, by its ``trial``, ``advance`` and start."""
+
+    def inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Solve for the input for which the block follows the reference, and take that step."""
+        u = solve_input(trial, coefficients, state, inputs)
+        advance(u, coefficients[:-2], state[:-2])
+        outputs[0] = u
+
+    inverse_step.__qualname__ = f"{trial.__module__}.{trial.__qualname__}.inverse"
+    return step(inverse_step), solved_start(trial, start)
 
 
 def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> Start:
@@ -147,7 +154,6 @@ def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> 
         start(forward, own, given, rule[0] > 0.0)
         return trial(u, (forward, own))
 
-    @kernel
     def inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
         """Start with the input, within its limits, at which the block has the first reference."""
         own, forward = state[: state.size - behind], coefficients[:-2]
@@ -179,7 +185,8 @@ def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> 
         start(forward, own, u, virgin)
         state[-1] = 0.0
 
-    return inverse_start
+    inverse_start.__qualname__ = f"{trial.__module__}.{trial.__qualname__}.start"
+    return kernel(inverse_start)
 
 
 USUAL_NEWTON, MOST_NEWTON = 3, 60

@@ -11,8 +11,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.equations import channel_units, unit_of
 from mckibben.blocks.hysteresis.eupi import EUPI
 from mckibben.blocks.hysteresis.gpi import GPI
-from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.hysteresis.rate_dependent_pi import RateDependentPI
+from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.errors import ModelError
 from mckibben.report.drawing import (
     N_COLOURS,

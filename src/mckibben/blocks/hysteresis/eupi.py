@@ -16,7 +16,7 @@ The inverse is solved for every sample, until the bracket closes to rounding.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
 from annotated_types import Ge, Gt
@@ -24,7 +24,6 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -35,9 +34,9 @@ from mckibben.blocks.fields import (
 )
 from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
 from mckibben.blocks.inverse import Invertible, check_input_range
-from mckibben.blocks.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.kernels import inlined, kernel, summing_step
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import solve_sample, solved_start
+from mckibben.blocks.solving import solved_inverse
 from mckibben.errors import ModelError
 
 
@@ -51,11 +50,10 @@ def unparallel_play(s: float, x: float, r: float, alpha: float, beta: float) -> 
 def eupi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; coefficients are [u_0, alpha, beta, offset, a_1..a_3, thresholds, weights]."""
     n = state.size
-    origin, alpha, beta, offset = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    alpha, beta, offset = coefficients[1], coefficients[2], coefficients[3]
     a1, a2, a3 = coefficients[4], coefficients[5], coefficients[6]
-    r = coefficients[7 : n + 7]
-    w = coefficients[n + 7 :]
-    x = inputs[0] - origin
+    r, w = coefficients[7 : n + 7], coefficients[n + 7 :]
+    x = inputs[0] - coefficients[0]
     y = 0.0
     for i in range(n):
         state[i] = unparallel_play(state[i], x, r[i], alpha, beta)
@@ -93,20 +91,11 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
     return y
 
 
-@step
-def eupi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Solve for the input; see `mckibben.blocks.solving`."""
-    solve_sample(_trial, _advance, coefficients, state, inputs, outputs)
-
-
 @kernel
 def eupi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start the operators before the first sample."""
     x = inputs[0] - coefficients[0]
     start_operators(coefficients[7 : state.size + 7], x, x, virgin, state)
-
-
-eupi_inverse_start = solved_start(_trial, eupi_start)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -135,22 +124,15 @@ class EUPI(Invertible):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "eupi"
-    solved: ClassVar[bool] = True
+    kind = "eupi"
+    solved = True
     inverse_remembers = "input"
-    kernel: ClassVar[Kernel] = eupi_step
-    start_kernel: ClassVar[Start] = eupi_start
-    inverse_kernel: ClassVar[Kernel] = eupi_inverse_step
-    inverse_start_kernel: ClassVar[Start] = eupi_inverse_start
+    kernel = eupi_step
+    start_kernel = eupi_start
+    inverse_kernel, inverse_start_kernel = solved_inverse(_trial, _advance, eupi_start)
     increasing = ("thresholds",)
-    parameters: ClassVar[tuple[str, ...]] = (
-        "weights",
-        "falling_slope",
-        "falling_threshold",
-        "polynomial",
-        "offset",
-    )
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("weights", "falling_slope", "falling_threshold", "polynomial", "offset")
+    notation = Notation(
         r"y = y_0 + \sum_{k} a_k x^k + \sum_i w_i F_i[x],\quad x = u - u_{\min}",
         r"F_{i,t} = \begin{cases} \max(x_t - r_i,\, F_{i,t-1}) & x \text{ rises} \\ "
         r"\min(\alpha x_t + \beta r_i,\, F_{i,t-1}) & x \text{ falls} \end{cases}",
@@ -184,7 +166,6 @@ class EUPI(Invertible):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights]."""
-        del sample_time
         edges = (self.input_range[0], self.falling_slope, self.falling_threshold)
         shape = (self.offset, *self.polynomial)
         return np.array([*edges, *shape, *self.thresholds, *self.weights])

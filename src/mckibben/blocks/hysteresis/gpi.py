@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import BeforeValidator, FiniteFloat, InstanceOf
@@ -31,7 +31,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.learning import Learnable, start_learning
 from mckibben.blocks.adaptive.operators import follow_learning, inverse_at, learnable_operators
-from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import (
     DISPLACEMENT,
@@ -42,8 +42,7 @@ from mckibben.blocks.fields import (
     Vector,
     vector,
 )
-from mckibben.blocks.hysteresis.envelopes.base import Envelope, nested_envelope
-from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
+from mckibben.blocks.hysteresis.envelopes import Envelope, Tanh, nested_envelope
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
     check_thresholds,
@@ -86,8 +85,7 @@ def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
     def gpi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
         """Run a GPI model."""
         n = state.size - 1
-        r = coefficients[4 : n + 4]
-        w = coefficients[n + 4 : 2 * n + 4]
+        r, w = coefficients[4 : n + 4], coefficients[n + 4 : 2 * n + 4]
         first = 2 * n + 4 + int(coefficients[1])
         u = inputs[0]
         y = 0.0
@@ -120,16 +118,14 @@ def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
         """Invert: find the operators' common edge, and the input from the envelope of the direction."""
         n = state.size - 3
         low, high = coefficients[0], coefficients[1]
-        r = coefficients[6 : n + 6]
-        w = coefficients[n + 6 : 2 * n + 6]
+        r, w = coefficients[6 : n + 6], coefficients[n + 6 : 2 * n + 6]
         first = 2 * n + 6 + int(coefficients[3])
         up, down = coefficients[2 * n + 6 : first], coefficients[first:]
-        y = inputs[0]
         lowest, highest = falling_at(low, down), rising_at(high, up)
-        direction, clipped = follow(y, state[n + 1], lowest, highest, r, w, state[:n])
+        direction, clipped = follow(inputs[0], state[n + 1], lowest, highest, r, w, state[:n])
         if clipped:
             state[n + 2] += 1.0
-        state[n + 1] = y
+        state[n + 1] = inputs[0]
         if direction > 0.0:
             state[n] = min(max(rising_from(state[0], up), low), high)
         elif direction < 0.0:
@@ -141,8 +137,7 @@ def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
         """Start the inverse of a GPI model before its first reference."""
         n = state.size - 3
         low, high = coefficients[0], coefficients[1]
-        r = coefficients[6 : n + 6]
-        w = coefficients[n + 6 : 2 * n + 6]
+        r, w = coefficients[6 : n + 6], coefficients[n + 6 : 2 * n + 6]
         first = 2 * n + 6 + int(coefficients[3])
         up, down = coefficients[2 * n + 6 : first], coefficients[first:]
         y = inputs[0]
@@ -150,9 +145,7 @@ def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
         start_sum(y, lowest, rising_at(high, up), r, w, virgin, state[:n])
         falls = virgin and y < 0.0
         u = falling_from(state[0], down) if falls else rising_from(state[0], up)
-        state[n] = min(max(u, low), high)
-        state[n + 1] = y
-        state[n + 2] = 0.0
+        state[n], state[n + 1], state[n + 2] = min(max(u, low), high), y, 0.0
 
     @step
     def gpi_adaptive_step(
@@ -193,14 +186,35 @@ def gpi_matrix(
     Shapes: u, rising and falling (n,), r and s (N,), operators (n, N). Changes the states ``s``, which
     are those after the first sample: nothing moves before the second.
     """
-    previous = u[0]
     for t in range(u.size):
-        lower = rising[t] if u[t] > previous else -np.inf
-        upper = falling[t] if u[t] < previous else np.inf
+        lower = rising[t] if u[t] > u[max(t - 1, 0)] else -np.inf
+        upper = falling[t] if u[t] < u[max(t - 1, 0)] else np.inf
         for i in range(r.size):
             s[i] = min(max(s[i], lower - r[i]), upper + r[i])
             operators[t, i] = s[i]
-        previous = u[t]
+
+
+def smallest_gap(
+    rising: Envelope, falling: Envelope, input_range: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the smallest of gamma_L - gamma_R over the input range, and the input where it is."""
+    low, high = input_range
+    for _ in range(4):
+        u = np.linspace(low, high, 1025)
+        gaps = falling(u) - rising(u)
+        best = int(np.argmin(gaps))
+        low, high = u[max(best - 1, 0)], u[min(best + 1, u.size - 1)]
+    return float(gaps[best]), float(u[best])
+
+
+def of_envelopes(name: str) -> Any:
+    """Return a property: the kernel of this name for a model's kinds of envelopes."""
+
+    def kernel_of(model: GPI) -> Any:
+        kinds: Any = (type(model.rising), type(model.falling))
+        return getattr(kernels_of(*kinds), name)
+
+    return property(kernel_of)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -224,11 +238,15 @@ class GPI(Invertible):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "gpi"
+    kind = "gpi"
+    kernel = of_envelopes("step")
+    start_kernel = of_envelopes("start")
+    inverse_kernel = of_envelopes("inverse_step")
+    inverse_start_kernel = of_envelopes("inverse_start")
     inverse_remembers = "output"
     increasing = ("thresholds",)
-    parameters: ClassVar[tuple[str, ...]] = ("weights", "rising", "falling")
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("weights", "rising", "falling")
+    notation = Notation(
         r"y = \sum_i x_i w_i",
         r"w_{i,t} = \begin{cases} \max(\gamma_R(u_t) - r_i,\, w_{i,t-1}) & u \text{ "
         r"rises} \\ \min(\gamma_L(u_t) + r_i,\, w_{i,t-1}) & u \text{ falls} \end{cases}",
@@ -250,45 +268,15 @@ class GPI(Invertible):
         check_input_range(self.kind, self.input_range)
 
     @property
-    def kernel(self) -> Kernel:  # type: ignore[override]
-        """That of its kinds of envelopes."""
-        return self._kernels.step
-
-    @property
-    def start_kernel(self) -> Start:  # type: ignore[override]
-        """That of its kinds of envelopes."""
-        return self._kernels.start
-
-    @property
-    def inverse_kernel(self) -> Kernel:  # type: ignore[override]
-        """That of its kinds of envelopes."""
-        return self._kernels.inverse_step
-
-    @property
-    def inverse_start_kernel(self) -> Start:  # type: ignore[override]
-        """That of its kinds of envelopes."""
-        return self._kernels.inverse_start
-
-    @property
-    def _kernels(self) -> Kernels:
-        return kernels_of(type(self.rising), type(self.falling))
-
-    @property
     def n_states(self) -> int:
         """One an operator, and the previous input."""
         return len(self.thresholds) + 1
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [kind and size of rising, of falling, thresholds, weights, rising, falling]."""
-        del sample_time
-        envelopes = (self.rising, self.falling)
-        numbers = [envelope.coefficients() for envelope in envelopes]
-        head = [
-            float(part)
-            for envelope, own in zip(envelopes, numbers, strict=True)
-            for part in (envelope.number, own.size)
-        ]
-        return np.array([*head, *self.thresholds, *self.weights, *numbers[0], *numbers[1]])
+        up, down = self.rising.coefficients(), self.falling.coefficients()
+        head = [self.rising.number, up.size, self.falling.number, down.size]
+        return np.array([*head, *self.thresholds, *self.weights, *up, *down])
 
     def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Give the thresholds, and the knots of the envelopes that have some."""
@@ -319,7 +307,6 @@ class GPI(Invertible):
         return np.array([*self.input_limits, *own])
 
     def remembered(self, state: Array) -> tuple[float, ...]:
-        """Return the output."""
         return (np.dot(self.weights, state[:-1]),)
 
     @property
@@ -327,29 +314,17 @@ class GPI(Invertible):
         """Weights, and an offset that the model itself has not."""
         low, high = self.input_range
         limits = float(self.falling(low)), float(self.rising(high))
-        kernels = self._kernels.adaptive_step, self._kernels.adaptive_start
+        kernels = kernels_of(type(self.rising), type(self.falling))
 
         def with_parameters(theta: Array) -> Block:
             changed, offset = replace(self, weights=vector(theta[:-1])), float(theta[-1])
             shift = Affine(1.0, offset, self.output, self.output)
             return Series((changed, shift)) if offset else changed
 
-        return learnable_operators(self, limits, 0.0, *kernels, with_parameters)
+        adaptive = kernels.adaptive_step, kernels.adaptive_start
+        return learnable_operators(self, limits, 0.0, *adaptive, with_parameters)
 
     @classmethod
     def example(cls) -> Self:
         """Return a saturating, asymmetric loop over 0 to 5 bar."""
         return cls((0.0, 0.1, 0.3, 0.5), (9.0, 4.0, 2.0, 1.0), *Tanh.examples(), (0.0, 5.0))
-
-
-def smallest_gap(
-    rising: Envelope, falling: Envelope, input_range: tuple[float, float]
-) -> tuple[float, float]:
-    """Return the smallest of gamma_L - gamma_R over the input range, and the input where it is."""
-    low, high = input_range
-    for _ in range(4):
-        u = np.linspace(low, high, 1025)
-        gaps = falling(u) - rising(u)
-        best = int(np.argmin(gaps))
-        low, high = u[max(best - 1, 0)], u[min(best + 1, u.size - 1)]
-    return float(gaps[best]), float(u[best])

@@ -14,7 +14,7 @@ ours has one ratio of each for all elements).
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
 from annotated_types import Gt
@@ -22,20 +22,18 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
-    Coefficients,
     StoredInitial,
     Vector,
 )
 from mckibben.blocks.hysteresis.play_operators import check_thresholds
 from mckibben.blocks.inverse import Invertible, check_input_range
 from mckibben.blocks.kernels import accumulate, kernel, step
-from mckibben.blocks.memoryless import least_slope, polynomial_at
+from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solve_input, solved_start
 from mckibben.errors import ModelError
@@ -131,9 +129,6 @@ def maxwell_slip_start(coefficients: Array, state: Array, inputs: Array, virgin:
     state[n] = inputs[0]
 
 
-maxwell_slip_inverse_start = solved_start(_trial, maxwell_slip_start)
-
-
 @dataclass(frozen=True, config=STRICT)
 class MaxwellSlip(Invertible):
     """Springs that slip, beside a reversible polynomial.
@@ -161,21 +156,16 @@ class MaxwellSlip(Invertible):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "maxwell-slip"
-    solved: ClassVar[bool] = True
+    kind = "maxwell-slip"
+    solved = True
     inverse_remembers = "input"
-    kernel: ClassVar[Kernel] = maxwell_slip_step
-    start_kernel: ClassVar[Start] = maxwell_slip_start
-    inverse_kernel: ClassVar[Kernel] = maxwell_slip_inverse_step
-    inverse_start_kernel: ClassVar[Start] = maxwell_slip_inverse_start
-    parameters: ClassVar[tuple[str, ...]] = (
-        "weights",
-        "polynomial",
-        "stiffness_ratio",
-        "limit_ratio",
-    )
+    kernel = maxwell_slip_step
+    start_kernel = maxwell_slip_start
+    inverse_kernel = maxwell_slip_inverse_step
+    inverse_start_kernel = solved_start(_trial, maxwell_slip_start)
+    parameters = ("weights", "polynomial", "stiffness_ratio", "limit_ratio")
     increasing = ("breakaways",)
-    notation: ClassVar[Notation] = Notation(
+    notation = Notation(
         r"y = \sum_k c_k x^k + \sum_i w_i s_i,\quad x = \frac{u - m}{s}",
         r"s_{i,t} = \begin{cases} \min(s_{i,t-1} + \Delta u,\, r_i) & u \text{ rises} \\ "
         r"\max(s_{i,t-1} + \kappa \Delta u,\, -\lambda r_i) & u \text{ falls} \end{cases}",
@@ -190,7 +180,7 @@ class MaxwellSlip(Invertible):
 
     breakaways: Vector
     weights: Vector
-    polynomial: Coefficients
+    polynomial: Reversible
     stiffness_ratio: Annotated[FiniteFloat, Gt(0)] = 1.0
     limit_ratio: Annotated[FiniteFloat, Gt(0)] = 1.0
     centre: FiniteFloat = 0.0
@@ -203,11 +193,8 @@ class MaxwellSlip(Invertible):
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.breakaways, self.weights)
         check_input_range(self.kind, self.input_range)
-        if self.breakaways[0] == 0 or not self.polynomial:
-            raise ModelError(
-                f"{self.kind!r} wants limits above 0 and a polynomial. "
-                "Remedy: give positive limits, and one coefficient or more."
-            )
+        if self.breakaways[0] == 0:
+            raise ModelError(f"{self.kind!r} wants limits above 0. Remedy: give positive limits.")
 
     @property
     def n_states(self) -> int:
@@ -221,13 +208,11 @@ class MaxwellSlip(Invertible):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [size, kappa, lambda, centre, scale, polynomial, limits, weights]."""
-        del sample_time
         head = [len(self.polynomial), self.stiffness_ratio, self.limit_ratio]
         tail = [*self.polynomial, *self.breakaways, *self.weights]
         return np.array([*head, self.centre, self.scale, *tail])
 
     def least_slope(self) -> float:
-        """Return a lower bound of the slope of the output by the input."""
         softening = float(np.minimum(self.weights, 0.0).sum()) * max(1.0, self.stiffness_ratio)
         return least_slope(self.polynomial, self.centre, self.scale, self.input_limits) + softening
 

@@ -1,26 +1,37 @@
-"""The classical Prandtl-Ishlinskii (PI) model: a weighted sum of play operators, and its inverse.
+"""Prandtl-Ishlinskii (PI) models: weighted sums of play operators, and their inverses.
 
-y_t = y_0 + sum_i w_i F_{r_i}[u]_t, with r_0 = 0 so that the first term is the reversible part.
-
-Source: "Analysis and modeling of a pneumatic artificial muscle system", Eqs. (12), (13). The inverse
-is known to be a PI model too; here it is found by walking the same piecewise-linear relation from
-the operators' states, which is as exact, touches only the operators that move, and stays consistent
+The classical model: y_t = y_0 + sum_i w_i F_{r_i}[u]_t, with r_0 = 0 so that the first term is the
+reversible part. Source: "Analysis and modeling of a pneumatic artificial muscle system", Eqs. (12) and
+(13).
+The inverse is known to be a PI model too; here it is found by walking the same piecewise-linear relation
+from the operators' states, which is as exact, touches only the operators that move, and stays consistent
 when a reference has to be clipped.
+
+The rate-dependent model: y_t = y_0 + sum_i (k_i v_t + d_i) F_{r_i}[u]_t, where v is the rate of u,
+optionally through a first-order filter for inputs that are measured and noisy. With a polynomial behind
+it, this is the MPI model of "High-Precision Displacement and Force Hybrid Modeling of Pneumatic
+Artificial Muscle Using 3D PI-NARMAX Model", Eqs. (2) to (4). The rate depends on the input looked for,
+so the inverse is solved for every sample, until the bracket closes: within 1e-10 of the output's range.
+Where the output falls at first when the input jumps up (strongly negative weights by rate and a short
+filter), a model has solutions that swing ever wider; the inverse then runs into the input limits and
+says so. A longer `rate_time_constant` mends it.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from typing import ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
+from annotated_types import Ge
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.learning import Learnable, start_learning
 from mckibben.blocks.adaptive.operators import follow_learning, inverse_at, learnable_operators
-from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.base import needs_sample_time
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -38,24 +49,29 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_sum,
 )
 from mckibben.blocks.inverse import Invertible, check_input_range
-from mckibben.blocks.kernels import kernel, step, summing_step
+from mckibben.blocks.kernels import DERIVED, improved, kernel, step, summing_step
 from mckibben.blocks.notation import FEW, Notation, summed, tex
+from mckibben.blocks.solving import solve_near
 
 
 @summing_step
 def pi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run a PI model; coefficients are [offset, thresholds, weights]."""
     n = state.size
-    offset = coefficients[0]
-    r = coefficients[1 : n + 1]
-    w = coefficients[n + 1 :]
+    r, w = coefficients[1 : n + 1], coefficients[n + 1 :]
     u = inputs[0]
     y = 0.0
     for i in range(n):
         s = min(max(state[i], u - r[i]), u + r[i])
         state[i] = s
         y += w[i] * s
-    outputs[0] = offset + y
+    outputs[0] = coefficients[0] + y
+
+
+@kernel
+def pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start a PI model before its first sample."""
+    start_operators(coefficients[1 : state.size + 1], inputs[0], inputs[0], virgin, state)
 
 
 @step
@@ -66,22 +82,13 @@ def pi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: A
     """
     n = state.size - 2
     lowest, highest, offset = coefficients[0], coefficients[1], coefficients[2]
-    r = coefficients[3 : n + 3]
-    w = coefficients[n + 3 :]
-    s = state[:n]
+    r, w = coefficients[3 : n + 3], coefficients[n + 3 :]
     y = inputs[0]
-    _, clipped = follow(y - offset, state[n] - offset, lowest, highest, r, w, s)
+    _, clipped = follow(y - offset, state[n] - offset, lowest, highest, r, w, state[:n])
     if clipped:
         state[n + 1] += 1.0
     state[n] = y
-    outputs[0] = s[0]
-
-
-@kernel
-def pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start a PI model before its first sample."""
-    n = state.size
-    start_operators(coefficients[1 : n + 1], inputs[0], inputs[0], virgin, state)
+    outputs[0] = state[0]
 
 
 @kernel
@@ -89,11 +96,9 @@ def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: b
     """Start the inverse of a PI model before its first reference."""
     n = state.size - 2
     lowest, highest, offset = coefficients[0], coefficients[1], coefficients[2]
-    r = coefficients[3 : n + 3]
-    w = coefficients[n + 3 :]
+    r, w = coefficients[3 : n + 3], coefficients[n + 3 :]
     start_sum(inputs[0] - offset, lowest, highest, r, w, virgin, state[:n])
-    state[n] = inputs[0]
-    state[n + 1] = 0.0
+    state[n], state[n + 1] = inputs[0], 0.0
 
 
 @step
@@ -137,15 +142,15 @@ class PI(Invertible):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "pi"
-    kernel: ClassVar[Kernel] = pi_step
-    start_kernel: ClassVar[Start] = pi_start
-    inverse_kernel: ClassVar[Kernel] = pi_inverse_step
-    inverse_start_kernel: ClassVar[Start] = pi_inverse_start
+    kind = "pi"
+    kernel = pi_step
+    start_kernel = pi_start
+    inverse_kernel = pi_inverse_step
+    inverse_start_kernel = pi_inverse_start
     inverse_remembers = "output"
     increasing = ("thresholds",)
-    parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("weights", "offset")
+    notation = Notation(
         r"y = y_0 + \sum_i w_i F_{r_i}[u]",
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
         thresholds="r_i [{u}]",
@@ -172,7 +177,6 @@ class PI(Invertible):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [offset, thresholds, weights]."""
-        del sample_time
         return np.array([self.offset, *self.thresholds, *self.weights])
 
     def peaks(self) -> Array:
@@ -188,7 +192,6 @@ class PI(Invertible):
         return np.array([*self.input_limits, *own])
 
     def remembered(self, state: Array) -> tuple[float, ...]:
-        """Return the output."""
         return (self.offset + np.dot(self.weights, state),)
 
     @property
@@ -215,3 +218,181 @@ class PI(Invertible):
     def example(cls) -> Self:
         """Return the shape of a small muscle's loop over 0 to 5 bar."""
         return cls((0.0, 0.3, 0.8, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))
+
+
+@summing_step
+def rate_dependent_pi_step(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
+
+    The state is [operators, previous input, filtered rate].
+    """
+    n = state.size - 2
+    r = coefficients[3 : n + 3]
+    k, d = coefficients[n + 3 : 2 * n + 3], coefficients[2 * n + 3 :]
+    u = inputs[0]
+    rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
+    static = 0.0
+    dynamic = 0.0
+    for i in range(n):
+        s = min(max(state[i], u - r[i]), u + r[i])
+        state[i] = s
+        static += d[i] * s
+        dynamic += k[i] * s
+    outputs[0] = coefficients[2] + static + rate * dynamic
+    state[n], state[n + 1] = u, rate
+
+
+@kernel
+def _rate_trial(u: float, memory: tuple[Array, Array]) -> float:
+    coefficients, state = memory
+    n = state.size - 3
+    r = coefficients[3 : n + 3]
+    rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
+    y = coefficients[2]
+    for i in range(n):
+        s = min(max(state[i], u - r[i]), u + r[i])
+        y += (coefficients[2 * n + 3 + i] + rate * coefficients[n + 3 + i]) * s
+    return y
+
+
+@step
+def rate_dependent_pi_inverse_step(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Solve for the input; coefficients are [forward ones, lowest, highest input].
+
+    The state is [operators, previous input, filtered rate, samples clipped].
+    """
+    n = state.size - 3
+    lowest, highest = coefficients[-2], coefficients[-1]
+    u, clipped = solve_near(
+        _rate_trial, inputs[0], state[n], lowest, highest, (coefficients, state)
+    )
+    if DERIVED and lowest < u < highest:
+        u = improved(_rate_trial, inputs[0], u, (coefficients, state))
+    rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
+    for i in range(n):
+        r = coefficients[3 + i]
+        state[i] = min(max(state[i], u - r), u + r)
+    state[n] = u
+    state[n + 1] = rate
+    if clipped:
+        state[n + 2] += 1.0
+    outputs[0] = u
+
+
+@kernel
+def rate_dependent_pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start at rest, at the first input."""
+    n = state.size - 2
+    start_operators(coefficients[3 : n + 3], inputs[0], inputs[0], virgin, state[:n])
+    state[n], state[n + 1] = inputs[0], 0.0
+
+
+@kernel
+def rate_dependent_pi_inverse_start(
+    coefficients: Array, state: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start at rest, at the input that gives the first reference."""
+    n = state.size - 3
+    lowest, highest = coefficients[-2], coefficients[-1]
+    r, d = coefficients[3 : n + 3], coefficients[2 * n + 3 : 3 * n + 3]
+    start_sum(inputs[0] - coefficients[2], lowest, highest, r, d, virgin, state[:n])
+    state[n] = state[0]  # whose threshold is 0
+    state[n + 1], state[n + 2] = 0.0, 0.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class RateDependentPI(Invertible):
+    """Prandtl-Ishlinskii model whose weights are linear in the input's rate.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length N
+        Thresholds, in the unit of the input: 0 <= r_0 < r_1 < ...
+    rate_weights : sequence of float, length N
+        k_i, output per input per rate.
+    weights : sequence of float, length N
+        d_i, output per input at rest. The inverse wants r_0 = 0 and positive partial sums.
+    offset : float
+        Constant of the output.
+    rate_time_constant : float
+        Time constant of the filter of the rate [s]; 0, as in the paper, for none.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind = "rate-dependent-pi"
+    solved = True
+    kernel = rate_dependent_pi_step
+    start_kernel = rate_dependent_pi_start
+    inverse_kernel = rate_dependent_pi_inverse_step
+    inverse_start_kernel = rate_dependent_pi_inverse_start
+    rate_dependent = True
+    increasing = ("thresholds",)
+    parameters = ("rate_weights", "weights", "offset")
+    notation = Notation(
+        r"y = y_0 + \sum_i (d_i + k_i v) F_{r_i}[u],\quad T \dot{v} = \dot{u} - v",
+        r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
+        thresholds="r_i [{u}]",
+        rate_weights="k_i [{y} s/{u}^2]",
+        weights="d_i [{y}/{u}]",
+        offset="y_0 [{y}]",
+        rate_time_constant="T [s]",
+    )
+
+    thresholds: Vector
+    rate_weights: Vector
+    weights: Vector
+    offset: FiniteFloat = 0.0
+    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, self.thresholds, self.weights)
+        check_thresholds(self.kind, self.thresholds, self.rate_weights)
+        check_input_range(self.kind, self.input_range)
+
+    @property
+    def n_states(self) -> int:
+        """Operators, previous input and filtered rate."""
+        return len(self.thresholds) + 2
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [smoothing, gain of the rate, offset, thresholds, k, d].
+
+        Raises
+        ------
+        ModelError
+            Without a sample time.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        tau = self.rate_time_constant
+        smoothing = math.exp(-step / tau) if tau > 0 else 0.0
+        head = [smoothing, (1 - smoothing) / step, self.offset]
+        return np.array([*head, *self.thresholds, *self.rate_weights, *self.weights])
+
+    def check_invertible(self) -> None:
+        """Demand an input range, a first threshold of 0, and an output that rises at rest."""
+        check_invertible_sum(self.kind, self.thresholds, self.weights)
+        super().check_invertible()
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that can be reached at rest whatever happened before."""
+        at_rest = PI(self.thresholds, self.weights, self.offset, self.input_range)
+        return at_rest.reachable()
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a mildly rate-dependent loop over 0 to 5 bar."""
+        weights, rate_weights = (3.0, 1.5, 1.0, 0.5), (-0.05, 0.02, 0.04, 0.01)
+        return cls((0.0, 0.3, 0.8, 1.5), rate_weights, weights, 2.0, 0.1, (0.0, 5.0))

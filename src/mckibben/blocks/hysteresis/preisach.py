@@ -1,30 +1,39 @@
-"""Preisach model on a grid of thresholds in Everett form, with its closed-form inverse.
+"""Preisach and Krasnosel'skii-Pokrovskii models on a triangular grid of thresholds, and their inverses.
 
-A relay switches up where the input rises through a and down where it falls through b <= a; the
-output is the weighted sum over all relays. The plane of (a, b) is cut into cells by the levels;
-each cell off the diagonal carries its weight evenly, each on the diagonal as relays without a dead
-zone (a = b), which is the reversible part of the model. Instead of relays, the turning points of
-the input that are not wiped out are remembered, and the output follows from E(a, b), the weight of
-all relays within b and a: after a minimum b, rising to u gives y_b + 2 E(u, b). Between levels E is
-bilinear.
+Preisach, in Everett form: a relay switches up where the input rises through a and down where it
+falls through b <= a; the output is the weighted sum over all relays. The plane of (a, b) is cut into
+cells by the levels; each cell off the diagonal carries its weight evenly, each on the diagonal as
+relays without a dead zone (a = b), which is the reversible part of the model. Instead of relays, the
+turning points of the input that are not wiped out are remembered, and the output follows from E(a, b),
+the weight of all relays within b and a: after a minimum b, rising to u gives y_b + 2 E(u, b). Between
+levels E is bilinear.
 
 Sources: Preisach 1935; Mayergoyz, "Mathematical Models of Hysteresis", 1991 (Everett form,
 wiping-out, congruency).
 
 Along a branch the output is linear in the input from one level to the next, so the inverse is in
 closed form; it wants positive weights on the diagonal and none negative.
+
+Krasnosel'skii-Pokrovskii: y = offset + sum_ij w_ij s_ij, where operator ij is a play operator with
+bounded ridges: while the input rises, s is at least the ramp from 0 at level i to 1 at level i + 1;
+while it falls, s is at most the ramp from level j to level j + 1, j <= i. On the diagonal both ramps are
+one, and the operator is reversible. Its inverse is solved for.
+
+Sources: Krasnosel'skii and Pokrovskii, "Systems with Hysteresis", 1989; as an approximation of the
+Preisach model by Banks, Kurdila and Webb, 1997.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Cost, Kernel, Start
+from mckibben.blocks.base import Cost
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -34,11 +43,33 @@ from mckibben.blocks.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.hysteresis.triangular_grid import TriangularGrid
+from mckibben.blocks.inverse import Invertible, check_input_range
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import solved_start
+from mckibben.blocks.solving import solved_inverse, solved_start
 from mckibben.errors import ModelError
+
+
+def check_grid(kind: str, levels: Sequence[float], weights: Sequence[float]) -> None:
+    """Refuse levels that do not increase, and other than a weight for every cell between them."""
+    n = len(levels) - 1
+    if n < 1 or np.any(np.diff(levels) <= 0):
+        raise ModelError(
+            f"the levels of {kind!r} do not increase. Remedy: give two or more, in order."
+        )
+    check_input_range(kind, (levels[0], levels[-1]))
+    if len(weights) != n * (n + 1) // 2:
+        raise ModelError(
+            f"{kind!r} with {n + 1} levels has {len(weights)} weights. "
+            f"Remedy: give {n * (n + 1) // 2}."
+        )
+
+
+def on_diagonal(weights: Sequence[float]) -> Array:
+    """Return the weights of the cells on the diagonal, shape (L,), which act where the input turns."""
+    n = int(np.sqrt(2 * len(weights)))
+    return np.array(weights)[np.cumsum(np.arange(1, n + 1)) - 1]
+
 
 DEPTH = 64
 """Turning points remembered. More are nested only in loops within loops 32 deep; the smallest two
@@ -204,7 +235,7 @@ preisach_inverse_start = solved_start(_first_output, preisach_start, 1)
 
 
 @dataclass(frozen=True, config=STRICT)
-class Preisach(TriangularGrid):
+class Preisach(Invertible):
     """Preisach model on a triangular grid.
 
     Parameters
@@ -225,13 +256,14 @@ class Preisach(TriangularGrid):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "preisach"
-    kernel: ClassVar[Kernel] = preisach_step
-    start_kernel: ClassVar[Start] = preisach_start
-    inverse_kernel: ClassVar[Kernel] = preisach_inverse_step
-    inverse_start_kernel: ClassVar[Start] = preisach_inverse_start
-    parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
-    notation: ClassVar[Notation] = Notation(
+    kind = "preisach"
+    kernel = preisach_step
+    start_kernel = preisach_start
+    inverse_kernel = preisach_inverse_step
+    inverse_start_kernel = preisach_inverse_start
+    increasing = ("levels",)
+    parameters = ("weights", "offset")
+    notation = Notation(
         r"y = y_0 + \sum_{j \le i} w_{ij} \left(1 + R_{ij}[u]\right)",
         r"R_{ij}[u] = +1 \text{ once } u \text{ rose through cell } i,\; -1 \text{ once "
         "it fell through cell } j",
@@ -246,6 +278,14 @@ class Preisach(TriangularGrid):
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_grid(self.kind, self.levels, self.weights)
+
+    @property
+    def input_range(self) -> tuple[float, float]:
+        """The first and last level."""
+        return self.levels[0], self.levels[-1]
 
     @property
     def n_states(self) -> int:
@@ -281,18 +321,15 @@ class Preisach(TriangularGrid):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [number of levels, levels, Everett table, offset]."""
-        del sample_time
         return np.array([len(self.levels), *self.levels, *self.table().ravel(), self.offset])
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what it costs to find the place of an input in the table."""
-        del sample_time
         once = self._look_up()
         return Cost(once, once + 64)
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
         """Return what it costs to walk along the levels, half of them usually."""
-        del sample_time
         once, levels = self._look_up(), len(self.levels)
         return Cost(once * max(1, levels // 2), once * levels + 64)
 
@@ -301,15 +338,172 @@ class Preisach(TriangularGrid):
 
     def check_invertible(self) -> None:
         """Demand weights that are not negative, and positive on the diagonal."""
-        if min(self.weights) < 0 or self.diagonal.min() <= 0:
+        if min(self.weights) < 0 or on_diagonal(self.weights).min() <= 0:
             raise ModelError(
                 "'preisach' has no inverse: its weights must not be negative, and positive on the "
                 "diagonal. Remedy: identify it with nonnegative=true."
             )
+
+    def peaks(self) -> Array:
+        return np.array(self.levels)
 
     @classmethod
     def example(cls) -> Self:
         """Return a loop over 0 to 5 bar with more weight near the diagonal."""
         n = 5
         weights = [2.0 / (1 + i - j) ** 2 for i in range(n) for j in range(i + 1)]
+        return cls(tuple(np.linspace(0.0, 5.0, n + 1).tolist()), tuple(weights), 1.0)
+
+
+@kernel
+def _ramp(u: float, levels: Array, i: int) -> float:
+    return min(max((u - levels[i]) / (levels[i + 1] - levels[i]), 0.0), 1.0)
+
+
+@kernel
+def _advance(u: float, c: Array, state: Array) -> None:
+    n = int(c[0])
+    levels = c[2 : 3 + n]
+    place = 0
+    for i in range(n):
+        least = _ramp(u, levels, i)
+        for j in range(i + 1):
+            state[place] = max(least, min(_ramp(u, levels, j), state[place]))
+            place += 1
+    state[place] = u
+
+
+@kernel
+def _trial(u: float, memory: tuple[Array, Array]) -> float:
+    c, state = memory
+    n = int(c[0])
+    levels = c[2 : 3 + n]
+    y = c[1]
+    place = 0
+    for i in range(n):
+        least = _ramp(u, levels, i)
+        for j in range(i + 1):
+            y += c[3 + n + place] * max(least, min(_ramp(u, levels, j), state[place]))
+            place += 1
+    return y
+
+
+@step
+def krasnoselskii_pokrovskii_step(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; coefficients are [number of intervals, offset, levels, weights].
+
+    The state is [operators, previous input].
+    """
+    n = int(coefficients[0])
+    weights = coefficients[3 + n :]
+    _advance(inputs[0], coefficients, state)
+    y = coefficients[1]
+    for k in range(weights.size):
+        y += weights[k] * state[k]
+    outputs[0] = y
+
+
+@kernel
+def krasnoselskii_pokrovskii_start(
+    coefficients: Array, state: Array, inputs: Array, virgin: bool
+) -> None:
+    """Start on the rising ridges, or half-way between the ridges."""
+    n = int(coefficients[0])
+    levels = coefficients[2 : 3 + n]
+    place = 0
+    for i in range(n):
+        least = _ramp(inputs[0], levels, i)
+        for j in range(i + 1):
+            most = _ramp(inputs[0], levels, j) if virgin else least
+            state[place] = 0.5 * (least + most)
+            place += 1
+    state[place] = inputs[0]
+
+
+@dataclass(frozen=True, config=STRICT)
+class KrasnoselskiiPokrovskii(Invertible):
+    """Krasnosel'skii-Pokrovskii model on a triangular grid.
+
+    Parameters
+    ----------
+    levels : sequence of float, length L + 1
+        Increasing inputs between which the ridges rise; the output is constant beyond them.
+    weights : sequence of float, length L (L + 1) / 2
+        Output of the operators, for rising ridges interval by interval, each from the lowest
+        falling ridge to the diagonal: w_00, w_10, w_11, w_20, ...
+    offset : float
+        Output with all operators at 0.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: the input has risen from the lowest level, or every
+        operator is half-way between its ridges.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind = "krasnoselskii-pokrovskii"
+    solved = True
+    inverse_remembers = "input"
+    kernel = krasnoselskii_pokrovskii_step
+    start_kernel = krasnoselskii_pokrovskii_start
+    inverse_kernel, inverse_start_kernel = solved_inverse(
+        _trial, _advance, krasnoselskii_pokrovskii_start
+    )
+    increasing = ("levels",)
+    parameters = ("weights", "offset")
+    notation = Notation(
+        r"y = y_0 + \sum_{j \le i} w_{ij} s_{ij}",
+        r"s_{ij,t} = \begin{cases} \max(s_{ij,t-1},\, \rho_i(u_t)) & u \text{ rises} \\ "
+        r"\min(s_{ij,t-1},\, \rho_j(u_t)) & u \text{ falls} \end{cases}",
+        r"\rho_i(u) = \min\left(\max\left(\frac{u - a_i}{a_{i+1} - a_i},\, 0\right),\, "
+        r"1\right)",
+        levels="a_i [{u}]",
+        weights="w_k [{y}]",
+        offset="y_0 [{y}]",
+    )
+
+    levels: Vector
+    weights: Vector
+    offset: FiniteFloat = 0.0
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_grid(self.kind, self.levels, self.weights)
+
+    @property
+    def input_range(self) -> tuple[float, float]:
+        """The first and last level."""
+        return self.levels[0], self.levels[-1]
+
+    @property
+    def n_states(self) -> int:
+        """Operators and the previous input."""
+        return len(self.weights) + 1
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [number of intervals, offset, levels, weights]."""
+        return np.array([len(self.levels) - 1, self.offset, *self.levels, *self.weights])
+
+    def least_slope(self) -> float:
+        """Return the least slope by the input: that of the reversible operators, or less."""
+        least = min(self.weights)
+        if least < 0:
+            return float(least / np.diff(self.levels).min())
+        return float(np.min(on_diagonal(self.weights) / np.diff(self.levels)))
+
+    def remembered(self, state: Array) -> tuple[float, ...]:
+        """Return the input last seen, within the levels."""
+        return (float(np.clip(state[-1], *self.input_range)),)
+
+    def peaks(self) -> Array:
+        return np.array(self.levels)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a loop over 0 to 5 bar with more weight near the diagonal."""
+        n = 5
+        weights = [4.0 / (1 + i - j) ** 2 for i in range(n) for j in range(i + 1)]
         return cls(tuple(np.linspace(0.0, 5.0, n + 1).tolist()), tuple(weights), 1.0)

@@ -64,7 +64,7 @@ class StateNetworkEstimator(SearchEstimator):
         Most steps of the descent, each of which costs about as much as n_states runs of all weights.
     periodic : bool
         Whether every recording is a whole number of periods of a motion that repeats itself; see
-        `mckibben.estimators.hysteresis.oscillator.OscillatorEstimator`.
+        `mckibben.estimators.hysteresis.oscillators.OscillatorEstimator`.
     substeps : int, optional
         Runge-Kutta steps from sample to sample. Default: enough that the linear oscillator turns by
         no more than 1/3 rad in each.

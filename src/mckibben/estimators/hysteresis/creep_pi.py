@@ -1,40 +1,78 @@
 """Identification of a Prandtl-Ishlinskii memory followed by an increasing map and visco-elastic creep.
 
-Everything is identified jointly by variable projection: weights of the
-operators, offset, compliances and time constants are searched, the map is solved for.
+Two things that rate-independent loops leave out of a pneumatic muscle: its friction grows with pressure,
+so the play operators act on log(u + offset); and braid and rubber creep, so the output goes on moving
+while the input is held. Everything is identified jointly by variable projection.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from annotated_types import Ge, Interval
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.fields import vector
+from mckibben.blocks.dynamics.creep import Creep, creep_step
+from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.memoryless import Logarithm
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.estimator import Grid
-from mckibben.estimators.core.separable import LEAST_REVERSIBLE, counting
-from mckibben.estimators.hysteresis.creeping import CreepingEstimator, creep_moves, with_creep
+from mckibben.estimators.core.estimator import Grid, Operators
+from mckibben.estimators.core.separable import (
+    LEAST_REVERSIBLE,
+    SEARCH_SAMPLES,
+    SeparableEstimator,
+    counting,
+)
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
-from mckibben.estimators.hysteresis.pi import play_operators
-from mckibben.estimators.hysteresis.thresholds import spread
+from mckibben.estimators.hysteresis.pi import play_operators, spread
+from mckibben.estimators.optimisers.tracker import Tracker
 
 RAISED = 1e-5
 """Step either way, of the logarithm of what is added to the input, for its derivative."""
 
+MOST_ADDED = 20.0
+"""Largest addition to the input, relative to its range."""
+
+FASTEST, SLOWEST = 3.0, 3.0
+"""Of the time constants: samples, and durations of the longest run."""
+
+HELPS = 0.9
+"""Share of the error up to which it may help that creep was under way when runs began."""
+
+FEWEST = 20
+"""Samples that tell whether later parts of runs are foreseen."""
+
+UNDER_WAY = (
+    "creep was under way when the recordings began, and what was left of it was found: it goes on where "
+    "outputs are known, and elsewhere the muscle is taken to be settled"
+)
+
+MOST_CREEP = 0.3
+"""Largest compliance of an element, relative to the immediate response."""
+
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class CreepPIEstimator(CreepingEstimator):
+class CreepPIEstimator(SeparableEstimator):
     """Prandtl-Ishlinskii memory on the logarithm of the input, an increasing map, and creep.
+
+    What is searched: relative weights of the operators, the logarithm of what is added to the input,
+    logarithms of the time constants, compliances; the map is solved for.
 
     Parameters
     ----------
+    n_operators : int
+        Play operators, the one without dead zone included.
+    n_creep : int
+        Visco-elastic elements.
+    settled : bool, optional
+        Whether creep had ended before every recording, at its first input; else what was left of it is
+        found with the rest. Default: what foresees later parts of the recordings better.
     map_size : int
         Degree of the increasing polynomial behind them.
     threshold_share : float
@@ -50,13 +88,15 @@ class CreepPIEstimator(CreepingEstimator):
     cannot = "Its loops' shape does not change with rate or load; needs time."
     inverse_kind = "exact"
     quick = True
-    param_grid: ClassVar[Grid] = {
-        "n_operators": (4, 6, 8),
-        "n_creep": (1, 2, 3),
-    }
+    param_grid: ClassVar[Grid] = {"n_operators": (4, 6, 8), "n_creep": (1, 2, 3)}
     makes = ("logarithm pi polynomial creep",)
     effort: ClassVar[float] = 1.0
+    needs_time: ClassVar[bool] = True
+    searches_condensed: ClassVar[bool] = False
 
+    n_operators: Operators = 10
+    n_creep: Annotated[int, Interval(ge=0, le=5)] = 2
+    settled: bool | None = None
     map_size: Annotated[int, Interval(ge=1, le=12)] = 6
     threshold_share: Annotated[float, Interval(gt=0, le=1)] = 1.0
     n_starts: Annotated[int, Ge(1)] = 8
@@ -64,8 +104,110 @@ class CreepPIEstimator(CreepingEstimator):
 
     search_evaluations: ClassVar[int] = 30  # the valleys are flat
 
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        if self.n_creep > 0:
+            data.timed("creep depends on it", ", or use n_creep=0")
+        if self.settled is not None or self.n_creep == 0:
+            return super().identify(data, tracker)
+        first, second = tracker.part(0.0, 0.5), tracker.part(0.5, 0.9)
+        settled = self._with(settled=True).identify(data, first)
+        tracker.saw_all(first)
+        tracker.best, tracker.best_cost = first.best, first.best_cost
+        foresees = False
+        with tracker.searching():  # an interrupt leaves what is found by now
+            if not tracker.interrupted:
+                begun = self._with(settled=False).identify(data, second)
+                helps = second.best_cost < HELPS * first.best_cost
+                foresees = helps and self._foresees(data, second)
+        tracker.saw_all(second)
+        if tracker.interrupted or not foresees:
+            return settled
+        tracker.best, tracker.best_cost = second.best, second.best_cost
+        tracker.notes.append(UNDER_WAY)
+        return begun
+
+    def _foresees(self, data: TrainingData, tracker: Tracker) -> bool:
+        """Tell whether what comes later in the runs is foreseen better with what was left of creep."""
+        missed = {True: 0.0, False: 0.0}
+        for end in (0.5, 0.75):
+            known = data.between(0.0, end).thinned(SEARCH_SAMPLES)
+            later = data.between(end, end + 0.25).thinned(SEARCH_SAMPLES)
+            if min(known.target.size, later.target.size) < FEWEST:
+                return False
+            for settled in missed:
+                tried, part = self._with(settled=settled), tracker.part(0.9, 0.9)
+                theta = tried._search(known, part)
+                tracker.saw_all(part)
+                if part.interrupted:
+                    return False
+                linear, offset = tried._solve(theta, known)
+                errors = tried.matrix(theta, later) @ linear + offset - later.target
+                missed[settled] += float(errors @ errors)
+        return missed[False] < missed[True]
+
+    def _with(self, **settings: bool) -> Self:
+        """Return the same estimator with other settings."""
+        return type(self)(**self.get_params() | settings)
+
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        return self.bounds_about(data, 20.0, ((), ()))
+        """Return bounds of [weights, log addition, log time constants, compliances]."""
+        n, k = self.n_operators, self.n_creep
+        low, high = data.input_range
+        least = np.log(max(0.01 * (high - low), 0.1 - low))
+        step = data.sample_time or 1.0
+        longest = max(run.u.size for run in data.runs) * step
+        slow = np.log(max(SLOWEST * longest, 30 * step))
+        lower = [*[0.0] * n, least, *[np.log(FASTEST * step)] * k, *[0.0] * k]
+        added = max(np.log(MOST_ADDED * (high - low)), least + 1)
+        upper = [*[1.0] * n, added, *[slow] * k, *[MOST_CREEP] * k]
+        lower[0] = LEAST_REVERSIBLE
+        return np.array(lower), np.array(upper)
+
+    def n_begun(self, data: TrainingData) -> int:
+        """Return how many columns the basis has for creep that was under way when runs began."""
+        if self.settled is not False:
+            return 0
+        return self.n_creep * (1 + max(run.place for run in data.runs))
+
+    def begun(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return how creep that was under way when runs began fades over a run's history, (n, n_begun).
+
+        What an element was behind by, times its compliance, is one number an element and a run.
+        """
+        columns = np.zeros((run.history.size, self.n_begun(data)))
+        if columns.size:
+            taus, _ = self.tail(theta)
+            own = slice(run.place * self.n_creep, (1 + run.place) * self.n_creep)
+            columns[:, own] = np.exp(-elapsed(run)[:, np.newaxis] / taus)
+        return columns
+
+    def begun_moves(self, theta: Array, left: Array, run: Run, data: TrainingData) -> Array:
+        """Return how that moves with the logarithms of the time constants, (n, n_creep)."""
+        taus, _ = self.tail(theta)
+        columns = self.begun(theta, run, data) * left
+        by_element = columns.reshape(len(columns), -1, self.n_creep).sum(axis=1)
+        return np.asarray(by_element * elapsed(run)[:, np.newaxis] / taus)
+
+    def tail(self, theta: Array) -> tuple[Array, Array]:
+        """Return time constants and compliances as they are searched."""
+        taus, compliances = np.split(theta[theta.size - 2 * self.n_creep :], 2)
+        return np.exp(taus), compliances
+
+    def creep(self, theta: Array) -> tuple[Array, Array]:
+        """Return time constants and compliances, the fastest first."""
+        taus, compliances = self.tail(theta)
+        order = np.argsort(taus, kind="stable")
+        return taus[order], compliances[order]
+
+    def creep_parts(self, theta: Array, channel: Channel) -> tuple[Block, ...]:
+        """Return the block of the creep, if there is any."""
+        taus, compliances = self.creep(theta)
+        rule: Literal["first_sample", "fitted"] = (
+            "fitted" if self.settled is False else "first_sample"
+        )
+        if not taus.size:
+            return ()
+        return (Creep(vector(compliances), vector(taus), rule, channel, channel),)
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return fading weights, on the logarithm and nearly on the input itself, with some creep."""
@@ -152,20 +294,53 @@ class CreepPIEstimator(CreepingEstimator):
         given = data.inputs[0]
         result = data.outputs[0]
         scale = 1.0 / (top - bottom)
-        parts = (
-            Logarithm(raised, given, given),
-            PI(
-                vector(radii),
-                vector(weights * scale),
-                -bottom * scale,
-                (low, high),
-                self.starting_rule,
-                given,
-                result,
-            ),
-            PolynomialMap(self.map_size).build(
-                linear, offset / (1.0 + compliances.sum()), 0.0, 1.0, result
-            ),
-            *self.creep_parts(theta, result),
+        memory = (vector(radii), vector(weights * scale), -bottom * scale, (low, high))
+        settled = offset / (1.0 + compliances.sum())
+        return Series(
+            (
+                Logarithm(raised, given, given),
+                PI(*memory, self.starting_rule, given, result),
+                PolynomialMap(self.map_size).build(linear, settled, 0.0, 1.0, result),
+                *self.creep_parts(theta, result),
+            )
         )
-        return Series(parts)
+
+
+def elapsed(run: Run) -> Array:
+    """Return the time since a run began, as its elements have felt it [s]."""
+    assert run.sample_time is not None
+    return np.asarray(run.sample_time * np.arange(1.0, 1.0 + run.history.size))
+
+
+def with_creep(
+    columns: Array, taus: Sequence[float] | Array, compliances: Array, step: float | None
+) -> Array:
+    """Return columns, shape (n, k), each with visco-elastic creep."""
+    if len(taus) == 0:
+        return columns
+    assert step is not None
+    coefficients = np.array([*np.exp(-step / np.asarray(taus)), *compliances])
+    crept = np.empty_like(columns)
+    for k in range(columns.shape[1]):
+        state = np.full(len(taus), columns[0, k])
+        given = np.ascontiguousarray(columns[:, k : k + 1])
+        out = np.empty_like(given)
+        creep_step.batch(coefficients, state, given, out)
+        crept[:, k] = out[:, 0]
+    return crept
+
+
+def creep_moves(given: Array, taus: Array, compliances: Array, step: float | None) -> Array:
+    """Return how something with creep moves with log time constants, then compliances, (n, 2 k)."""
+    from scipy.signal import lfilter
+
+    if len(taus) == 0:
+        return np.empty((given.size, 0))
+    assert step is not None
+    elements, by_time = [], []
+    for tau, compliance in zip(taus, compliances, strict=True):
+        crept = with_creep(given[:, np.newaxis], [tau], np.ones(1), step)[:, 0]
+        elements.append(crept - given)
+        late = compliance * step / tau * (elements[-1] - given)
+        by_time.append(np.asarray(lfilter([1.0], [1.0, -np.exp(-step / tau)], late)))
+    return np.column_stack([*by_time, *elements])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Ge
@@ -16,7 +16,7 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
-from mckibben.estimators.hysteresis.thresholds import spread
+from mckibben.estimators.hysteresis.pi import Spacing, spread
 
 CUBIC = PolynomialMap(3)
 
@@ -45,7 +45,7 @@ class EUPIEstimator(SeparableEstimator):
     effort: ClassVar[float] = 0.3
 
     n_operators: Operators = 10
-    spacing: Literal["even", "dense"] = "even"
+    spacing: Spacing = "even"
     n_starts: Annotated[int, Ge(1)] = 16
 
     def radii(self, data: TrainingData) -> Array:

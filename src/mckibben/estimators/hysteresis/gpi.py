@@ -2,27 +2,109 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.envelopes.base import Envelope
-from mckibben.blocks.hysteresis.envelopes.exponential import Exponential
-from mckibben.blocks.hysteresis.envelopes.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.hysteresis.envelopes.tanh import Tanh
+from mckibben.blocks.hysteresis.envelopes import Envelope, Exponential, PiecewiseLinear, Tanh
 from mckibben.blocks.hysteresis.gpi import GPI, gpi_matrix, smallest_gap
 from mckibben.blocks.hysteresis.play_operators import started
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.hysteresis.thresholds import spread
+from mckibben.estimators.hysteresis.pi import Spacing, spread
 
-Range = tuple[float, float]
+
+class Shape(NamedTuple):
+    """How a pair of envelopes is parametrised for the search, up to height and scale."""
+
+    lower: list[float]
+    upper: list[float]
+    """Bounds of the shape parameters of both envelopes."""
+
+    guesses: list[list[float]]
+    """Sensible shape parameters."""
+
+    envelopes: Callable[[Array], list[Envelope]]
+    """Gives the rising and the falling envelope of shape parameters."""
+
+
+def tanh_shape(low: float, high: float, n_knots: int) -> Shape:
+    """Return the shape of tangents: the logarithm of the slope and the centre of each."""
+    span, centre = high - low, 0.5 * (low + high)
+
+    def envelopes(shape: Array) -> list[Envelope]:
+        slopes, centres = np.exp(shape[[0, 2]]).tolist(), shape[[1, 3]].tolist()
+        return [Tanh(a, -a * c) for a, c in zip(slopes, centres, strict=True)]
+
+    return Shape(
+        [np.log(0.2 / span), low - span] * 2,
+        [np.log(16 / span), high + span] * 2,
+        [
+            [np.log(steepness / span), centre, np.log(steepness / span), centre - 0.02 * span]
+            for steepness in (1.0, 2.0, 4.0)
+        ],
+        envelopes,
+    )
+
+
+def exponential_shape(low: float, high: float, n_knots: int) -> Shape:
+    """Return the shape of exponentials: both rates, and the logarithm of their relative steepness.
+
+    The rising one has unit mean slope over the range.
+    """
+    span = high - low
+
+    def envelopes(shape: Array) -> list[Envelope]:
+        found: list[Envelope] = []
+        for rate, steepness in ((shape[0], 0.0), (shape[1], shape[2])):
+            bent = float(np.copysign(max(abs(rate), 1e-3 / span), rate))
+            rise = abs(np.exp(-bent * low) - np.exp(-bent * high))
+            found.append(Exponential(bent, float(steepness - np.log(rise))))
+        return found
+
+    return Shape(
+        [-4 / span, -4 / span, -1.5],
+        [4 / span, 4 / span, 1.5],
+        [[rate / span, rate / span, 0.0] for rate in (-1.5, -0.5, 0.5, 1.5)],
+        envelopes,
+    )
+
+
+def piecewise_linear_shape(low: float, high: float, n_knots: int) -> Shape:
+    """Return the shape of lines between equally spaced knots: the logarithms of all their rises.
+
+    The rising envelope's rises are scaled to add up to one.
+    """
+    n = n_knots - 1
+    middle, places = -np.log(n), (np.arange(n) + 0.5) / n
+
+    def envelopes(shape: Array) -> list[Envelope]:
+        knots, rises = vector(np.linspace(low, high, n_knots)), np.exp(shape).reshape(2, -1)
+        heights = [np.cumsum(rise / rises[0].sum()) for rise in rises]
+        return [PiecewiseLinear(knots, (0.0, *vector(height))) for height in heights]
+
+    return Shape(
+        [middle - 4.0] * 2 * n,
+        [middle + 2.0] * 2 * n,
+        [
+            np.tile(np.log(rise / rise.sum()), 2).tolist()
+            for rise in (np.ones(n), 0.2 + np.sin(np.pi * places))
+        ],
+        envelopes,
+    )
+
+
+SHAPES: dict[str, Callable[[float, float, int], Shape]] = {
+    "tanh": tanh_shape,
+    "piecewise-linear": piecewise_linear_shape,
+    "exponential": exponential_shape,
+}
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -70,32 +152,28 @@ class GPIEstimator(SeparableEstimator):
     envelope: Literal["tanh", "piecewise-linear", "exponential"] = "tanh"
     n_knots: Annotated[int, Interval(ge=3, le=100)] = 6
     threshold_rule: Literal["envelope", "paper"] = "envelope"
-    spacing: Literal["even", "dense"] = "even"
+    spacing: Spacing = "even"
 
-    @property
-    def shape(self) -> EnvelopeShape:
-        """How the envelopes are parametrised for the search."""
-        return SHAPES[self.envelope](self.n_knots)
+    def shape(self, data: TrainingData) -> Shape:
+        """Return how the envelopes are parametrised for the search."""
+        return SHAPES[self.envelope](*data.input_range, self.n_knots)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the envelopes' shapes, the gap between them, and a virgin one's height."""
-        lower, upper = self.shape.bounds(data.input_range)
+        shape = self.shape(data)
         highest = [] if self.solves_offset else [2.0 * self.highest(data)]
-        return (
-            np.concatenate([lower, [0.0], -np.array(highest)]),
-            np.concatenate([upper, [1.0], highest]),
-        )
+        lowest = [-height for height in highest]
+        return np.array([*shape.lower, 0.0, *lowest]), np.array([*shape.upper, 1.0, *highest])
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return near-equal envelopes of a few curvatures."""
-        shapes = self.shape.guesses(data.input_range)
         heights: list[list[float]] = [[]]
         if not self.solves_offset:
             heights = [[share * self.highest(data)] for share in (-0.5, 0.0, 0.5)]
         return [
-            np.concatenate([shape, [gap], height])
+            np.array([*shape, gap, *height])
             for height in heights
-            for shape in shapes
+            for shape in self.shape(data).guesses
             for gap in (0.0, 0.1)
         ]
 
@@ -117,13 +195,11 @@ class GPIEstimator(SeparableEstimator):
 
         def made() -> tuple[Envelope, Envelope]:
             n = theta.size - 1 if self.solves_offset else theta.size - 2
-            rising, falling = self.shape.envelopes(theta[:n], data.input_range)
+            rising, falling = self.shape(data).envelopes(theta[:n])
             gap, _ = smallest_gap(rising, falling, data.input_range)
             height = 0.0 if self.solves_offset else float(theta[-1])
-            return (
-                rising.shifted(height),
-                falling.shifted(height + float(theta[n]) - gap + 1e-9),
-            )
+            above = height + float(theta[n]) - gap + 1e-9
+            return rising.shifted(height), falling.shifted(above)
 
         return data.latest("envelopes", theta, made)
 
@@ -137,17 +213,20 @@ class GPIEstimator(SeparableEstimator):
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the generalised play operators over the run's history, shape (n, N + 1)."""
         rising, falling = self.envelopes(theta, data)
-        return gpi_operators(
-            run.history, rising, falling, self.radii(rising, falling, data), self.starting_rule
+        u, radii = np.ascontiguousarray(run.history), self.radii(rising, falling, data)
+        up, down = rising(u), falling(u)
+        operators = np.empty((u.size, radii.size))
+        gpi_matrix(
+            u, up, down, radii, started(radii, up[0], down[0], self.starting_rule), operators
         )
+        return operators
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> GPI:
         """Return the GPI model; the offset becomes a common height of the envelopes."""
         rising, falling = self.envelopes(theta, data)
-        radii = self.radii(rising, falling, data)
         height = offset / linear.sum() if linear.sum() != 0 else 0.0
         return GPI(
-            vector(radii),
+            vector(self.radii(rising, falling, data)),
             vector(linear),
             rising.shifted(height),
             falling.shifted(height),
@@ -155,116 +234,3 @@ class GPIEstimator(SeparableEstimator):
             self.starting_rule,
             **self.channels(data),
         )
-
-
-def gpi_operators(u: Array, rising: Envelope, falling: Envelope, radii: Array, rule: str) -> Array:
-    """Return generalised play operators side by side over an input, shape (n, N)."""
-    u = np.ascontiguousarray(u)
-    up, down = rising(u), falling(u)
-    operators = np.empty((u.size, radii.size))
-    gpi_matrix(u, up, down, radii, started(radii, up[0], down[0], rule), operators)
-    return operators
-
-
-class EnvelopeShape(ABC):
-    """How a pair of envelopes is parametrised for the search, up to height and scale."""
-
-    def __init__(self, n_knots: int) -> None:
-        self.n_knots = n_knots
-
-    @abstractmethod
-    def bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of the shape parameters of both envelopes."""
-
-    @abstractmethod
-    def guesses(self, input_range: Range) -> list[Array]:
-        """Return sensible shape parameters of both envelopes."""
-
-    @abstractmethod
-    def envelopes(self, shape: Array, input_range: Range) -> tuple[Envelope, Envelope]:
-        """Return both envelopes."""
-
-
-class TanhShape(EnvelopeShape):
-    """Steepness (as a logarithm) and centre of each tangent."""
-
-    def bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of [log slope, centre] twice."""
-        low, high = input_range
-        span = high - low
-        lower, upper = [np.log(0.2 / span), low - span], [np.log(16 / span), high + span]
-        return np.array(lower * 2), np.array(upper * 2)
-
-    def guesses(self, input_range: Range) -> list[Array]:
-        """Return centred tangents of a few slopes."""
-        low, high = input_range
-        span, centre = high - low, 0.5 * (low + high)
-        slopes = [np.log(steepness / span) for steepness in (1.0, 2.0, 4.0)]
-        return [np.array([slope, centre, slope, centre - 0.02 * span]) for slope in slopes]
-
-    def envelopes(self, shape: Array, input_range: Range) -> tuple[Envelope, Envelope]:
-        slopes, centres = np.exp(shape[[0, 2]]).tolist(), shape[[1, 3]].tolist()
-        rising, falling = (Tanh(a, -a * c) for a, c in zip(slopes, centres, strict=True))
-        return rising, falling
-
-
-class ExponentialShape(EnvelopeShape):
-    """Rate of each exponential, and the steepness of the falling one relative to the rising one."""
-
-    def bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of [rate, rate, log of relative steepness]."""
-        span = input_range[1] - input_range[0]
-        return np.array([-4 / span, -4 / span, -1.5]), np.array([4 / span, 4 / span, 1.5])
-
-    def guesses(self, input_range: Range) -> list[Array]:
-        """Return like exponentials of a few curvatures, convex and concave."""
-        span = input_range[1] - input_range[0]
-        return [np.array([rate / span, rate / span, 0.0]) for rate in (-1.5, -0.5, 0.5, 1.5)]
-
-    def envelopes(self, shape: Array, input_range: Range) -> tuple[Envelope, Envelope]:
-        """Return both exponentials, the rising one of unit mean slope over the range."""
-        low, high = input_range
-        least = 1e-3 / (high - low)
-        envelopes = []
-        for rate, steepness in ((shape[0], 0.0), (shape[1], shape[2])):
-            bent = float(np.copysign(max(abs(rate), least), rate))
-            rise = abs(np.exp(-bent * low) - np.exp(-bent * high))
-            envelopes.append(Exponential(bent, float(steepness - np.log(rise))))
-        return envelopes[0], envelopes[1]
-
-
-class PiecewiseLinearShape(EnvelopeShape):
-    """Logarithms of the rise between knots, the rising envelope's adding up to one."""
-
-    def bounds(self, input_range: Range) -> tuple[Array, Array]:
-        """Return bounds of the logarithms of all rises."""
-        n = 2 * (self.n_knots - 1)
-        middle = -np.log(self.n_knots - 1)
-        return np.full(n, middle - 4.0), np.full(n, middle + 2.0)
-
-    def guesses(self, input_range: Range) -> list[Array]:
-        """Return straight envelopes, and S-shaped ones."""
-        pieces = self.n_knots - 1
-        middle = (np.arange(pieces) + 0.5) / pieces
-        return [
-            np.tile(np.log(rise / rise.sum()), 2)
-            for rise in (np.ones(pieces), 0.2 + np.sin(np.pi * middle))
-        ]
-
-    def envelopes(self, shape: Array, input_range: Range) -> tuple[Envelope, Envelope]:
-        """Return both envelopes on equally spaced knots."""
-        knots = np.linspace(*input_range, self.n_knots)
-        rising, falling = np.exp(shape).reshape(2, -1)
-        scale = rising.sum()
-        first, second = (
-            PiecewiseLinear(vector(knots), (0.0, *vector(np.cumsum(rise / scale))))
-            for rise in (rising, falling)
-        )
-        return first, second
-
-
-SHAPES: dict[str, type[EnvelopeShape]] = {
-    "tanh": TanhShape,
-    "piecewise-linear": PiecewiseLinearShape,
-    "exponential": ExponentialShape,
-}

@@ -13,15 +13,48 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.hysteresis.play import play_matrix
-from mckibben.blocks.hysteresis.play_operators import started
+from mckibben.blocks.hysteresis.play_operators import play_matrix, started
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid, Operators
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.core.uncertainty import simulate_all
-from mckibben.estimators.hysteresis.thresholds import spread
 from mckibben.estimators.optimisers.tracker import Tracker
+
+Spacing = Literal["even", "dense"]
+
+
+def spread(n: int, span: float, spacing: Spacing) -> Array:
+    """Return ``n`` thresholds from 0 to below half of ``span``.
+
+    An operator of threshold r only moves when the input moves by more than 2 r after a reversal, so
+    thresholds beyond half the range never move.
+
+    Parameters
+    ----------
+    n : int
+        Number of thresholds, at least 1.
+    span : float
+        Range of what the operators act on.
+    spacing : {"even", "dense"}
+        Equal steps, or steps that grow from 0, for loops that bend right after a reversal.
+
+    >>> spread(4, 8.0, "even").tolist()
+    [0.0, 1.0, 2.0, 3.0]
+    """
+    share = np.arange(n) / n
+    return 0.5 * span * (share if spacing == "even" else share**1.5)
+
+
+def play_operators(u: Array, radii: Array, rule: str) -> Array:
+    """Return play operators side by side over an input, shape (n, N)."""
+    operators = np.empty((u.size, radii.size))
+    play_matrix(np.ascontiguousarray(u), radii, started(radii, u[0], u[0], rule), operators)
+    return operators
+
+
+SHORTEST = 0.02
+"""Segment whose slope is more than noise, relative to the longest branch."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -58,7 +91,7 @@ class PIEstimator(SeparableEstimator):
 
     method: Literal["ls", "slopes"] = "ls"
     n_operators: Operators = 10
-    spacing: Literal["even", "dense"] = "even"
+    spacing: Spacing = "even"
     thresholds: Annotated[Sequence[float], Len(1)] | None = None
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -106,17 +139,6 @@ class PIEstimator(SeparableEstimator):
         model = self.build(np.empty(0), weights, 0.0, data)
         outputs = simulate_all([model], data)[0]
         return self.build(np.empty(0), weights, float(np.mean(data.target - outputs)), data)
-
-
-SHORTEST = 0.02
-"""Segment whose slope is more than noise, relative to the longest branch."""
-
-
-def play_operators(u: Array, radii: Array, rule: str) -> Array:
-    """Return play operators side by side over an input, shape (n, N)."""
-    operators = np.empty((u.size, radii.size))
-    play_matrix(np.ascontiguousarray(u), radii, started(radii, u[0], u[0], rule), operators)
-    return operators
 
 
 def _segments(data: TrainingData, radii: Array, rule: str) -> tuple[Array, Array]:

@@ -11,8 +11,7 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
-from mckibben.blocks.hysteresis.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
-from mckibben.blocks.hysteresis.preisach import Preisach
+from mckibben.blocks.hysteresis.preisach import KrasnoselskiiPokrovskii, Preisach
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.separable import SeparableEstimator

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import DISPLACEMENT, Channel
-from mckibben.blocks.hysteresis.rate_dependent_pi import RateDependentPI
+from mckibben.blocks.hysteresis.pi import RateDependentPI
 from mckibben.blocks.memoryless import Polynomial
 
 THRESHOLDS = (0.0, 0.0101, 0.0296, 0.2596, 0.4318, 0.8309, 1.6003, 1.9544, 3.9537, 4.95)

@@ -1,0 +1,503 @@
+"""Models of a loop with one memory z that moves with the input: Bouc-Wen, generalised, and Duhem.
+
+All are rate-independent and integrated in closed form, and their inverses are solved for.
+
+Bouc-Wen in its normalised form, with a reversible polynomial P of x = (u - centre) / scale:
+y = P(x) + weight z, dz/du = rate (1 - |z|^n [sigma sgn(z du) + 1 - sigma]). z lies within -1 and 1. In
+the common form, z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n, it is A = rate D, beta = sigma rate
+D^(1-n), gamma = (1 - sigma) rate D^(1-n) with z scaled by D: one number less, and none that the data
+cannot tell. Sources: Bouc 1967; Wen, "Method of random vibration of hysteretic systems", 1976; the
+normalised form is that of Ikhouane and Rodellar, "Systems with Hysteresis", 2007.
+
+Generalised, for asymmetric loops: dz/du = rate (1 - |z|^n psi),
+psi = sgn(z du) + b2 sgn(x du) + b3 sgn(x z) + b4 sgn(du) + b5 sgn(z) + b6 sgn(x). The first of the six
+shape numbers is 1: it only sets the size of z, which the weight sets too. Each of the eight combinations
+of signs has a psi of its own. Sources: Song and Der Kiureghian, "Generalized Bouc-Wen model for highly
+asymmetric hysteresis", 2006; of pneumatic muscles: Schindele and Aschemann 2012.
+
+Duhem in Coleman and Hodgdon's form, with polynomials: dy/dx = alpha sgn(dx) (f(x) - y) + g(x); f is the
+curve that the output tends to, and g its slope right after a reversal. While the input goes one way the
+equation is linear, with the particular solution P(x), a polynomial:
+P_k = (s alpha f_k + g_k - (k + 1) P_{k+1}) / (s alpha), s the direction. Hence over any stretch
+y = P(x) + (y_0 - P(x_0)) exp(-alpha |x - x_0|), exactly. Source: Coleman and Hodgdon, "A constitutive
+relation for rate-independent hysteresis in ferromagnetically soft materials", 1986.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from annotated_types import Ge, Gt
+from numpy.typing import ArrayLike
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Start
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import solved_inverse
+from mckibben.errors import ModelError
+
+
+def loop_kernels(
+    moved: Callable[..., float], output: Callable[..., float], start: Start
+) -> tuple[Step, Step, Start]:
+    """Return the step of a model, and the step and the start of its inverse; the state is [z, input].
+
+    The model gives two compiled functions: ``moved(u, coefficients, state)``, its memory after the input
+    has gone on to u, and ``output(u, z, coefficients)``.
+    """
+    place = f"{moved.__module__}.{moved.__qualname__}"
+
+    @kernel
+    def advance(u: float, c: Array, state: Array) -> None:
+        state[0] = moved(u, c, state)
+        state[1] = u
+
+    def trial(u: float, memory: tuple[Array, Array]) -> float:
+        c, state = memory
+        return output(u, moved(u, c, state), c)
+
+    def loop_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Move the memory with the input; the state is [memory, previous input]."""
+        advance(inputs[0], coefficients, state)
+        outputs[0] = output(inputs[0], state[0], coefficients)
+
+    trial.__qualname__, loop_step.__qualname__ = f"{place}.trial", f"{place}.step"
+    return step(loop_step), *solved_inverse(kernel(trial), advance, start)
+
+
+@kernel
+def bouc_wen_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start with z = 1, as after a long rise, or z = 0."""
+    state[0] = 0.0 if virgin else 1.0
+    state[1] = inputs[0]
+
+
+@kernel
+def flow(v: float, tau: float, unloading: float, loading: float, n: int) -> float:
+    """Return z in the direction of motion, v, after a straight stretch ``tau`` of the input.
+
+    With tau > 0 in units of the model's rate, dv/dtau = 1 - psi |v|^n; psi is ``unloading`` while v < 0,
+    then ``loading``. For n = 1 the solutions are exponentials; for n = 2 they are tanh where psi > 0 and
+    tan where psi < 0, by their addition formulas. No step size enters, so stretches add up exactly.
+    Wants loading > 0 and unloading < 1 / |v|^n, so that v returns to zero and then stays bounded.
+    """
+    if v < 0.0:
+        needed = _way_to_zero(-v, unloading, n)
+        if tau <= needed:
+            return min(-_shrunk(-v, tau, unloading, n), 0.0)
+        v, tau = 0.0, tau - needed
+    if n == 1:
+        limit = 1.0 / loading
+        return limit - (limit - v) * math.exp(-loading * tau)
+    q = math.sqrt(loading)
+    t = math.tanh(q * tau)
+    return (v + t / q) / (1.0 + v * q * t)
+
+
+@kernel
+def _way_to_zero(w: float, psi: float, n: int) -> float:
+    """Return the way after which w = |v| has shrunk to zero."""
+    if psi == 0.0:
+        return w
+    if n == 1:
+        return -math.log1p(-psi * w) / psi
+    q = math.sqrt(abs(psi))
+    return math.atan(q * w) / q if psi < 0.0 else math.atanh(q * w) / q
+
+
+@kernel
+def _shrunk(w: float, tau: float, psi: float, n: int) -> float:
+    """Return what is left of w = |v| after the way ``tau``."""
+    if psi == 0.0:
+        return w - tau
+    if n == 1:
+        grown = math.expm1(psi * tau)
+        return w + grown * (w - 1.0 / psi)
+    q = math.sqrt(abs(psi))
+    if psi < 0.0:
+        t = math.tan(q * tau)
+        return (w - t / q) / (1.0 + w * q * t)
+    t = math.tanh(q * tau)
+    return (w - t / q) / (1.0 - w * q * t)
+
+
+@kernel
+def _bouc_wen_moved(u: float, c: Array, state: Array) -> float:
+    """Return z after the input has gone on to ``u``."""
+    du = u - state[1]
+    if du == 0.0:
+        return state[0]
+    up = 1.0 if du > 0.0 else -1.0
+    return up * flow(up * state[0], abs(c[0] * du), 1.0 - 2.0 * c[1], 1.0, int(c[2]))
+
+
+@kernel
+def _bouc_wen_output(u: float, z: float, c: Array) -> float:
+    return polynomial_at((u - c[4]) / c[5], c, 6, c.size - 6) + c[3] * z
+
+
+@dataclass(frozen=True, config=STRICT)
+class BoucWen(Invertible):
+    """Normalised Bouc-Wen model with a reversible polynomial.
+
+    Parameters
+    ----------
+    polynomial : sequence of float
+        Ascending coefficients of the reversible part, at least one; two for the classical model.
+    weight : float
+        Output per z; negative where the output lags the input, as a muscle's displacement lags
+        pressure.
+    rate : float
+        How fast z moves with the input, per input; positive.
+    sigma : float
+        Shape of the loop, at least 0.5: the part of the decay that changes sign with the direction.
+    exponent : {1, 2}
+        n; how sharply z saturates.
+    centre, scale : float
+        Of the input in the polynomial; scale positive.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: z = 1, or z = 0.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind = "bouc-wen"
+    solved = True
+    inverse_remembers = "input"
+    n_states = 2
+    start_kernel = bouc_wen_start
+    kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
+        _bouc_wen_moved, _bouc_wen_output, bouc_wen_start
+    )
+    parameters = ("polynomial", "weight", "rate", "sigma")
+    notation = Notation(
+        r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
+        r"\frac{dz}{du} = \rho \left(1 - |z|^n \left[\sigma \operatorname{sgn}(z\, du) + "
+        r"1 - \sigma\right]\right)",
+        polynomial="c_k from 0 [{y}]",
+        weight="w [{y}]",
+        rate=r"\rho [1/{u}]",
+        sigma=r"\sigma",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
+
+    polynomial: Reversible
+    weight: FiniteFloat
+    rate: Annotated[FiniteFloat, Gt(0)]
+    sigma: Annotated[FiniteFloat, Ge(0.5)]
+    exponent: Literal[1, 2] = 1
+    centre: FiniteFloat = 0.0
+    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_input_range(self.kind, self.input_range)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [rate, sigma, exponent, weight, centre, scale, polynomial]."""
+        head = [self.rate, self.sigma, self.exponent, self.weight, self.centre, self.scale]
+        return np.array([*head, *self.polynomial])
+
+    def least_slope(self) -> float:
+        steepest = self.rate * max(1.0, 2.0 * self.sigma)
+        reversible = least_slope(self.polynomial, self.centre, self.scale, self.input_limits)
+        return reversible + min(0.0, self.weight * steepest)
+
+    def peaks(self) -> Array:
+        return np.linspace(*self.input_limits, 33)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a saturating loop over 0 to 5 bar."""
+        return cls((14.0, 16.0, -1.0, -1.0), -2.5, 1.2, 0.7, 1, 2.5, 2.5, (0.0, 5.0))
+
+
+@kernel
+def _psi(going: float, z: float, side: float, c: Array) -> float:
+    return (
+        going * z + c[6] * side * going + c[7] * side * z + c[8] * going + c[9] * z + c[10] * side
+    )
+
+
+@kernel
+def _stretch(z: float, du: float, side: float, c: Array) -> float:
+    """Return z after the input has moved by ``du`` on one side of the centre."""
+    if du == 0.0:
+        return z
+    up = 1.0 if du > 0.0 else -1.0
+    loading, unloading = _psi(up, up, side, c), _psi(up, -up, side, c)
+    return up * flow(up * z, abs(c[0] * du), unloading, loading, int(c[1]))
+
+
+@kernel
+def _generalized_moved(u: float, c: Array, state: Array) -> float:
+    """Return z after the input has gone on to ``u``.
+
+    Coefficients are [rate, n, weight, centre, scale, 1, b2 to b6, polynomial].
+    """
+    z, before, centre = state[0], state[1], c[3]
+    if (before - centre) * (u - centre) < 0.0:
+        z = _stretch(z, centre - before, 1.0 if before > centre else -1.0, c)
+        before = centre
+    return _stretch(z, u - before, 1.0 if before + u > 2.0 * centre else -1.0, c)
+
+
+@kernel
+def _generalized_output(u: float, z: float, c: Array) -> float:
+    return polynomial_at((u - c[3]) / c[4], c, 11, c.size - 11) + c[2] * z
+
+
+@dataclass(frozen=True, config=STRICT)
+class GeneralizedBoucWen(Invertible):
+    """Generalised Bouc-Wen model with a reversible polynomial.
+
+    Parameters
+    ----------
+    polynomial : sequence of float
+        Ascending coefficients of the reversible part, at least one; two for the classical model.
+    weight : float
+        Output per z; negative where the output lags the input, as a muscle's displacement lags
+        pressure.
+    rate : float
+        How fast z moves with the input, per input; positive.
+    shape : sequence of float, length 5
+        b2 to b6; their sizes may add up to less than 1, which keeps z bounded and lets it return.
+    exponent : {1, 2}
+        n; how sharply z saturates.
+    centre, scale : float
+        Of the input in the polynomial; scale positive.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: z = 1, or z = 0.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind = "generalized-bouc-wen"
+    solved = True
+    inverse_remembers = "input"
+    n_states = 2
+    start_kernel = bouc_wen_start
+    kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
+        _generalized_moved, _generalized_output, bouc_wen_start
+    )
+    parameters = ("polynomial", "weight", "rate", "shape")
+    notation = Notation(
+        r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
+        r"\frac{dz}{du} = \rho \left(1 - |z|^n \psi\right)",
+        r"\psi = \operatorname{sgn}(z\,du) + b_2 \operatorname{sgn}(x\,du) + b_3 "
+        r"\operatorname{sgn}(x z) + b_4 \operatorname{sgn}(du) + b_5 "
+        r"\operatorname{sgn}(z) + b_6 \operatorname{sgn}(x)",
+        polynomial="c_k from 0 [{y}]",
+        weight="w [{y}]",
+        rate=r"\rho [1/{u}]",
+        shape="b_k from 2",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
+
+    polynomial: Reversible
+    weight: FiniteFloat
+    rate: Annotated[FiniteFloat, Gt(0)]
+    shape: Vector
+    exponent: Literal[1, 2] = 1
+    centre: FiniteFloat = 0.0
+    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_input_range(self.kind, self.input_range)
+        if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
+            raise ModelError(
+                f"the shape of {self.kind!r} is {self.shape}. Remedy: give five numbers whose sizes add "
+                "up to less than 1."
+            )
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [rate, exponent, weight, centre, scale, 1, shape, polynomial]."""
+        head = [self.rate, self.exponent, self.weight, self.centre, self.scale, 1.0]
+        return np.array([*head, *self.shape, *self.polynomial])
+
+    def least_slope(self) -> float:
+        away = (1.0 + self.asymmetry) * self.bound**self.exponent - 1.0
+        shallowest = -self.rate * away
+        reversible = least_slope(self.polynomial, self.centre, self.scale, self.input_limits)
+        return reversible + min(self.weight * shallowest, self.weight * self.steepest, 0.0)
+
+    @property
+    def asymmetry(self) -> float:
+        """Sum of the sizes of the shape numbers."""
+        return float(np.abs(self.shape).sum())
+
+    @property
+    def steepest(self) -> float:
+        """Largest slope of z by the input."""
+        return self.rate * (1.0 + (1.0 + self.asymmetry) * self.bound**self.exponent)
+
+    @property
+    def bound(self) -> float:
+        """Largest size of z: where it ends with the smallest psi of loading."""
+        signs = [(s * g, s * g, g, g, s) for s in (1, -1) for g in (1, -1)]
+        smallest = 1.0 + min(float(np.dot(self.shape, sign)) for sign in signs)
+        return float(smallest ** (-1.0 / self.exponent))
+
+    def peaks(self) -> Array:
+        return np.linspace(*self.input_limits, 33)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a saturating loop over 0 to 5 bar."""
+        polynomial, shape = (14.0, 16.0, -1.0, -1.0), (0.1, -0.1, 0.15, 0.05, -0.1)
+        return cls(polynomial, -0.9, 1.2, shape, 1, 2.5, 2.5, (0.0, 5.0))
+
+
+@kernel
+def _duhem_moved(u: float, c: Array, state: Array) -> float:
+    """Return the output after the input has gone on to ``u``.
+
+    Coefficients are [alpha, centre, scale, P rising, P falling, f].
+    """
+    y, before = state[0], state[1]
+    if u == before:
+        return y
+    size = (c.size - 3) // 3
+    first = 3 if u > before else 3 + size
+    x, x0 = (u - c[1]) / c[2], (before - c[1]) / c[2]
+    kept = math.exp(-c[0] * abs(x - x0))
+    return polynomial_at(x, c, first, size) + (y - polynomial_at(x0, c, first, size)) * kept
+
+
+@kernel
+def _duhem_output(u: float, y: float, c: Array) -> float:
+    """Return the memory: it is the output."""
+    return y
+
+
+@kernel
+def duhem_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start on the curve of inputs that have only risen, or on f."""
+    x = (inputs[0] - coefficients[1]) / coefficients[2]
+    size = (coefficients.size - 3) // 3
+    state[0] = polynomial_at(x, coefficients, 3 + 2 * size if virgin else 3, size)
+    state[1] = inputs[0]
+
+
+def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: float) -> Array:
+    """Return P for the directions 1 or -1 of the input: all polynomials by ascending coefficients."""
+    f, g = np.atleast_1d(np.asarray(target, float)), np.atleast_1d(np.asarray(slope, float))
+    size = max(f.size, g.size)
+    f, g = np.pad(f, (0, size - f.size)), np.pad(g, (0, size - g.size))
+    found = np.zeros(size + 1)
+    for k in range(size - 1, -1, -1):
+        found[k] = f[k] + (g[k] - (k + 1) * found[k + 1]) / (direction * alpha)
+    return found[:size]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Duhem(Invertible):
+    """Duhem model with a polynomial to tend to and a polynomial slope.
+
+    Parameters
+    ----------
+    target : sequence of float
+        Ascending coefficients of f, in the unit of the output; at least one.
+    slope : sequence of float
+        Ascending coefficients of g, output per scaled input; at least one.
+    alpha : float
+        How fast the output tends to f, per scaled input; positive.
+    centre, scale : float
+        Of the input; scale positive.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: on the curve of inputs that have only risen, or on
+        f.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind = "duhem"
+    solved = True
+    inverse_remembers = "input"
+    n_states = 2
+    start_kernel = duhem_start
+    kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
+        _duhem_moved, _duhem_output, duhem_start
+    )
+    parameters = ("target", "slope", "alpha")
+    notation = Notation(
+        r"\frac{dy}{dx} = \alpha \operatorname{sgn}(dx) \left(f(x) - y\right) + "
+        r"g(x),\quad x = \frac{u - m}{s}",
+        r"f(x) = \sum_k f_k x^k,\quad g(x) = \sum_k g_k x^k",
+        target="f_k from 0 [{y}]",
+        slope="g_k from 0 [{y}]",
+        alpha=r"\alpha",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
+
+    target: Reversible
+    slope: Reversible
+    alpha: Annotated[FiniteFloat, Gt(0)]
+    centre: FiniteFloat = 0.0
+    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_input_range(self.kind, self.input_range)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [alpha, centre, scale, P rising, P falling, f], filled up to as many numbers as P."""
+        up, down = (particular(self.alpha, self.target, self.slope, way) for way in (1.0, -1.0))
+        filled = [0.0] * (up.size - len(self.target))
+        return np.array([self.alpha, self.centre, self.scale, *up, *down, *self.target, *filled])
+
+    def least_slope(self) -> float:
+        """Return a lower bound of the slope of the output by the input, on loops within the range.
+
+        The output stays between the curves that it tends to when rising and when falling.
+        """
+        x = (np.linspace(*self.input_limits, 201) - self.centre) / self.scale
+        value = np.polynomial.polynomial.polyval
+        f, g = value(x, self.target), value(x, self.slope)
+        ends = [value(x, particular(self.alpha, self.target, self.slope, s)) for s in (1.0, -1.0)]
+        low, high = np.minimum(*ends), np.maximum(*ends)
+        rising, falling = self.alpha * (f - high) + g, -self.alpha * (f - low) + g
+        return float(min(rising.min(), falling.min())) / self.scale
+
+    def peaks(self) -> Array:
+        return np.linspace(*self.input_limits, 33)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a loop over 0 to 5 bar that saturates."""
+        return cls((14.0, 16.0, -1.0), (12.0, -1.0), 1.5, 2.5, 2.5, (0.0, 5.0))

@@ -1,0 +1,267 @@
+"""Envelopes of generalised play operators: strictly increasing functions of the input.
+
+Each has two kernels, ``value`` and ``inverse``, and the frozen class that names their parameters. Adding
+one is a class here, its test, and one line in the registry.
+
+Source of the hyperbolic tangent: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling
+Behavior for Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator", Eq. (4).
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar, Protocol, Self, cast
+
+import numpy as np
+from annotated_types import Gt
+from numpy.typing import ArrayLike
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.fields import STRICT, Vector
+from mckibben.blocks.kernels import inlined, kernel
+from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import Parametrised
+from mckibben.blocks.saving import part_from_dict
+from mckibben.errors import ModelError
+
+
+class EnvelopeKernel(Protocol):
+    """A function of one number, ``kernel(argument, coefficients)``, compiled.
+
+    Attributes
+    ----------
+    batch : callable
+        ``batch(coefficients, arguments, values)``, which fills ``values``, shape (n,).
+    """
+
+    batch: Callable[[Array, Array, Array], None]
+
+    def __call__(self, argument: float, coefficients: Array) -> float:
+        """Return the value."""
+
+
+def envelope_kernel(function: Callable[[float, Array], float]) -> EnvelopeKernel:
+    """Compile a function of one number, and the loop over many."""
+    one: Any = inlined(function)  # so that what calls it is compiled alike, whatever was before
+
+    def batch(coefficients: Array, arguments: Array, values: Array) -> None:
+        for t in range(arguments.size):
+            values[t] = one(arguments[t], coefficients)
+
+    batch.__qualname__ = f"{function.__module__}.{function.__qualname__}"  # by which it is cached
+    one.batch = kernel(batch)
+    return cast("EnvelopeKernel", one)
+
+
+class Envelope(Parametrised):
+    """A strictly increasing function of the input, with its inverse."""
+
+    number: ClassVar[int]
+    """What C tells it by."""
+
+    increasing: ClassVar[tuple[str, ...]] = ()
+    """Fields of numbers in increasing order, which single precision must not make one."""
+
+    value: ClassVar[EnvelopeKernel]
+    inverse: ClassVar[EnvelopeKernel]
+
+    def coefficients(self) -> Array:
+        """Return the numbers that the kernels read; by default the parameters."""
+        return self.pack()
+
+    def shifted(self, offset: float) -> Self:
+        """Return this envelope raised by a constant; by default its field ``offset``."""
+        return replace(self, offset=self.offset + offset)  # type: ignore[type-var,attr-defined]
+
+    @classmethod
+    @abstractmethod
+    def examples(cls) -> tuple[Self, Self]:
+        """Return a pair for rising and falling input over 0 to 5 bar, the second never lower."""
+
+    def __call__(self, inputs: ArrayLike) -> Array:
+        """Return the envelope at the inputs, any shape."""
+        return self._evaluate(type(self).value, inputs)
+
+    def solve(self, values: ArrayLike) -> Array:
+        """Return the inputs at which the envelope has these values, any shape; NaN beyond its range."""
+        return self._evaluate(type(self).inverse, values)
+
+    def _evaluate(self, function: EnvelopeKernel, arguments: ArrayLike) -> Array:
+        given = np.asarray(arguments, dtype=np.float64)
+        flat = np.ascontiguousarray(given.reshape(-1))
+        values = np.empty_like(flat)
+        function.batch(self.coefficients(), flat, values)
+        return values.reshape(given.shape)
+
+
+def nested_envelope(content: Any) -> Any:
+    """Turn the dict of an envelope inside a block into that envelope."""
+    return part_from_dict(content, "envelopes") if isinstance(content, dict) else content
+
+
+@envelope_kernel
+def tanh_value(u: float, coefficients: Array) -> float:
+    """Return the envelope at an input; coefficients are [slope, shift, offset]."""
+    return math.tanh(coefficients[0] * u + coefficients[1]) + coefficients[2]
+
+
+@envelope_kernel
+def tanh_inverse(value: float, coefficients: Array) -> float:
+    """Return the input at which the envelope has a value."""
+    return (math.atanh(value - coefficients[2]) - coefficients[1]) / coefficients[0]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Tanh(Envelope):
+    """Hyperbolic tangent, for loops that saturate at both ends: tanh(slope u + shift) + offset.
+
+    Parameters
+    ----------
+    slope : float
+        Steepness per unit of the input; positive.
+    shift : float
+        Argument at zero input.
+    offset : float
+        Added to the tangent.
+    """
+
+    kind = "tanh"
+    number = 0
+    value = tanh_value
+    inverse = tanh_inverse
+    parameters = ("slope", "shift", "offset")
+    notation = Notation(r"\gamma(u) = \tanh(a u + b) + c", slope="a [1/{u}]", shift="b", offset="c")
+
+    slope: Annotated[FiniteFloat, Gt(0)]
+    shift: FiniteFloat
+    offset: FiniteFloat = 0.0
+
+    @classmethod
+    def examples(cls) -> tuple[Self, Self]:
+        """Return a pair for rising and falling input over 0 to 5 bar."""
+        return cls(0.5, -1.3, 0.0), cls(0.45, -0.9, 0.1)
+
+
+@envelope_kernel
+def exponential_value(u: float, coefficients: Array) -> float:
+    """Return the envelope at an input; coefficients are [rate, shift, offset]."""
+    rate, shift, offset = coefficients[0], coefficients[1], coefficients[2]
+    return offset + math.copysign(1.0, rate) * (1.0 - math.exp(shift - rate * u))
+
+
+@envelope_kernel
+def exponential_inverse(value: float, coefficients: Array) -> float:
+    """Return the input at which the envelope has a value."""
+    rate, shift, offset = coefficients[0], coefficients[1], coefficients[2]
+    return (shift - math.log(1.0 - math.copysign(1.0, rate) * (value - offset))) / rate
+
+
+@dataclass(frozen=True, config=STRICT)
+class Exponential(Envelope):
+    """Shifted exponential, for loops that bend one way only.
+
+    gamma(u) = offset + sign(rate) (1 - exp(shift - rate u)): concave and saturating for a positive
+    rate, convex for a negative one, and strictly increasing for both.
+
+    Parameters
+    ----------
+    rate : float
+        Curvature per unit of the input; not zero.
+    shift : float
+        Exponent at zero input; the slope there is abs(rate) exp(shift).
+    offset : float
+        Added to the exponential.
+    """
+
+    kind = "exponential"
+    number = 1
+    value = exponential_value
+    inverse = exponential_inverse
+    parameters = ("rate", "shift", "offset")
+    notation = Notation(
+        r"\gamma(u) = c + \operatorname{sgn}(a) \left(1 - e^{b - a u}\right)",
+        rate="a [1/{u}]",
+        shift="b",
+        offset="c",
+    )
+
+    rate: FiniteFloat
+    shift: FiniteFloat
+    offset: FiniteFloat = 0.0
+
+    def __post_init__(self) -> None:
+        if self.rate == 0:
+            raise ModelError(
+                "an exponential envelope of rate 0 is flat. Remedy: give a rate that is not zero."
+            )
+
+    @classmethod
+    def examples(cls) -> tuple[Self, Self]:
+        """Return a pair for rising and falling input over 0 to 5 bar."""
+        return cls(0.3, 0.2, 0.0), cls(0.4, 0.2, 0.2)
+
+
+@envelope_kernel
+def piecewise_linear_value(u: float, coefficients: Array) -> float:
+    """Return the envelope at an input; coefficients are [knots, values]."""
+    n = coefficients.size // 2
+    return interpolate(u, coefficients[:n], coefficients[n:])
+
+
+@envelope_kernel
+def piecewise_linear_inverse(value: float, coefficients: Array) -> float:
+    """Return the input at which the envelope has a value."""
+    n = coefficients.size // 2
+    return interpolate(value, coefficients[n:], coefficients[:n])
+
+
+@dataclass(frozen=True, config=STRICT)
+class PiecewiseLinear(Envelope):
+    """Straight lines between knots, continued beyond the first and the last; for loops of any shape.
+
+    Parameters
+    ----------
+    knots : sequence of float, length K >= 2
+        Inputs where lines meet, increasing.
+    values : sequence of float, length K
+        Envelope there, increasing.
+    """
+
+    kind = "piecewise-linear"
+    number = 2
+    value = piecewise_linear_value
+    inverse = piecewise_linear_inverse
+    increasing = ("knots", "values")
+    parameters = ("values",)
+    notation = Notation(
+        r"\gamma(u) = v_k + (v_{k+1} - v_k) \frac{u - \xi_k}{\xi_{k+1} - \xi_k},\quad "
+        r"\xi_k \le u \le \xi_{k+1}",
+        knots=r"\xi_k [{u}]",
+        values="v_k",
+    )
+
+    knots: Vector
+    values: Vector
+
+    def __post_init__(self) -> None:
+        check_increasing("piecewise-linear envelope", self.knots, self.values)
+
+    def coefficients(self) -> Array:
+        """Return [knots, values]."""
+        return np.array([*self.knots, *self.values])
+
+    def shifted(self, offset: float) -> Self:
+        """Return this envelope raised by a constant."""
+        return replace(self, values=tuple(value + offset for value in self.values))
+
+    @classmethod
+    def examples(cls) -> tuple[Self, Self]:
+        """Return a pair for rising and falling input over 0 to 5 bar."""
+        knots = (0.0, 1.0, 2.5, 4.0, 5.0)
+        return cls(knots, (0.0, 0.1, 0.5, 0.9, 1.0)), cls(knots, (0.05, 0.3, 0.7, 0.95, 1.05))

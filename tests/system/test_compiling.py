@@ -88,6 +88,44 @@ def test_a_kernel_kept_notices_what_changes_in_the_files_that_it_calls(tmp_path:
         assert printed("import calling", tmp_path, **own) == expected
 
 
+LOOPING = """
+from mckibben.system.compiling import deferred
+
+def looped(function):
+    def loop(x):
+        return function(x)
+    return deferred(loop)
+"""
+
+MOVED = """
+from mckibben.system.compiling import deferred
+from {module} import grown
+
+@deferred
+def result(x):
+    return grown(x)
+"""
+
+LOOPED = """
+from looping import looped
+from moved import result
+
+loop = looped(result)
+print(loop(1.0), sum(loop.dispatcher.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.long
+def test_a_kernel_kept_does_without_the_module_that_what_it_calls_stood_in(tmp_path: Path) -> None:
+    own = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    (tmp_path / "looping.py").write_text(LOOPING)
+    for module, hits in (("called", 0), ("called", 1), ("elsewhere", 0)):
+        (tmp_path / "called.py").unlink(missing_ok=True)
+        (tmp_path / f"{module}.py").write_text(CALLED)
+        (tmp_path / "moved.py").write_text(MOVED.format(module=module))
+        assert printed(LOOPED, tmp_path, **own) == [f"3.0 {hits}"]
+
+
 def test_kernels_travel_to_other_processes() -> None:
     kernel = deferred(double)
     for _ in range(2):  # before it is compiled, and after

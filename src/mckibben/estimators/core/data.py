@@ -30,6 +30,12 @@ RESTS = 0.03
 """An input rests where it stays below this share of that range above its lowest value."""
 
 
+def stretches(mask: Mask) -> list[tuple[int, int]]:
+    """Return where stretches of true values start and stop."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
 @dataclass(frozen=True)
 class Run:
     """One recording: what drives (n, k), outputs (n, m), what schedules (n, s), and which samples count.
@@ -76,10 +82,9 @@ class Run:
 
     def stretches(self, shortest: int) -> list[Run]:
         """Return the stretches whose samples all count, longer than so many, each a run of its own."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], self.counts, [False]])))
         return [
             self.cut(start, stop)
-            for start, stop in edges.reshape(-1, 2).tolist()
+            for start, stop in stretches(self.counts)
             if stop - start > shortest
         ]
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.running import run_many
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import Run, TrainingData, stretches
 
 LARGEST = 1e150
 """Sensitivity that still is one: its square is a number."""
@@ -151,9 +151,7 @@ def sandwich(
 
 def _pieces(series: Array) -> list[Array]:
     """Return the stretches of a series without NaN."""
-    finite = np.isfinite(series)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]])))
-    return [series[start:stop] for start, stop in edges.reshape(-1, 2).tolist()]
+    return [series[start:stop] for start, stop in stretches(np.isfinite(series))]
 
 
 def relative_sizes(parameters: Array) -> Array:
@@ -245,8 +243,8 @@ class Autoregression:
         back = lfilter([1.0], self._whitener, slopes[::-1], axis=0)[::-1]
         return np.asarray(self.shock * back)
 
-    def worth(self, n: int) -> float:
-        """Return how many independent samples tell as much of the mean as n of these."""
+    def effective_sample_size(self, n: int) -> float:
+        """Return how many independent samples determine the mean as well as n of these."""
         if self.variance <= 0:
             return float(n)
         memory = (self.shock / float(self._whitener.sum())) ** 2 / self.variance

@@ -24,6 +24,9 @@ NARROWEST, WIDEST = 0.15, 1.5
 
 MOST_STEPS = 15
 
+HELD = 1e-3
+"""How strongly sets stay where they start, relative to the error there, if errors hardly change."""
+
 LEAST_GAIN = 2e-4
 """Share of the squared error that a step has to gain for another to follow."""
 
@@ -47,17 +50,20 @@ def project(
     lower, upper = _limits(start, low, scale)
     unit = np.concatenate([np.repeat(scale, start.centres.shape[1])] * 2)
 
+    held = HELD * float(np.linalg.norm(problem.errors(start))) / unit
+
     def errors(theta: Array) -> Array:
-        return problem.errors(start.replaced(theta)).ravel()
+        left = problem.errors(start.replaced(theta)).ravel()
+        return np.append(left, held * (theta - start.vector))
 
     def slopes(theta: Array) -> Array:
         sets = start.replaced(theta)
         by_theta, left = sensitivities(problem, sets)
-        held = float(np.sqrt(np.mean(left**2)))
+        cost = float(np.sqrt(np.mean(left**2)))
         if validation is not None:
-            held = _held(problem, sets, *validation)
-        tracker.saw(theta, held)
-        return by_theta
+            cost = _held(problem, sets, *validation)
+        tracker.saw(theta, cost)
+        return np.vstack([by_theta, np.diag(held)])
 
     tracker.budget = MOST_STEPS + 1
     with tracker.searching():

@@ -158,7 +158,7 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     left = [e[: len(r)] for e, r in zip(left, kept, strict=True)]
     share = sum(map(len, left)) / total
     models = autoregressions(left)
-    worth = min(model.worth(sum(map(len, left))) for model in models) / share
+    worth = min(model.effective_sample_size(sum(map(len, left))) for model in models) / share
     places = [place for place in range(n_parameters) if not said[place]]
     columns: list[list[Array]] = []
     given = [channel.name for channel in block.outputs]

@@ -17,17 +17,17 @@ from mckibben.recording import Recording, listed
 Mask = NDArray[np.bool_]
 Made = TypeVar("Made")
 
-MOVES = 0.1
-"""An input moves in a run where it covers this share of the range it has over all runs."""
-
 MOVES_AT_ALL = 0.02
 """Share of its known range below which an output does not move."""
 
 FEWEST_SAMPLES = 10
 """Fewer samples than this identify nothing."""
 
-RESTS = 0.03
-"""An input rests where it stays below this share of that range above its lowest value."""
+
+def stretches(mask: Mask) -> list[tuple[int, int]]:
+    """Return where stretches of true values start and stop."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,9 @@ class Run:
 
     def stretches(self, shortest: int) -> list[Run]:
         """Return the stretches whose samples all count, longer than so many, each a run of its own."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], self.counts, [False]])))
         return [
             self.cut(start, stop)
-            for start, stop in edges.reshape(-1, 2).tolist()
+            for start, stop in stretches(self.counts)
             if stop - start > shortest
         ]
 
@@ -269,28 +268,6 @@ class TrainingData:
         """Return the same data with every run condensed; see `Run.condensed`."""
         return replace(self, runs=tuple(run.condensed() for run in self.runs))
 
-    def bridged(self) -> TrainingData:
-        """Return the runs up to their last outputs that count, with likely ones for those that do not.
-
-        These go straight with the inputs, as those that count do, and meet them on either side.
-        """
-        known = [run for run in self.runs if run.counts.any()]
-        runs = [run.cut(0, int(np.flatnonzero(run.counts)[-1]) + 1) for run in known]
-        columns = [
-            np.column_stack([run.driven, run.scheduled, np.ones(len(run.u))]) for run in runs
-        ]
-        counting = [columns[i][run.counts] for i, run in enumerate(runs)]
-        targets = np.concatenate([run.outputs[run.counts] for run in runs])
-        by = np.linalg.lstsq(np.concatenate(counting), targets, rcond=None)[0]
-        found = []
-        for place, (run, given) in enumerate(zip(runs, columns, strict=True)):
-            time, at = np.arange(len(run.u)), np.flatnonzero(run.counts)
-            left = (run.outputs - given @ by)[at]
-            meeting = np.column_stack([np.interp(time, at, column) for column in left.T])
-            outputs = np.where(run.counts[:, np.newaxis], run.outputs, given @ by + meeting)
-            found.append(replace(run, outputs=outputs, place=place))
-        return replace(self, runs=tuple(found))
-
     def stretches(self, shortest: int) -> TrainingData:
         """Return the same data as runs whose samples all count; see `Run.stretches`."""
         found = [part for run in self.runs for part in run.stretches(shortest)]
@@ -300,11 +277,6 @@ class TrainingData:
     def stacked(self, what: str) -> Array:
         """Return a field of all runs, one under another."""
         return np.concatenate([getattr(run, what) for run in self.runs])
-
-    def alone(self, place: int) -> list[Run]:
-        """Return the runs in which one input moves and all others rest."""
-        ends = self.lowest, self.highest
-        return [run for run in self.runs if moves_alone(run.driven, place, *ends)]
 
     def between(self, start: float, stop: float) -> TrainingData:
         """Return the same runs of which only what is between two shares of their time counts."""
@@ -330,22 +302,6 @@ class TrainingData:
             counts[chosen] = True
             runs.append(replace(run, counts=counts))
         return replace(self, runs=tuple(runs))
-
-
-def moves_alone(driven: Array, place: int, lowest: Array, highest: Array) -> bool:
-    """Tell whether one input moves and all others rest.
-
-    Parameters
-    ----------
-    driven : array, shape (n, m)
-        Of a run.
-    place : int
-    lowest, highest : arrays, shape (m,)
-        Of all runs.
-    """
-    span, above = highest - lowest, driven.max(axis=0) - lowest
-    others = np.delete(above <= RESTS * span, place)
-    return bool(np.ptp(driven[:, place]) > MOVES * span[place] and others.all())
 
 
 def training_data(

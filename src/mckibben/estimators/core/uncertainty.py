@@ -21,7 +21,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.starts import fitted_places, fitted_run
 from mckibben.blocks.running import run_many
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import Run, TrainingData, stretches
 
 Simulated = Callable[[Sequence[Block], TrainingData], Array]
 """Gives the free-running outputs of blocks where samples count, shape (blocks, n)."""
@@ -172,9 +172,7 @@ def sandwich(
 
 def _pieces(series: Array) -> list[Array]:
     """Return the stretches of a series without NaN."""
-    finite = np.isfinite(series)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]])))
-    return [series[start:stop] for start, stop in edges.reshape(-1, 2).tolist()]
+    return [series[start:stop] for start, stop in stretches(np.isfinite(series))]
 
 
 def relative_sizes(parameters: Array) -> Array:
@@ -266,8 +264,8 @@ class Autoregression:
         back = lfilter([1.0], self._whitener, slopes[::-1], axis=0)[::-1]
         return np.asarray(self.shock * back)
 
-    def worth(self, n: int) -> float:
-        """Return how many independent samples tell as much of the mean as n of these."""
+    def effective_sample_size(self, n: int) -> float:
+        """Return how many independent samples determine the mean as well as n of these."""
         if self.variance <= 0:
             return float(n)
         memory = (self.shock / float(self._whitener.sum())) ** 2 / self.variance

@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.errors import DataError
-from mckibben.estimators.core.data import Mask, TrainingData, moves_alone, training_data
+from mckibben.estimators.core.data import Mask, Run, TrainingData, training_data
 from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
@@ -22,6 +23,12 @@ SCHEDULES = ("pressure_extensor", "force")
 
 LOADS = ("N",)
 """Units of what loads a muscle, instead of scheduling its springs."""
+
+MOVES = 0.1
+"""An input moves in a run where it covers this share of the range it has over all runs."""
+
+RESTS = 0.03
+"""An input rests where it stays below this share of that range above its lowest value."""
 
 FEWEST_SAMPLES = 50
 """Fewer samples than this in a row identify nothing of several muscles."""
@@ -174,7 +181,7 @@ class CoupledEstimator(Estimator):
         found = training_data(
             every, inputs, outputs, rows, scheduling, one_rate=False, spans=self.spans
         )
-        kept = found.bridged() if self.through else found.stretches(FEWEST_SAMPLES - 1)
+        kept = bridged(found) if self.through else found.stretches(FEWEST_SAMPLES - 1)
         if sum(int(run.counts.sum()) for run in kept.runs) < FEWEST_SAMPLES:
             raise DataError(
                 f"no {FEWEST_SAMPLES} samples in a row count", remedy="give longer recordings"
@@ -193,6 +200,49 @@ class CoupledEstimator(Estimator):
     @abstractmethod
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the block found."""
+
+
+def bridged(data: TrainingData) -> TrainingData:
+    """Return the runs up to their last outputs that count, with likely ones for those that do not.
+
+    These go straight with the inputs, as those that count do, and meet them on either side.
+    """
+    known = [run for run in data.runs if run.counts.any()]
+    runs = [run.cut(0, int(np.flatnonzero(run.counts)[-1]) + 1) for run in known]
+    columns = [np.column_stack([run.driven, run.scheduled, np.ones(len(run.u))]) for run in runs]
+    counting = [columns[i][run.counts] for i, run in enumerate(runs)]
+    targets = np.concatenate([run.outputs[run.counts] for run in runs])
+    by = np.linalg.lstsq(np.concatenate(counting), targets, rcond=None)[0]
+    found = []
+    for place, (run, given) in enumerate(zip(runs, columns, strict=True)):
+        time, at = np.arange(len(run.u)), np.flatnonzero(run.counts)
+        left = (run.outputs - given @ by)[at]
+        meeting = np.column_stack([np.interp(time, at, column) for column in left.T])
+        outputs = np.where(run.counts[:, np.newaxis], run.outputs, given @ by + meeting)
+        found.append(replace(run, outputs=outputs, place=place))
+    return replace(data, runs=tuple(found))
+
+
+def alone(data: TrainingData, place: int) -> list[Run]:
+    """Return the runs in which one input moves and all others rest."""
+    ends = data.lowest, data.highest
+    return [run for run in data.runs if moves_alone(run.driven, place, *ends)]
+
+
+def moves_alone(driven: Array, place: int, lowest: Array, highest: Array) -> bool:
+    """Tell whether one input moves and all others rest.
+
+    Parameters
+    ----------
+    driven : array, shape (n, m)
+        Of a run.
+    place : int
+    lowest, highest : arrays, shape (m,)
+        Of all runs.
+    """
+    span, above = highest - lowest, driven.max(axis=0) - lowest
+    others = np.delete(above <= RESTS * span, place)
+    return bool(np.ptp(driven[:, place]) > MOVES * span[place] and others.all())
 
 
 def _never_alone(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:

@@ -26,6 +26,9 @@ LIGHTEST = 1e-11
 NARROWEST, WIDEST = 0.15, 1.5
 """Widths of sets, relative to the range of their input."""
 
+STAYING = 1e-3
+"""How strongly sets stay where they start, relative to the error there, if errors hardly change."""
+
 MOST_STEPS = 15
 """Of variable projection."""
 
@@ -238,15 +241,18 @@ def project(
     upper = np.concatenate([lowest + 1.2 * wide, WIDEST * wide])
     unit = np.concatenate([wide, wide])
 
+    staying = STAYING * float(np.linalg.norm(problem.errors(start))) / unit
+
     def errors(theta: Array) -> Array:
-        return problem.errors(start.replaced(theta)).ravel()
+        left = problem.errors(start.replaced(theta)).ravel()
+        return np.append(left, staying * (theta - start.vector))
 
     def slopes(theta: Array) -> Array:
         sets = start.replaced(theta)
         by_theta, left = sensitivities(problem, sets)
         cost = float(np.sqrt(np.mean(left**2)))
         tracker.saw(theta, cost if held is None else problem.cost(sets, held))
-        return by_theta
+        return np.vstack([by_theta, np.diag(staying)])
 
     tracker.budget = MOST_STEPS + 1
     with tracker.searching():

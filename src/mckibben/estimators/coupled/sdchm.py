@@ -26,7 +26,7 @@ from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.coupled.base import CoupledEstimator
+from mckibben.estimators.coupled.base import CoupledEstimator, alone
 from mckibben.estimators.coupled.fuzzy import (
     Consequents,
     Fitted,
@@ -334,7 +334,7 @@ def softest(data: TrainingData, muscle: int) -> Run:
     DataError
         If the muscle never moves alone.
     """
-    runs = data.alone(muscle)
+    runs = alone(data, muscle)
     if not runs:
         raise DataError(
             "no run moves this muscle alone, so its hysteresis cannot be told from the coupling",

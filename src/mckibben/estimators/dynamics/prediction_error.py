@@ -119,27 +119,27 @@ def minimise(
     """Return the best parameters found from all starts."""
     tracker.budget = len(starts) * FIRST_STEPS + FOLLOWED * STEPS
 
-    def followed(theta: Array, steps: int) -> tuple[Array, float]:
-        here = At(orders, runs, start, tracker)
-        search = partial(trust_region, scale="jac", least_gain=LEAST_GAIN, max_evaluations=steps)
+    here = At(orders, runs, start, tracker)
+    search = partial(trust_region, scale="jac", least_gain=LEAST_GAIN)
+
+    def begun(theta: Array) -> tuple[Array, float]:
+        found, squares = search(here.errors, here.slopes, theta, max_evaluations=FIRST_STEPS)[-1]
+        return found, float(np.sqrt(squares))
+
+    def followed(theta: Array) -> None:
         # in the coefficients the valley of a root near the unit circle is straight; but they have
         # bounds, at which the others would stop too, and these coordinates have none
-        found, _ = search(here.errors, here.slopes, theta)[-1]
-        loose, squares = search(
+        found, _ = search(here.errors, here.slopes, theta, max_evaluations=STEPS)[-1]
+        search(
             lambda free: here.errors(tightened(free, orders)[0]),
             lambda free: here.slopes(free) @ tightened(free, orders)[1],
             loosened(found, orders),
-        )[-1]
-        return tightened(loose, orders)[0], float(np.sqrt(squares))
+            max_evaluations=STEPS,
+        )
 
     with tracker.searching():
-        follow_best(
-            (theta for theta in starts if admissible(theta, orders)),
-            partial(followed, steps=FIRST_STEPS),
-            partial(followed, steps=STEPS),
-            FOLLOWED,
-            SAME,
-        )
+        starting = (theta for theta in starts if admissible(theta, orders))
+        follow_best(starting, begun, followed, FOLLOWED, SAME)
     assert tracker.best is not None
     return tracker.best
 

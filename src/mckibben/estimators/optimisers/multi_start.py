@@ -193,24 +193,29 @@ def trust_region(
     first = float(last @ last)
     if not 0.0 < first < np.inf:
         return [(start, first)]
+    # relative errors of relative parameters, so that nothing depends on a unit
+    unit, sizes = (
+        np.sqrt(first / last.size),
+        np.ones(start.size) if isinstance(scale, str) else scale,
+    )
     path: list[tuple[Array, float]] = []
 
     def errors_at(point: Array) -> Array:
         nonlocal last
-        if path or not np.array_equal(point, start):
-            last = errors(point)
-        return last
+        if path or not np.array_equal(point, start / sizes):
+            last = errors(point * sizes)
+        return last / unit
 
     def slopes_at(point: Array) -> Array:  # called at the start and after every step that is taken
-        path.append((point.copy(), float(last @ last)))
-        return slopes(point)
+        path.append((point * sizes, float(last @ last)))
+        return slopes(point * sizes) * sizes / unit
 
     least_squares(
         errors_at,
-        start,
+        start / sizes,
         slopes_at,
-        bounds=bounds,
-        x_scale=scale,
+        bounds=(bounds[0] / sizes, bounds[1] / sizes),
+        x_scale=scale if isinstance(scale, str) else 1.0,
         ftol=least_gain,
         xtol=SHORTEST,
         gtol=None,

@@ -26,39 +26,39 @@ U = np.interp(np.arange(400), np.arange(0, 400, 37), [0, 4, 1, 3, 2, 5, 0, 2.5, 
 
 
 @pytest.fixture
-def my_block(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    """Register the templates as their README says, from where they lie, and import the block."""
-    lines = re.findall(r'"([\w-]+)": "mckibben\.(\w+)\.[\w.]+:(\w+)"', README)
-    assert {group for _, group, _ in lines} == {"blocks", "estimators"}
-    for kind, group, name in lines:
-        monkeypatch.setitem(registry.PLUGINS[group], kind, f"my_{group[:-1]}:{name}")
+def my_model(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    """Register the template as its README says, from where it lies, and import it."""
+    lines = re.findall(r'"(\w+)": \{[^}]*?"([\w-]+)": "mckibben\.[\w.]+:(\w+)"', README)
+    assert {group for group, *_ in lines} == {"blocks", "estimators"}
+    for group, kind, name in lines:
+        monkeypatch.setitem(registry.PLUGINS[group], kind, f"my_model:{name}")
     monkeypatch.syspath_prepend(TEMPLATES)
     registry._locations.cache_clear()
-    yield import_module("my_block")
+    yield import_module("my_model")
     registry._locations.cache_clear()
 
 
 @pytest.fixture
-def estimator(my_block: ModuleType) -> Any:
+def estimator(my_model: ModuleType) -> Any:
     return registry.load("estimators", "elastic-plastic")
 
 
-def test_template_obeys_the_contract(my_block: ModuleType) -> None:
-    block = my_block.ElasticPlastic.example()
+def test_template_obeys_the_contract(my_model: ModuleType) -> None:
+    block = my_model.ElasticPlastic.example()
     for seed in range(5):
         check_block(block, seed=seed)
         check_block(block.inverse(), seed=seed)
     with pytest.raises(ModelError, match="-1"):
-        my_block.ElasticPlastic(1.0, -2.0, 0.4).inverse()
+        my_model.ElasticPlastic(1.0, -2.0, 0.4, (0.0, 5.0)).inverse()
     with pytest.raises(ModelError, match="threshold"):
-        my_block.ElasticPlastic(1.0, -2.0, -0.4)
+        my_model.ElasticPlastic(1.0, -2.0, -0.4)
 
 
 @pytest.mark.parametrize("weight", [-1.5, 0.0, 2.0])
 def test_template_is_a_two_operator_prandtl_ishlinskii_model(
-    my_block: ModuleType, weight: float
+    my_model: ModuleType, weight: float
 ) -> None:
-    model = my_block.ElasticPlastic(4.0, weight, 0.4, (0.0, 5.0))
+    model = my_model.ElasticPlastic(4.0, weight, 0.4, (0.0, 5.0))
     same = PI((0.0, 0.4), (4.0 + weight, -weight), 0.0, (0.0, 5.0))
     np.testing.assert_allclose(model.simulate(U), same.simulate(U), atol=1e-12)
     for ends, expected in zip(model.reachable(), same.reachable(), strict=True):
@@ -67,9 +67,9 @@ def test_template_is_a_two_operator_prandtl_ishlinskii_model(
 
 
 def test_the_estimator_finds_the_block(
-    my_block: ModuleType, estimator: Any, tmp_path: Path
+    my_model: ModuleType, estimator: Any, tmp_path: Path
 ) -> None:
-    truth = my_block.ElasticPlastic(4.0, 2.5, 0.4, (0.0, 5.0))
+    truth = my_model.ElasticPlastic(4.0, 2.5, 0.4, (0.0, 5.0))
     recording = Recording({"pressure": U, "displacement": truth.simulate(U)}, 0.01)
     found = estimator().fit(recording)
     assert clone(found).fit(recording).model_ == found.model_
@@ -89,9 +89,9 @@ def test_the_estimator_finds_the_block(
 @pytest.mark.parametrize("initial", ["first_sample", "virgin"])
 @pytest.mark.parametrize("inverse", [False, True])
 def test_the_c_is_the_block(
-    my_block: ModuleType, inverse: bool, initial: str, tmp_path: Path
+    my_model: ModuleType, inverse: bool, initial: str, tmp_path: Path
 ) -> None:
-    block = my_block.ElasticPlastic(4.0, -1.5, 0.4, (0.0, 5.0), initial)
+    block = my_model.ElasticPlastic(4.0, -1.5, 0.4, (0.0, 5.0), initial)
     given = U[:, np.newaxis]
     if inverse:
         block, given = block.inverse(), block.simulate(given)

@@ -24,7 +24,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.fields import STRICT, Vector
 from mckibben.blocks.kernels import inlined, kernel
-from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
+from mckibben.blocks.memoryless import check_increasing, interpolate
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import Parametrised
 from mckibben.blocks.saving import part_from_dict

@@ -1,0 +1,128 @@
+"""The elastic-plastic model: y = g u + w (u - F_r[u]), a spring beside a spring that slips.
+
+F_r is the play operator of threshold r. Source: title of the paper, its equations, every departure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass as settings
+from typing import Annotated, Self
+
+import numpy as np
+from annotated_types import Ge, Gt
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, StoredInitial
+from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.notation import Notation
+from mckibben.blocks.solving import solved_inverse
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
+
+
+@kernel
+def advance(u: float, c: Array, state: Array) -> None:
+    """Move the play operator, which is the state; c are [g, w, r]."""
+    state[0] = min(max(state[0], u - c[2]), u + c[2])
+
+
+@kernel
+def trial(u: float, memory: tuple[Array, Array]) -> float:
+    """Return the output that an input would give, which the inverse is solved with."""
+    c, state = memory
+    return c[0] * u + c[1] * (u - min(max(state[0], u - c[2]), u + c[2]))
+
+
+@step
+def elastic_plastic_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model."""
+    outputs[0] = trial(inputs[0], (coefficients, state))
+    advance(inputs[0], coefficients, state)
+
+
+@kernel
+def elastic_plastic_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as if the input had only risen to the first sample, or as if nothing had happened."""
+    u, r = inputs[0], coefficients[2]
+    state[0] = min(max(0.0, u - r), u + r) if virgin else u - r
+
+
+@dataclass(frozen=True, config=STRICT)
+class ElasticPlastic(Invertible):
+    """Elastic-plastic model.
+
+    Parameters
+    ----------
+    gain, weight : float
+        g, output per input while slipping, and w, what sticking adds; the inverse wants g + w > 0.
+    threshold : float
+        Travel of the input from the middle to slipping, in its unit; at least 0.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    """
+
+    kind = "elastic-plastic"
+    kernel, start_kernel = elastic_plastic_step, elastic_plastic_start
+    inverse_kernel, inverse_start_kernel = solved_inverse(trial, advance, elastic_plastic_start)
+    solved, inverse_remembers = True, "input"
+    parameters = ("gain", "weight", "threshold")  # in this order they are the kernel's coefficients
+    notation = Notation(
+        r"y = g u + w (u - F_r[u])", gain="g [{y}/{u}]", weight="w [{y}/{u}]", threshold="r [{u}]"
+    )
+
+    gain: Annotated[FiniteFloat, Gt(0)]
+    weight: FiniteFloat
+    threshold: Annotated[FiniteFloat, Ge(0)]
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+    n_states = 1
+
+    def __post_init__(self) -> None:
+        check_input_range(self.kind, self.input_range)
+
+    def peaks(self) -> Array:  # from which the operator just comes back to the lowest input
+        return np.array([self.input_limits[0] + 2 * self.threshold])
+
+    def least_slope(self) -> float:  # of the output by the input: the inverse wants it positive
+        return min(self.gain, self.gain + self.weight)
+
+    @classmethod
+    def example(cls) -> Self:  # small and typical: tests run on it
+        return cls(4.0, -1.5, 0.4, (0.0, 5.0))
+
+
+@settings(kw_only=True, repr=False, eq=False)
+class ElasticPlasticEstimator(SeparableEstimator):
+    """Elastic-plastic model: its threshold is searched, its slopes are solved for in every trial."""
+
+    title = "Elastic-plastic model"
+    purpose = "memory"
+    can = "One loop of straight branches, with nonlocal memory."
+    cannot = "No curved branches, no rate, no creep."
+    inverse_kind = "solved"
+    makes = ("elastic-plastic",)
+    solves_offset = False
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:  # of theta, [threshold by range]
+        return np.array([0.005]), np.array([0.45])
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        return [np.array([share]) for share in (0.02, 0.08, 0.2)]
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:  # what slopes multiply
+        play = self.build(theta, np.array([0.0, 1.0]), 0.0, data).simulate(run.history)
+        return np.column_stack([run.history - play, play])
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:  # slopes: so there is an inverse
+        return LEAST_REVERSIBLE * np.ptp(data.output_range) / np.ptp(matrix, axis=0)
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        sticking, slipping = linear.tolist()
+        numbers = slipping, sticking - slipping, float(theta[0] * np.ptp(data.input_range))
+        return ElasticPlastic(*numbers, data.input_range, self.starting_rule, **self.channels(data))

@@ -55,7 +55,11 @@ NO_MODEL: list[tuple[str, dict[str, Any], str]] = [
     ("series", {"parts": (example("per-channel"), PI.example())}, r"2 .*1"),
     ("series", {"parts": ()}, "'series'"),
     ("series", {"parts": (3,)}, r"parts\.0"),
-    ("parallel", {"parts": (PI.example(), example("affine"))}, "'affine'"),
+    (
+        "parallel",
+        {"parts": (PI.example(), replace(PI.example(), output=Channel("displacement", "N")))},
+        "displacement",
+    ),
     ("per-channel", {"parts": (PI.example(), example("eupi"))}, "pressure, pressure"),
     (
         "load-estimate",

@@ -6,20 +6,19 @@ F_r is the play operator of threshold r. Source: title of the paper, its equatio
 from __future__ import annotations
 
 from dataclasses import dataclass as settings
-from typing import Annotated, Self
+from typing import Self
 
 import numpy as np
-from annotated_types import Ge, Gt
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block
-from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, StoredInitial
-from mckibben.blocks.inverse import Invertible, check_input_range
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.inverse import Invertible
+from mckibben.blocks.kernels import kernel
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.solving import solved_inverse
+from mckibben.blocks.solving import solved_kernels
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator
 
@@ -32,16 +31,9 @@ def advance(u: float, c: Array, state: Array) -> None:
 
 @kernel
 def trial(u: float, memory: tuple[Array, Array]) -> float:
-    """Return the output that an input would give, which the inverse is solved with."""
+    """Return the output that an input would give: the model, and what its inverse is solved with."""
     c, state = memory
     return c[0] * u + c[1] * (u - min(max(state[0], u - c[2]), u + c[2]))
-
-
-@step
-def elastic_plastic_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model."""
-    outputs[0] = trial(inputs[0], (coefficients, state))
-    advance(inputs[0], coefficients, state)
 
 
 @kernel
@@ -51,7 +43,7 @@ def elastic_plastic_start(coefficients: Array, state: Array, inputs: Array, virg
     state[0] = min(max(0.0, u - r), u + r) if virgin else u - r
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class ElasticPlastic(Invertible):
     """Elastic-plastic model.
 
@@ -66,25 +58,22 @@ class ElasticPlastic(Invertible):
     """
 
     kind = "elastic-plastic"
-    kernel, start_kernel = elastic_plastic_step, elastic_plastic_start
-    inverse_kernel, inverse_start_kernel = solved_inverse(trial, advance, elastic_plastic_start)
+    start_kernel = elastic_plastic_start
+    kernel, inverse_kernel, inverse_start_kernel = solved_kernels(trial, advance, start_kernel)
     solved, inverse_remembers = True, "input"
     parameters = ("gain", "weight", "threshold")  # in this order they are the kernel's coefficients
     notation = Notation(
         r"y = g u + w (u - F_r[u])", gain="g [{y}/{u}]", weight="w [{y}/{u}]", threshold="r [{u}]"
     )
 
-    gain: Annotated[FiniteFloat, Gt(0)]
+    gain: fields.Positive
     weight: FiniteFloat
-    threshold: Annotated[FiniteFloat, Ge(0)]
-    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    threshold: fields.NotNegative
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
     n_states = 1
-
-    def __post_init__(self) -> None:
-        check_input_range(self.kind, self.input_range)
 
     def peaks(self) -> Array:  # from which the operator just comes back to the lowest input
         return np.array([self.input_limits[0] + 2 * self.threshold])

@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from annotated_types import MaxLen
+from annotated_types import Ge, Gt, MaxLen
 from numpy.typing import ArrayLike
-from pydantic import BeforeValidator, ConfigDict, FiniteFloat
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
+
+from mckibben.arrays import NARROWEST
+from mckibben.errors import ModelError
 
 Rule = Literal["first_sample", "virgin", "fitted"]
 """Name of a starting memory."""
@@ -48,6 +51,28 @@ def rows(value: Any) -> Any:
 
 Rows = Annotated[tuple[Vector, ...], BeforeValidator(rows)]
 """Rows of finite numbers."""
+
+Positive = Annotated[FiniteFloat, Gt(0)]
+NotNegative = Annotated[FiniteFloat, Ge(0)]
+
+NARROWEST_SHARE = 1e-9
+"""Least width of an input range as a share of the sizes of its ends."""
+
+
+def wide(ends: tuple[float, float]) -> tuple[float, float]:
+    """Refuse an input range that is empty, or that steps through it could not be told apart in."""
+    low, high = ends
+    width = high - low
+    if NARROWEST <= width < np.inf and width >= NARROWEST_SHARE * (abs(low) + abs(high)):
+        return ends
+    raise ModelError(
+        f"the input range {ends} is empty, or too narrow or wide to compute with. "
+        "Remedy: give (lowest, highest)."
+    )
+
+
+InputRange = Annotated[tuple[FiniteFloat, FiniteFloat], AfterValidator(wide)]
+"""Lowest and highest input of an inverse."""
 
 StoredInitial = Literal["first_sample", "virgin"] | Vector
 """`Initial` as a field of a block."""

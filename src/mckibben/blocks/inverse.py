@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
-from mckibben.arrays import NARROWEST, Array
+from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Cost, Kernel, Start, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.kernels import kernel
@@ -31,9 +31,6 @@ USUAL_TRIALS, MOST_TRIALS = 12, 600
 
 COMMANDS = ("pressure", "voltage")
 """How channels that drive a muscle are called."""
-
-NARROWEST_SHARE = 1e-9
-"""Least width of an input range as a share of the sizes of its ends."""
 
 
 @kernel
@@ -170,19 +167,6 @@ class Invertible(Block):
             f"{int(state[-1])} sample(s) of the reference {wanted.name!r} were clipped: they "
             f"need {given.name} outside its limits. Reachable whatever happened before is "
             f"{low[0]:.6g} to {high[0]:.6g} {wanted.unit}"
-        )
-
-
-def check_input_range(kind: str, input_range: tuple[float, float] | None) -> None:
-    """Refuse an input range that is empty, or that steps through it could not be told apart in."""
-    if input_range is None:
-        return
-    low, high = input_range
-    width = high - low
-    if not (NARROWEST <= width < np.inf and width >= NARROWEST_SHARE * (abs(low) + abs(high))):
-        raise ModelError(
-            f"the input range {input_range} of {kind!r} is empty, or too narrow or wide to compute "
-            "with. Remedy: give (lowest, highest)."
         )
 
 

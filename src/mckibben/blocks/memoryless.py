@@ -22,9 +22,10 @@ from mckibben.blocks.fields import (
     STRICT,
     ChannelField,
     Coefficients,
+    InputRange,
     Vector,
 )
-from mckibben.blocks.inverse import Invertible, check_input_range, nothing_clipped
+from mckibben.blocks.inverse import Invertible, nothing_clipped
 from mckibben.blocks.kernels import DERIVED, SLACK, improved, inlined, kernel, step
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation, summed
@@ -314,12 +315,11 @@ class Polynomial(Invertible):
     polynomial: Coefficients
     centre: FiniteFloat = 0.0
     scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input_range: InputRange | None = None
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT
 
     def __post_init__(self) -> None:
-        check_input_range(self.kind, self.input_range)
         if not self.polynomial:
             raise ModelError("a polynomial without coefficients. Remedy: give at least one.")
 

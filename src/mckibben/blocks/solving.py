@@ -139,6 +139,20 @@ def solved_inverse(
     return step(inverse_step), solved_start(trial, start)
 
 
+def solved_kernels(
+    trial: Callable[..., float], advance: Callable[..., None], start: Start
+) -> tuple[Step, Step, Start]:
+    """Return the step of the block, too, before those of its inverse."""
+
+    def forward_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Give the output, and take the step."""
+        outputs[0] = trial(inputs[0], (coefficients, state))
+        advance(inputs[0], coefficients, state)
+
+    forward_step.__qualname__ = f"{trial.__module__}.{trial.__qualname__}.step"
+    return step(forward_step), *solved_inverse(trial, advance, start)
+
+
 def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> Start:
     """Return the start kernel of an inverse that is solved for: by bisection, the first input that fits.
 

@@ -28,8 +28,15 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Kernel, Start, needs_sample_time
-from mckibben.blocks.fields import PRESSURE, STRICT, Channel, ChannelField, StoredInitial
-from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.fields import (
+    PRESSURE,
+    STRICT,
+    Channel,
+    ChannelField,
+    InputRange,
+    StoredInitial,
+)
+from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError, ModelWarning
@@ -191,13 +198,12 @@ class Air(Invertible):
     dead_time: Annotated[FiniteFloat, Ge(0)] = 0.0
     ambient: FiniteFloat | None = 0.0
     supply: FiniteFloat | None = None
-    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input_range: InputRange | None = None
     initial: StoredInitial = "first_sample"
     input: ChannelField = Channel("voltage", "V")
     output: ChannelField = PRESSURE
 
     def __post_init__(self) -> None:
-        check_input_range(self.kind, self.input_range)
         lowest, highest = self.pressures
         if not lowest < highest:
             raise ModelError(

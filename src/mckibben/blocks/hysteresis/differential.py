@@ -42,10 +42,11 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    InputRange,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
@@ -207,13 +208,10 @@ class BoucWen(Invertible):
     exponent: Literal[1, 2] = 1
     centre: FiniteFloat = 0.0
     scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input_range: InputRange | None = None
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_input_range(self.kind, self.input_range)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [rate, sigma, exponent, weight, centre, scale, polynomial]."""
@@ -326,13 +324,12 @@ class GeneralizedBoucWen(Invertible):
     exponent: Literal[1, 2] = 1
     centre: FiniteFloat = 0.0
     scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input_range: InputRange | None = None
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
 
     def __post_init__(self) -> None:
-        check_input_range(self.kind, self.input_range)
         if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
             raise ModelError(
                 f"the shape of {self.kind!r} is {self.shape}. Remedy: give five numbers whose sizes add "
@@ -467,13 +464,10 @@ class Duhem(Invertible):
     alpha: Annotated[FiniteFloat, Gt(0)]
     centre: FiniteFloat = 0.0
     scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input_range: InputRange | None = None
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_input_range(self.kind, self.input_range)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [alpha, centre, scale, P rising, P falling, f], filled up to as many numbers as P."""

@@ -29,11 +29,12 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    InputRange,
     StoredInitial,
     Vector,
 )
 from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
-from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel, summing_step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_inverse
@@ -150,14 +151,13 @@ class EUPI(Invertible):
     falling_threshold: Annotated[FiniteFloat, Ge(0)]
     polynomial: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
     offset: FiniteFloat
-    input_range: tuple[FiniteFloat, FiniteFloat]
+    input_range: InputRange
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
-        check_input_range(self.kind, self.input_range)
 
     @property
     def n_states(self) -> int:

@@ -25,7 +25,7 @@ from functools import cache
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
-from pydantic import BeforeValidator, FiniteFloat, InstanceOf
+from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
@@ -38,6 +38,7 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    InputRange,
     StoredInitial,
     Vector,
     vector,
@@ -50,7 +51,7 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_operators,
     start_sum,
 )
-from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import Step, kernel, step, summing_step
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
@@ -258,14 +259,13 @@ class GPI(Invertible):
     weights: Vector
     rising: EnvelopeField
     falling: EnvelopeField
-    input_range: tuple[FiniteFloat, FiniteFloat]
+    input_range: InputRange
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
-        check_input_range(self.kind, self.input_range)
 
     @property
     def n_states(self) -> int:

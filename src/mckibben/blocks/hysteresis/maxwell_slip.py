@@ -27,11 +27,12 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    InputRange,
     StoredInitial,
     Vector,
 )
 from mckibben.blocks.hysteresis.play_operators import check_thresholds
-from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
@@ -185,14 +186,13 @@ class MaxwellSlip(Invertible):
     limit_ratio: Annotated[FiniteFloat, Gt(0)] = 1.0
     centre: FiniteFloat = 0.0
     scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input_range: InputRange | None = None
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.breakaways, self.weights)
-        check_input_range(self.kind, self.input_range)
         if self.breakaways[0] == 0:
             raise ModelError(f"{self.kind!r} wants limits above 0. Remedy: give positive limits.")
 

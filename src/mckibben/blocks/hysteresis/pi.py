@@ -37,6 +37,7 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    InputRange,
     StoredInitial,
     Vector,
     vector,
@@ -48,7 +49,7 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_operators,
     start_sum,
 )
-from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import DERIVED, improved, kernel, step, summing_step
 from mckibben.blocks.notation import FEW, Notation, summed, tex
 from mckibben.blocks.solving import solve_near
@@ -161,14 +162,13 @@ class PI(Invertible):
     thresholds: Vector
     weights: Vector
     offset: FiniteFloat = 0.0
-    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input_range: InputRange | None = None
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
-        check_input_range(self.kind, self.input_range)
 
     @property
     def n_states(self) -> int:
@@ -352,7 +352,7 @@ class RateDependentPI(Invertible):
     weights: Vector
     offset: FiniteFloat = 0.0
     rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
-    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input_range: InputRange | None = None
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
@@ -360,7 +360,6 @@ class RateDependentPI(Invertible):
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
         check_thresholds(self.kind, self.thresholds, self.rate_weights)
-        check_input_range(self.kind, self.input_range)
 
     @property
     def n_states(self) -> int:

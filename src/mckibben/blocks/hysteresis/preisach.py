@@ -42,8 +42,9 @@ from mckibben.blocks.fields import (
     Initial,
     StoredInitial,
     Vector,
+    wide,
 )
-from mckibben.blocks.inverse import Invertible, check_input_range
+from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_inverse, solved_start
@@ -57,7 +58,7 @@ def check_grid(kind: str, levels: Sequence[float], weights: Sequence[float]) -> 
         raise ModelError(
             f"the levels of {kind!r} do not increase. Remedy: give two or more, in order."
         )
-    check_input_range(kind, (levels[0], levels[-1]))
+    wide((levels[0], levels[-1]))
     if len(weights) != n * (n + 1) // 2:
         raise ModelError(
             f"{kind!r} with {n + 1} levels has {len(weights)} weights. "

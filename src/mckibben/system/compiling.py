@@ -53,6 +53,7 @@ class Deferred:
             with _lock:  # one of them, however many threads ask
                 if self._dispatcher is None:
                     compiled = numba.njit(**self.targetoptions)(self.py_func)
+                    _compile_alike(compiled)
                     _keep(compiled, self)
                     self._dispatcher = compiled
         return self._dispatcher
@@ -101,6 +102,20 @@ def deferred(function: Function, **options: Any) -> Function:
         Of `numba.njit`, beside freedom of other threads, and division as NumPy does it.
     """
     return cast("Function", Deferred(function, _OPTIONS | options))
+
+
+def _compile_alike(compiled: Any) -> None:
+    """Let a function be compiled once for constants and variables of one type, wherever it is called."""
+    from numba.types import unliteral
+
+    if not hasattr(compiled, "get_call_template"):  # where compiling is disabled
+        return
+    template = compiled.get_call_template
+
+    def alike(args: Any, kws: Any) -> Any:
+        return template([*map(unliteral, args)], {name: unliteral(kws[name]) for name in kws})
+
+    compiled.get_call_template = alike
 
 
 def _keep(compiled: Any, function: Deferred) -> None:

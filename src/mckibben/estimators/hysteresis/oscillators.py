@@ -336,7 +336,7 @@ class OscillatorEstimator(SearchEstimator):
     periodic : bool
         Whether every recording is a whole number of periods of a motion that repeats itself, as under
         a multisine after some periods. Then no start counts, and the input is taken to be band-limited
-        between samples; run such models by `Repeating.steady_state`. Otherwise recordings begin at
+        between samples; run such models by their `steady_state`. Otherwise recordings begin at
         rest, and the input goes in straight lines from sample to sample.
     fit_offset : bool
         Whether the displacement has an offset to be found; else it is 0 without force.

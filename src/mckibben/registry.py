@@ -131,7 +131,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "pi": "mckibben.estimators.hysteresis.pi:PIEstimator",
         "play-ridge": "mckibben.estimators.coupled.play_ridge:PlayRidgeEstimator",
         "preisach": "mckibben.estimators.hysteresis.preisach:PREISACH",
-        "rdpi": "mckibben.estimators.hysteresis.mpi:RDPIEstimator",
+        "rdpi": "mckibben.estimators.hysteresis.mpi:RDPI",
         "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",
         "sdchm-published": "mckibben.estimators.coupled.sdchm:SDCHM_PUBLISHED",
         "state-network": "mckibben.estimators.dynamics.state_network:StateNetworkEstimator",

@@ -85,7 +85,7 @@ def test_an_unknown_name_is_refused_and_one_that_is_gone_leads_to_its_successor(
 
 
 FAMILIES = {
-    *("LoopEstimator", "MappedPIEstimator", "NetworkEstimator"),
+    *("LoopEstimator", "NetworkEstimator"),
     "OscillatorEstimator",
 }
 """Of estimators that are still deeper."""

@@ -92,14 +92,12 @@ PLUGINS: dict[str, dict[str, str]] = {
         "balance-force": "mckibben.estimators.coupled.balance_force:BalanceForceEstimator",
         "bj": "mckibben.estimators.dynamics.linear_models:BJ",
         "bouc-wen": "mckibben.estimators.hysteresis.loops:BoucWenEstimator",
-        "bouc-wen-oscillator": (
-            "mckibben.estimators.hysteresis.oscillators:BoucWenOscillatorEstimator"
-        ),
+        "bouc-wen-oscillator": ("mckibben.estimators.hysteresis.oscillators:BOUC_WEN_OSCILLATOR"),
         "coupled-memory": "mckibben.estimators.coupled.play_ridge:COUPLED_MEMORY",
         "coupled-pi": "mckibben.estimators.coupled.sdchm:COUPLED_PI",
         "cpi": "mckibben.estimators.hysteresis.creep_pi:CreepPIEstimator",
         "duhem": "mckibben.estimators.hysteresis.duhem:DuhemEstimator",
-        "duhem-oscillator": ("mckibben.estimators.hysteresis.oscillators:DuhemOscillatorEstimator"),
+        "duhem-oscillator": ("mckibben.estimators.hysteresis.oscillators:DUHEM_OSCILLATOR"),
         "eupi": "mckibben.estimators.hysteresis.eupi:EUPIEstimator",
         "force-bilinear": "mckibben.estimators.force.laws:FORCE_BILINEAR",
         "force-chou": "mckibben.estimators.force.laws:ChouHannafordEstimator",

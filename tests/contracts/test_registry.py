@@ -86,7 +86,6 @@ def test_an_unknown_name_is_refused_and_one_that_is_gone_leads_to_its_successor(
 
 FAMILIES = {
     *("LoopEstimator", "NetworkEstimator"),
-    "OscillatorEstimator",
 }
 """Of estimators that are still deeper."""
 

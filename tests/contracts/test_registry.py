@@ -84,9 +84,7 @@ def test_an_unknown_name_is_refused_and_one_that_is_gone_leads_to_its_successor(
             assert callable(load(group, successor))
 
 
-FAMILIES = {
-    *("LoopEstimator", "NetworkEstimator"),
-}
+FAMILIES = {"NetworkEstimator"}
 """Of estimators that are still deeper."""
 
 

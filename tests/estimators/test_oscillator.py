@@ -145,6 +145,6 @@ def test_the_benchmark_is_met(element: Any, most: float) -> None:
         Recording({"force": u, "displacement": moved}, 1 / 750)
         for u, moved in zip(force, y, strict=True)
     ]
-    model = OscillatorEstimator(element=element, periodic=True).fit(runs).model_
+    model: Any = OscillatorEstimator(element=element, periodic=True).fit(runs).model_
     given = model.steady_state(Recording({"force": samples("uval")}, 1 / 750))["displacement"]
     assert np.sqrt(np.mean((given - 1e3 * samples("yval")) ** 2)) < most

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.estimators.hysteresis.gpi import GPIEstimator
-from mckibben.estimators.hysteresis.mpi import RDPIEstimator
+from mckibben.estimators.hysteresis.mpi import MPIEstimator
 from mckibben.metrics import err
 from mckibben.papers.field_models.published import prandtl_ishlinskii
 from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
@@ -307,7 +307,9 @@ def model_error(known: Recording, other: Recording) -> float:
     known, other = (
         resample(run.select(["voltage", "displacement"]), 0.02) for run in (known, other)
     )
-    model = RDPIEstimator(input="voltage", rate_time_constant=0.1).fit(known).model_
+    model = (
+        MPIEstimator(input="voltage", rate_dependent=True, rate_time_constant=0.1).fit(known).model_
+    )
     missed = model.simulate(other)["displacement"] - other["displacement"]
     return float(np.mean(np.abs(missed)))
 

@@ -33,7 +33,6 @@ from .errors import ModelWarning as ModelWarning
 from .estimators.hysteresis.eupi import EUPIEstimator as EUPIEstimator
 from .estimators.hysteresis.gpi import GPIEstimator as GPIEstimator
 from .estimators.hysteresis.mpi import MPIEstimator as MPIEstimator
-from .estimators.hysteresis.mpi import RDPIEstimator as RDPIEstimator
 from .estimators.hysteresis.pi import PIEstimator as PIEstimator
 from .excitation.planning import plan as plan
 from .excitation.telling import untold as untold

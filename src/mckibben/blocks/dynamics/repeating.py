@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Literal, Self, cast
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from annotated_types import Interval
@@ -23,53 +23,57 @@ BETWEEN = 2
 """Samples put into a substep where the input is band-limited: straight lines join them."""
 
 
-class Repeating(Block):
-    """A block of one input and one output whose last state is the last input."""
-
-    substeps: int
-    hold: Hold
+@runtime_checkable
+class Repeating(Protocol):
+    """What has a response to inputs that repeat."""
 
     def steady_state(self, recording: Recording) -> Recording:
-        """Return the response to a recording that repeats for ever, after all starts have died away.
+        """Return the response to a recording that repeats for ever; see `steady_state`."""
 
-        The input is taken to be band-limited between samples, as a multisine measured over whole
-        periods is; neither holds of `simulate`, which starts somewhere and joins samples as `hold` says.
 
-        Parameters
-        ----------
-        recording : Recording
-            A whole number of periods of the input, with time.
+def steady_state(block: Any, recording: Recording) -> Recording:
+    """Return the response to a recording that repeats for ever, after all starts have died away.
 
-        Returns
-        -------
-        Recording
-            Of the input, and the modelled output.
+    The input is taken to be band-limited between samples, as a multisine measured over whole
+    periods is; neither holds of `simulate`, which starts somewhere and joins samples as `hold` says.
 
-        Raises
-        ------
-        ModelError
-            Where no response comes to repeat itself.
-        """
-        given = self._inputs_from(recording)
-        step, ratio = needs_sample_time(self.kind, recording.sample_time), BETWEEN * self.substeps
-        fine = np.ascontiguousarray(np.roll(band_limited(given[:, 0], ratio), -1)[:, np.newaxis])
-        block = cast("Self", replace(self, substeps=1, hold="first"))  # type: ignore[type-var]
-        state, found = self.initial_state(given[0], "virgin"), np.empty_like(fine)
-        run = block.bind(step / ratio, state, fine, found)
-        state[-1] = given[0, 0]
-        before = np.full(len(given), np.inf)
-        for _ in range(PERIODS):
-            run()
-            now = np.roll(found[ratio - 1 :: ratio, 0], 1)
-            change = np.abs(now - before).max()
-            if not np.isfinite(now).all() or change <= REPEATS * np.ptp(now):
-                break
-            before = now.copy()
-        if not change <= REPEATS * np.ptp(now):
-            raise ModelError(
-                f"the response of {self.kind!r} to {recording.name} does not come to repeat itself in "
-                f"{PERIODS} periods. Remedy: use simulate, which starts from rest."
-            )
-        units = {self.outputs[0].name: self.outputs[0].unit}
-        kept = recording.select([self.inputs[0].name])
-        return kept.with_channels(units, **{self.outputs[0].name: now})
+    Parameters
+    ----------
+    block : Block
+        Of one input and one output, with ``substeps`` and ``hold``, whose last state is the last input.
+    recording : Recording
+        A whole number of periods of the input, with time.
+
+    Returns
+    -------
+    Recording
+        Of the input, and the modelled output.
+
+    Raises
+    ------
+    ModelError
+        Where no response comes to repeat itself.
+    """
+    given = block._inputs_from(recording)
+    step, ratio = needs_sample_time(block.kind, recording.sample_time), BETWEEN * block.substeps
+    fine = np.ascontiguousarray(np.roll(band_limited(given[:, 0], ratio), -1)[:, np.newaxis])
+    finer: Block = replace(block, substeps=1, hold="first")
+    state, found = block.initial_state(given[0], "virgin"), np.empty_like(fine)
+    run = finer.bind(step / ratio, state, fine, found)
+    state[-1] = given[0, 0]
+    before = np.full(len(given), np.inf)
+    for _ in range(PERIODS):
+        run()
+        now = np.roll(found[ratio - 1 :: ratio, 0], 1)
+        change = np.abs(now - before).max()
+        if not np.isfinite(now).all() or change <= REPEATS * np.ptp(now):
+            break
+        before = now.copy()
+    if not change <= REPEATS * np.ptp(now):
+        raise ModelError(
+            f"the response of {block.kind!r} to {recording.name} does not come to repeat itself in "
+            f"{PERIODS} periods. Remedy: use simulate, which starts from rest."
+        )
+    units = {block.outputs[0].name: block.outputs[0].unit}
+    kept = recording.select([block.inputs[0].name])
+    return kept.with_channels(units, **{block.outputs[0].name: now})

@@ -22,8 +22,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Cost, Kernel, Start, needs_sample_time
-from mckibben.blocks.dynamics.repeating import Hold, Repeating, Substeps
+from mckibben.blocks.base import Block, Cost, Kernel, Start, needs_sample_time
+from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, Rows, StoredInitial
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
@@ -119,7 +119,7 @@ def state_network_start(
 
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
-class StateNetwork(Repeating):
+class StateNetwork(Block):
     """State-space model of a linear part and tanh units.
 
     Parameters
@@ -149,6 +149,7 @@ class StateNetwork(Repeating):
     kernel: ClassVar[Kernel] = state_network_step
     start_kernel: ClassVar[Start] = state_network_start
     rate_dependent: ClassVar[bool] = True
+    steady_state = steady_state
     parameters: ClassVar[tuple[str, ...]] = ("linear", "hidden", "readout")
     notation: ClassVar[Notation] = Notation(
         r"\dot{x} = \lambda \left(L v + R \tanh(H v)\right),\quad v = \left(x,\, \frac{u "

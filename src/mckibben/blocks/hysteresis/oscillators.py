@@ -25,7 +25,7 @@ where y' passes 0, so that z' has corners and no jumps; steps over these leave e
 
 Straight lines take (omega T)^2 / 12 off a sine of the input, T being the sample time: where that counts,
 and the input is known beforehand, put samples between by a spline. A period of a recording can be run
-with its input band-limited between samples, `Repeating.steady_state`.
+with its input band-limited between samples, `steady_state`.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Cost, Run, Start, needs_sample_time
-from mckibben.blocks.dynamics.repeating import Hold, Repeating, Substeps
+from mckibben.blocks.base import Block, Cost, Run, Start, needs_sample_time
+from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, StoredInitial, Vector
 from mckibben.blocks.kernels import Step, inlined, kernel, step
 from mckibben.blocks.notation import Notation
@@ -137,10 +137,11 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
     return step(oscillator_step), kernel(oscillator_start)
 
 
-class Oscillator(Repeating):
+class Oscillator(Block):
     """A block with the fields of an oscillator, whose element a class adds."""
 
     rate_dependent = True
+    steady_state = steady_state
     slope_by: ClassVar[Any]
     """Slope of the element's force by y, from [force, velocity, `element`]; compiled."""
 
@@ -148,6 +149,8 @@ class Oscillator(Repeating):
     damping: float
     stiffness: float
     output_offset: float | None
+    substeps: int
+    hold: Hold
     initial: Any
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Interval, Len
@@ -16,18 +16,22 @@ from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
-from mckibben.estimators.core.estimator import Grid, resting
+from mckibben.estimators.core.estimator import Estimator, Grid, Initial, resting
 from mckibben.estimators.core.uncertainty import inverted, simulate_all, told_by_runs, unknown
 from mckibben.estimators.coupled.base import schedules
 from mckibben.estimators.dynamics.linear_polynomials import Orders, Polynomials, Start
-from mckibben.estimators.dynamics.linear_starts import LinearEstimator
+from mckibben.estimators.dynamics.linear_starts import (
+    but_input_offset,
+    explained_by_starts,
+    fit_from_rest,
+)
 from mckibben.estimators.dynamics.prediction_error import (
     arx,
     evaluate,
     minimise,
     starting_points,
 )
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.estimators.optimisers.tracker import Progress, Tracker
 from mckibben.presets import preset
 from mckibben.recording import Recording, listed
 
@@ -52,7 +56,7 @@ class Noise:
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class PredictionErrorEstimator(LinearEstimator):
+class PredictionErrorEstimator(Estimator):
     """An estimator of a linear model by one-step prediction errors, run free ever after.
 
     After `fit`, ``noise_`` holds the noise model, the one-step error, and the covariance of all
@@ -85,6 +89,10 @@ class PredictionErrorEstimator(LinearEstimator):
     beside : sequence of str, optional
         Further inputs, such as a load. Default: of several inputs or outputs ``pressure_extensor`` and
         ``force``, where there are any.
+    initial : {"fitted", "first_sample", "virgin"}
+        State before the first sample of every recording: with the least squared error; at rest at the
+        first input; at rest at the operating point. A model with a fitted start that from rest is
+        further off than the output ever moves is identified from rest instead, and its block says so.
     """
 
     purpose = "rate"
@@ -95,8 +103,9 @@ class PredictionErrorEstimator(LinearEstimator):
     }
     needs_time: ClassVar[bool] = True
 
-    input: str | tuple[str, ...] = "pressure"  # type: ignore[assignment]
-    output: str | tuple[str, ...] = "displacement"  # type: ignore[assignment]
+    input: str | tuple[str, ...] = "pressure"
+    output: str | tuple[str, ...] = "displacement"
+    initial: Initial = "fitted"
     beside: tuple[str, ...] | None = None
     n_zeros: Annotated[int, Interval(ge=1, le=20)] = 2
     n_poles: Order = 2
@@ -181,6 +190,18 @@ class PredictionErrorEstimator(LinearEstimator):
         moving = [name for name in beside if any(name in r and np.ptp(r[name]) > 0 for r in every)]
         whole = replace(self, input=(*driving, *moving), output=tuple(given))
         return super(PredictionErrorEstimator, whole).data(recordings, rows)
+
+    def _fit(
+        self,
+        recordings: Recording | Sequence[Recording],
+        rows: Sequence[Mask] | None,
+        validation: Sequence[Recording],
+        progress: Progress | None,
+    ) -> Self:
+        super()._fit(recordings, rows, validation, progress)
+        if self.initial == "fitted" and explained_by_starts(self, recordings, rows):
+            fit_from_rest(self, recordings, rows, validation, progress)
+        return self
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found: of several channels, the sum of one for every input, by output."""
@@ -279,6 +300,10 @@ class PredictionErrorEstimator(LinearEstimator):
     def starting(self) -> Start:
         """The state before the first sample; of several inputs none is fitted."""
         return "first_sample" if self.initial == "fitted" and not self.single else self.initial
+
+    def undetermined(self) -> tuple[int, ...]:
+        """Return the places of what the recordings do not determine; the input's offset is chosen."""
+        return but_input_offset(self, super().undetermined())
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the free-running outputs of blocks where samples count, started by their rule."""

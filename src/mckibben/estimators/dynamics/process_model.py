@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from annotated_types import Ge
@@ -13,18 +13,24 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import LONGEST_DELAY, ProcessModel
 from mckibben.blocks.dynamics.starts import free_responses
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.core.estimator import Initial
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.core.uncertainty import covariance_of
-from mckibben.estimators.dynamics.linear_starts import LinearEstimator
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.estimators.dynamics.linear_starts import (
+    but_input_offset,
+    explained_by_starts,
+    fit_from_rest,
+)
+from mckibben.estimators.optimisers.tracker import Progress, Tracker
 from mckibben.presets import Preset, preset
+from mckibben.recording import Recording
 
 Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
+class ProcessModelEstimator(SeparableEstimator):
     """Process model by variable projection: gain and zero are solved for, the poles searched.
 
     P2UZ is Eq. (11) of "Analysis and modeling of a pneumatic artificial muscle system".
@@ -37,6 +43,10 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         Whether a delay of up to a quarter of the longest run is searched too.
     hold : {"first", "zero"}
         What the input does between samples.
+    initial : {"fitted", "first_sample", "virgin"}
+        State before the first sample of every recording: with the least squared error; at rest at the
+        first input; at rest at the operating point. A model with a fitted start that from rest is
+        further off than the output ever moves is identified from rest instead, and its block says so.
     """
 
     purpose = "rate"
@@ -45,6 +55,7 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
 
     effort: ClassVar[float] = 0.3
 
+    initial: Initial = "fitted"
     structure: Structure = "P1"
     fit_delay: bool = False
     hold: Literal["first", "zero"] = "first"
@@ -55,6 +66,18 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
     fits_peaks: ClassVar[bool] = False
+
+    def _fit(
+        self,
+        recordings: Recording | Sequence[Recording],
+        rows: Sequence[Mask] | None,
+        validation: Sequence[Recording],
+        progress: Progress | None,
+    ) -> Self:
+        super()._fit(recordings, rows, validation, progress)
+        if self.initial == "fitted" and explained_by_starts(self, recordings, rows):
+            fit_from_rest(self, recordings, rows, validation, progress)
+        return self
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         data.timed(instead=", or use gpi")
@@ -79,7 +102,7 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
             for place, (value, error) in enumerate(zip(values, errors, strict=True))
             if abs(value) < 2 * error and "offset" not in names[place]
         }
-        return tuple(sorted({*super().undetermined(), *vague}))
+        return tuple(sorted({*but_input_offset(self, super().undetermined()), *vague}))
 
     @property
     def n_times(self) -> int:

@@ -8,7 +8,6 @@ such a sum rises with its input, so it has an inverse; and loops may lag (w) or 
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -37,69 +36,75 @@ SLOWEST, FASTEST = 0.3, 300.0
 MOST_ASYMMETRIC = 0.19
 """Largest size of each of their five shape numbers: together they stay below 1."""
 
+Degree = Annotated[int, Interval(ge=1, le=9)]
+
 MOST_UNEQUAL = np.log(4.0)
 """Largest logarithm of the ratio of stiffnesses, or limits, of springs in both directions."""
 
 
+@dataclass(frozen=True)
+class Loops:
+    """Linear parameters of a reversible polynomial with loops on top.
+
+    Parameters
+    ----------
+    degree : int
+        Of the polynomial.
+    both_ways : bool
+        Whether loops may lag and lead, each with weights of at least 0; else weights have any sign.
+    """
+
+    degree: int
+    both_ways: bool
+
+    def columns(self, x: Array, z: Array, slopes: Array) -> Array:
+        """Return the pieces of the polynomial, then the loops that lag, then those that lead.
+
+        Parameters
+        ----------
+        x : array, shape (n,)
+            Input, from 0 to 1 over its range.
+        z : array, shape (n, m)
+        slopes : array, shape (m,)
+            Bounds of the slopes of z by x.
+        """
+        pieces = PolynomialMap(self.degree).pieces(x)
+        if not self.both_ways:
+            return np.column_stack([pieces, z])
+        return np.column_stack([pieces, slopes * x[:, np.newaxis] - z, z])
+
+    def least(self, size: int, data: TrainingData) -> Array:
+        """Return a little of every piece of the polynomial, and nothing of the loops."""
+        floor = np.zeros(size)
+        low, high = data.output_range
+        floor[: self.degree] = LEAST_SLOPE * (high - low)
+        return floor
+
+    def weights(self, linear: Array, offset: float, slopes: Array) -> tuple[Array, Array]:
+        """Return the polynomial of x in ascending powers, shape (degree + 1,), and weights of z."""
+        polynomial = PolynomialMap(self.degree).powers(linear[: self.degree])
+        polynomial[0] += offset
+        if not self.both_ways:
+            return polynomial, linear[self.degree :]
+        lagging, leading = np.split(linear[self.degree :], 2)
+        polynomial[1] += float(slopes @ lagging)
+        return polynomial, leading - lagging
+
+
+def relative(run: Run, data: TrainingData) -> Array:
+    """Return the input over a run's history, from 0 to 1 over its range."""
+    low, high = data.input_range
+    return (run.history - low) / (high - low)
+
+
 @dataclass(kw_only=True, repr=False, eq=False)
-class LoopEstimator(SeparableEstimator):
-    """An estimator of a reversible polynomial with loops on top.
+class BoucWenEstimator(SeparableEstimator):
+    """Bouc-Wen model by variable projection: rate and shape are searched, the rest is solved for.
 
     Parameters
     ----------
     degree : int
         Of the reversible polynomial.
-    """
-
-    purpose = "memory"
-    inverse_kind = "solved"
-
-    degree: Annotated[int, Interval(ge=1, le=9)] = 5
-
-    @abstractmethod
-    def loops(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
-        """Return z over the run's history, shape (n, m), and the bounds of its slopes, shape (m,)."""
-
-    @abstractmethod
-    def assemble(
-        self, theta: Array, polynomial: Array, weights: Array, data: TrainingData
-    ) -> Block:
-        """Return the block of an ascending polynomial in x, shape (degree + 1,), and weights of z."""
-
-    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the pieces of the polynomial, then the loops that lag, then those that lead."""
-        low, high = data.input_range
-        x = (run.history - low) / (high - low)
-        z, slopes = self.loops(theta, run, data)
-        pieces = PolynomialMap(self.degree).pieces(x)
-        if not self.nonnegative:
-            return np.column_stack([pieces, z])
-        return np.column_stack([pieces, slopes * x[:, np.newaxis] - z, z])
-
-    def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return a little of every piece of the polynomial, and nothing of the loops."""
-        floor = np.zeros(matrix.shape[1])
-        low, high = data.output_range
-        floor[: self.degree] = LEAST_SLOPE * (high - low)
-        return floor
-
-    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
-        polynomial = PolynomialMap(self.degree).powers(linear[: self.degree])
-        polynomial[0] += offset
-        if not self.nonnegative:
-            return self.assemble(theta, polynomial, linear[self.degree :], data)
-        lagging, leading = np.split(linear[self.degree :], 2)
-        _, slopes = self.loops(theta, data.runs[0].cut(0, 2), data)
-        polynomial[1] += float(slopes @ lagging)
-        return self.assemble(theta, polynomial, leading - lagging, data)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class BoucWenEstimator(LoopEstimator):
-    """Bouc-Wen model by variable projection: rate and shape are searched, the rest is solved for.
-
-    Parameters
-    ----------
     exponent : {1, 2}, optional
         n. Default: the better of both on the training data.
     asymmetric : bool
@@ -107,12 +112,15 @@ class BoucWenEstimator(LoopEstimator):
     """
 
     title = "Bouc–Wen model"
+    purpose = "memory"
+    inverse_kind = "solved"
     can = "A loop that saturates, with five numbers or so, and a reversible polynomial."
     cannot = "Minor loops need not close; loops are symmetric but for the polynomial."
     quick = True
     makes = ("bouc-wen",)
     effort: ClassVar[float] = 0.6
 
+    degree: Degree = 5
     exponent: Literal[1, 2] | None = None
     asymmetric: bool = False
 
@@ -145,22 +153,32 @@ class BoucWenEstimator(LoopEstimator):
             return GeneralizedBoucWen((0.0,), 1.0, rate, shape, n, low + half, half, *ending)
         return BoucWen((0.0,), 1.0, rate, float(theta[1]), n, low, span, *ending)
 
-    def loops(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
-        unit = self.unit(theta, data)
-        if isinstance(unit, BoucWen):
-            steepest = float(np.exp(theta[0]) * max(1.0, 2 * theta[1]))
-        else:
-            steepest = 2 * unit.scale * unit.steepest
-        z = unit.simulate(run.history, initial=self.starting_rule)
-        return z[:, np.newaxis], np.array([steepest])
+    @property
+    def linear(self) -> Loops:
+        """What is solved for."""
+        return Loops(self.degree, self.nonnegative)
 
-    def assemble(
-        self, theta: Array, polynomial: Array, weights: Array, data: TrainingData
-    ) -> Block:
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        return self.linear.least(matrix.shape[1], data)
+
+    def steepest(self, theta: Array, unit: BoucWen | GeneralizedBoucWen) -> Array:
+        """Return the bound of the slope of z by the relative input, shape (1,)."""
+        if isinstance(unit, BoucWen):
+            return np.array([np.exp(theta[0]) * max(1.0, 2 * theta[1])])
+        return np.array([2 * unit.scale * unit.steepest])
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        unit = self.unit(theta, data)
+        z = unit.simulate(run.history, initial=self.starting_rule)[:, np.newaxis]
+        return self.linear.columns(relative(run, data), z, self.steepest(theta, unit))
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        unit = self.unit(theta, data)
+        slopes = self.steepest(theta, unit)
+        polynomial, weights = self.linear.weights(linear, offset, slopes)
         if self.asymmetric:  # whose polynomial is of -1 to 1 over the range, not of 0 to 1
             turned = np.polynomial.Polynomial(polynomial)(np.polynomial.Polynomial([0.5, 0.5])).coef
             polynomial = np.pad(turned, (0, polynomial.size - turned.size))
-        unit = self.unit(theta, data)
         return replace(unit, polynomial=vector(polynomial), weight=float(weights[0]))
 
 
@@ -178,11 +196,13 @@ GBW = preset(
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class MaxwellSlipEstimator(LoopEstimator):
+class MaxwellSlipEstimator(SeparableEstimator):
     """Maxwell-slip model: by least squares, but for the ratios of its directions where it has any.
 
     Parameters
     ----------
+    degree : int
+        Of the reversible polynomial.
     n_operators : int
         Springs.
     spacing : {"even", "dense"}
@@ -191,8 +211,11 @@ class MaxwellSlipEstimator(LoopEstimator):
         Whether rising and falling differ in stiffness and in slip, by ratios that are searched.
     """
 
+    purpose = "memory"
+    inverse_kind = "solved"
     effort: ClassVar[float] = 0.02
 
+    degree: Degree = 5
     n_operators: Operators = 8
     spacing: Spacing = "even"
     asymmetric: bool = False
@@ -208,24 +231,22 @@ class MaxwellSlipEstimator(LoopEstimator):
             return []
         return [np.array([a, b]) for a in (0.0, 0.3, -0.3) for b in (0.0, 0.3, -0.3)]
 
-    def loops(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
-        n, u = self.n_operators, run.history
-        springs = self.assemble(theta, np.zeros(1), np.zeros(n), data)
-        start = springs.initial_state(u[:1], self.starting_rule)[:n]
-        deflections = np.empty((u.size, n))
-        limits = np.array(springs.breakaways)
-        slip_matrix(u, limits, springs.stiffness_ratio, springs.limit_ratio, start, deflections)
-        return deflections, np.full(n, springs.scale * max(1.0, springs.stiffness_ratio))
+    @property
+    def linear(self) -> Loops:
+        """What is solved for."""
+        return Loops(self.degree, self.nonnegative)
 
-    def assemble(
-        self, theta: Array, polynomial: Array, weights: Array, data: TrainingData
-    ) -> MaxwellSlip:
-        low, high = data.input_range
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        return self.linear.least(matrix.shape[1], data)
+
+    def springs(self, theta: Array, data: TrainingData) -> MaxwellSlip:
+        """Return the springs, without weights or polynomial."""
+        n, (low, high) = self.n_operators, data.input_range
         kappa, ratio = np.exp(theta) if theta.size else (1.0, 1.0)
         return MaxwellSlip(
-            vector(spread(self.n_operators + 1, high - low, self.spacing)[1:]),
-            vector(weights),
-            vector(polynomial),
+            vector(spread(n + 1, high - low, self.spacing)[1:]),
+            (0.0,) * n,
+            (0.0,),
             float(kappa),
             float(ratio),
             low,
@@ -234,6 +255,23 @@ class MaxwellSlipEstimator(LoopEstimator):
             self.starting_rule,
             **self.channels(data),
         )
+
+    def steepest(self, springs: MaxwellSlip) -> Array:
+        """Return the bounds of the slopes of deflections by the relative input, (n_operators,)."""
+        return np.full(self.n_operators, springs.scale * max(1.0, springs.stiffness_ratio))
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        springs, n, u = self.springs(theta, data), self.n_operators, run.history
+        start = springs.initial_state(u[:1], self.starting_rule)[:n]
+        deflections = np.empty((u.size, n))
+        limits = np.array(springs.breakaways)
+        slip_matrix(u, limits, springs.stiffness_ratio, springs.limit_ratio, start, deflections)
+        return self.linear.columns(relative(run, data), deflections, self.steepest(springs))
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        springs = self.springs(theta, data)
+        polynomial, weights = self.linear.weights(linear, offset, self.steepest(springs))
+        return replace(springs, weights=vector(weights), polynomial=vector(polynomial))
 
 
 MAXWELL_SLIP = preset(

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -21,6 +20,7 @@ from mckibben.estimators.hysteresis.output_maps import OutputMap, output_map
 from mckibben.estimators.hysteresis.pi import Spacing, play_operators, spread
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
 
 LEAST_PIECE = 1e-6
 """Least share of the output's range that a piece of an increasing map gives."""
@@ -30,8 +30,8 @@ RATE_SHARE = 0.5
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class MappedPIEstimator(SeparableEstimator):
-    """Prandtl-Ishlinskii operators and a memoryless map behind them, by variable projection.
+class MPIEstimator(SeparableEstimator):
+    """Modified Prandtl-Ishlinskii model: operators and a memoryless map, by variable projection.
 
     The weights of the operators are searched, scaled so that the PI part spans the output's range; the
     map behind them is solved for.
@@ -47,7 +47,29 @@ class MappedPIEstimator(SeparableEstimator):
         the last two are the papers' and may not.
     map_size : int
         Straight lines of the map, or degree of the polynomial.
+    rate_dependent : bool
+        Whether weights are linear in the rate of the input, as in "High-Precision Displacement and Force
+        Hybrid Modeling of Pneumatic Artificial Muscle Using 3D PI-NARMAX Model", Eqs. (2) to (5).
+    rate_time_constant : float, optional
+        Time constant of the filter of the rate [s]; 0 as in the paper, which suits commanded inputs.
+        Default: the best on the training data of none, 5 and 25 samples.
     """
+
+    title = "Modified Prandtl–Ishlinskii model (MPI)"
+    purpose = "memory"
+    can = (
+        "Prandtl-Ishlinskii memory behind an increasing map: asymmetric by saturation; small "
+        "and quick."
+    )
+    cannot = (
+        "Loops that are narrow at one end and wide at the other for other reasons than the "
+        "map; no rate, no creep."
+    )
+    inverse_kind = "exact"
+    quick = True
+    default_for = "load"
+    makes = ("pi polynomial",)
+    effort: ClassVar[float] = 0.2
 
     n_operators: Operators = 10
     spacing: Spacing = "even"
@@ -55,11 +77,41 @@ class MappedPIEstimator(SeparableEstimator):
         "polynomial"
     )
     map_size: Annotated[int, Interval(ge=1, le=50)] = 5
+    rate_dependent: bool = False
+    rate_time_constant: Annotated[float, Ge(0)] | None = None
     n_starts: Annotated[int, Ge(1)] = 8
     n_refined: Annotated[int, Ge(1)] = 3
 
     # Operators are computed once a fit, so there is nothing to gain from fewer inputs.
     searches_condensed: ClassVar[bool] = False
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        if not self.rate_dependent:
+            return super().identify(data, tracker)
+        step = data.timed(instead=", or use mpi")
+        if self.rate_time_constant is not None:
+            return super().identify(data, tracker)
+        values = [samples * step for samples in (0, 5, 25)]
+        return self.best_of("rate_time_constant", values, data, tracker)
+
+    def rate(self, run: Run) -> Array:
+        """Return the filtered rate of the run's input, per second."""
+        from scipy.signal import lfilter
+
+        assert run.sample_time is not None
+        step = run.sample_time
+        tau = self.rate_time_constant or 0.0
+        smoothing = np.exp(-step / tau) if tau > 0 else 0.0
+        raw = np.diff(run.history, prepend=run.history[0]) / step
+        return np.asarray(lfilter([1 - smoothing], [1, -smoothing], raw))
+
+    def fastest(self, data: TrainingData) -> float:
+        """Return the largest rate in the data, per second."""
+        rates = data.once(
+            ("fastest", self.rate_time_constant),
+            lambda: np.array([np.abs(self.rate(run)).max() for run in data.runs]),
+        )
+        return float(rates.max())
 
     @property
     def map(self) -> OutputMap:
@@ -72,13 +124,15 @@ class MappedPIEstimator(SeparableEstimator):
         return spread(self.n_operators, high - low, self.spacing)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the relative weights."""
-        lower = np.zeros(self.n_operators)
+        """Return bounds of the relative weights, then of those by rate relative to the fastest."""
+        n = self.n_operators
+        share = np.full(n * self.rate_dependent, RATE_SHARE)
+        lower = np.zeros(n)
         lower[0] = LEAST_REVERSIBLE
-        return lower, np.ones(self.n_operators)
+        return np.concatenate([lower, -share]), np.concatenate([np.ones(n), share])
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return the weights of the best PI model, and two even distributions."""
+        """Return the weights of the best PI model, and two even distributions, whatever the rate."""
         low, high = data.input_range
         radii = self.radii(data)
         matrix = counting(data, lambda run: play_operators(run.history, radii, self.starting_rule))
@@ -86,11 +140,16 @@ class MappedPIEstimator(SeparableEstimator):
         top = weights.max() if weights.max() > 0 else 1.0
         fading = np.exp(-3 * radii / (high - low))
         reversible = np.where(radii == 0, 1.0, 0.1)
-        return [weights / top, fading, reversible]
+        by_rate = (0, self.n_operators * self.rate_dependent)
+        return [np.pad(guess, by_rate) for guess in (weights / top, fading, reversible)]
 
     def operators(self, run: Run, data: TrainingData) -> Array:
-        """Return what the searched weights multiply, over the run's history."""
-        return play_operators(run.history, self.radii(data), self.starting_rule)
+        """Return play operators over the run's history, then these times the relative rate."""
+        play = play_operators(run.history, self.radii(data), self.starting_rule)
+        if not self.rate_dependent:
+            return play
+        relative = self.rate(run) / self.fastest(data)
+        return np.column_stack([play, play * relative[:, np.newaxis]])
 
     def level(self, theta: Array, data: TrainingData) -> tuple[float, float]:
         """Return the lowest and highest value that the weighted operators take when static."""
@@ -98,12 +157,13 @@ class MappedPIEstimator(SeparableEstimator):
         return float(theta @ lowest), float(theta @ highest)
 
     def _ends(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return the operators when the input has only risen, at both ends of its range."""
-        low, high = data.input_range
-        radii = self.radii(data)
-        if self.starting_rule == "first_sample":
-            return low - radii, high - radii
-        return np.clip(0.0, low - radii, low + radii), np.clip(0.0, high - radii, high + radii)
+        """Return the operators at rest when the input has only risen, at both ends of its range."""
+        radii, by_rate = self.radii(data), (0, self.n_operators * self.rate_dependent)
+        held = [end - radii for end in data.input_range]
+        if self.starting_rule != "first_sample":
+            held = [np.clip(0.0, end - radii, end + radii) for end in data.input_range]
+        low, high = (np.pad(values, by_rate) for values in held)
+        return low, high
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the pieces of the map over the run's history."""
@@ -114,14 +174,9 @@ class MappedPIEstimator(SeparableEstimator):
         return self._pieces(theta, self._operators(data), data)
 
     def _operators(self, data: TrainingData) -> Array:
-        return data.once(
-            self.operators_key, lambda: counting(data, lambda run: self.operators(run, data))
-        )
-
-    @property
-    def operators_key(self) -> tuple[object, ...]:
-        """What the operators depend on beside the data."""
-        return ("operators", self.n_operators, self.spacing, self.initial)
+        rate = (self.rate_dependent, self.rate_time_constant)
+        key = ("operators", self.n_operators, self.spacing, self.initial, *rate)
+        return data.once(key, lambda: counting(data, lambda run: self.operators(run, data)))
 
     def _pieces(self, theta: Array, operators: Array, data: TrainingData) -> Array:
         low, high = self.level(theta, data)
@@ -155,132 +210,35 @@ class MappedPIEstimator(SeparableEstimator):
         channel = data.outputs[0]
         return Series((first, self.map.build(linear, offset, bottom, top, channel)))
 
-    @abstractmethod
     def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
         """Return the hysteresis part."""
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class MPIEstimator(MappedPIEstimator):
-    """Modified Prandtl-Ishlinskii model by variable projection."""
-
-    title = "Modified Prandtl–Ishlinskii model (MPI)"
-    purpose = "memory"
-    can = (
-        "Prandtl-Ishlinskii memory behind an increasing map: asymmetric by saturation; small "
-        "and quick."
-    )
-    cannot = (
-        "Loops that are narrow at one end and wide at the other for other reasons than the "
-        "map; no rate, no creep."
-    )
-    inverse_kind = "exact"
-    quick = True
-    default_for = "load"
-    makes = ("pi polynomial",)
-    effort: ClassVar[float] = 0.2
-
-    def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
-        return PI(
-            vector(self.radii(data)),
-            vector(weights),
-            offset,
-            data.input_range,
-            self.starting_rule,
-            **self.channels(data),
+        n, radii = self.n_operators, vector(self.radii(data))
+        ending: Any = (data.input_range, self.starting_rule, *self.channels(data).values())
+        if not self.rate_dependent:
+            return PI(radii, vector(weights), offset, *ending)
+        by_rate = vector(weights[n:] / self.fastest(data))
+        rate_time_constant = self.rate_time_constant or 0.0
+        return RateDependentPI(
+            radii, by_rate, vector(weights[:n]), offset, rate_time_constant, *ending
         )
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
-class RDPIEstimator(MappedPIEstimator):
-    """Rate-dependent modified Prandtl-Ishlinskii model by variable projection.
-
-    Weights are linear in the rate of the input, as in "High-Precision Displacement and Force Hybrid
-    Modeling of Pneumatic Artificial Muscle Using 3D PI-NARMAX Model", Eqs. (2) to (5).
-
-    Parameters
-    ----------
-    rate_time_constant : float, optional
-        Time constant of the filter of the rate [s]; 0 as in the paper, which suits commanded inputs.
-        Default: the best on the training data of none, 5 and 25 samples.
-    """
-
-    title = "Rate-dependent Prandtl–Ishlinskii model (RDPI)"
-    purpose = "rate"
-    can = "Prandtl-Ishlinskii memory with weights that follow the rate."
-    cannot = (
+RDPI = preset(
+    MPIEstimator,
+    "Rate-dependent modified Prandtl-Ishlinskii model by variable projection.",
+    title="Rate-dependent Prandtl–Ishlinskii model (RDPI)",
+    purpose="rate",
+    can="Prandtl-Ishlinskii memory with weights that follow the rate.",
+    cannot=(
         "Extrapolates badly beyond the rates seen; its inverse swings where weights by rate "
         "are strongly negative."
-    )
-    caution = "weights that follow the rate are arbitrary at other rates"
-    inverse_kind = "solved"
-    makes = ("rate-dependent-pi polynomial",)
-    needs_time: ClassVar[bool] = True
-
-    effort: ClassVar[float] = 0.9
-
-    rate_time_constant: Annotated[float, Ge(0)] | None = None
-
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        step = data.timed(instead=", or use mpi")
-        if self.rate_time_constant is not None:
-            return super().identify(data, tracker)
-        values = [samples * step for samples in (0, 5, 25)]
-        return self.best_of("rate_time_constant", values, data, tracker)
-
-    def rate(self, run: Run) -> Array:
-        """Return the filtered rate of the run's input, per second."""
-        from scipy.signal import lfilter
-
-        assert run.sample_time is not None
-        step = run.sample_time
-        tau = self.rate_time_constant or 0.0
-        smoothing = np.exp(-step / tau) if tau > 0 else 0.0
-        raw = np.diff(run.history, prepend=run.history[0]) / step
-        return np.asarray(lfilter([1 - smoothing], [1, -smoothing], raw))
-
-    def fastest(self, data: TrainingData) -> float:
-        """Return the largest rate in the data, per second."""
-        rates = data.once(
-            ("fastest", self.rate_time_constant),
-            lambda: np.array([np.abs(self.rate(run)).max() for run in data.runs]),
-        )
-        return float(rates.max())
-
-    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the weights at rest, then of those by rate relative to the fastest."""
-        lower, upper = super().bounds(data)
-        share = np.full(self.n_operators, RATE_SHARE)
-        return np.concatenate([lower, -share]), np.concatenate([upper, share])
-
-    def guesses(self, data: TrainingData) -> list[Array]:
-        """Return the guesses of the static model, without dependence on rate."""
-        return [np.concatenate([guess, np.zeros_like(guess)]) for guess in super().guesses(data)]
-
-    def operators(self, run: Run, data: TrainingData) -> Array:
-        """Return the play operators, then the same times the rate relative to the fastest."""
-        play = play_operators(run.history, self.radii(data), self.starting_rule)
-        relative = self.rate(run) / self.fastest(data)
-        return np.column_stack([play, play * relative[:, np.newaxis]])
-
-    @property
-    def operators_key(self) -> tuple[object, ...]:
-        return (*super().operators_key, self.rate_time_constant)
-
-    def _ends(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return the operators at both ends of the input's range, at rest."""
-        lowest, highest = super()._ends(data)
-        return np.pad(lowest, (0, lowest.size)), np.pad(highest, (0, highest.size))
-
-    def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
-        n = self.n_operators
-        return RateDependentPI(
-            vector(self.radii(data)),
-            vector(weights[n:] / self.fastest(data)),
-            vector(weights[:n]),
-            offset,
-            self.rate_time_constant or 0.0,
-            data.input_range,
-            self.starting_rule,
-            **self.channels(data),
-        )
+    ),
+    caution="weights that follow the rate are arbitrary at other rates",
+    inverse_kind="solved",
+    quick=False,
+    default_for=None,
+    makes=("rate-dependent-pi polynomial",),
+    needs_time=True,
+    effort=0.9,
+    rate_dependent=True,
+)

@@ -8,11 +8,10 @@ steps of `mckibben.blocks.hysteresis.oscillators`, and the tangents of each stag
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -36,6 +35,7 @@ from mckibben.estimators.dynamics.linear_oscillator import MOST_SUBSTEPS, linear
 from mckibben.estimators.dynamics.paths import Path, averaged, paths
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.presets import preset
 from mckibben.system.compiling import deferred
 
 ANGLE, COARSE_ANGLE = 1 / 30, 1 / 3
@@ -178,6 +178,51 @@ def duhem_element(z: float, velocity: float, numbers: Array, by: Array) -> tuple
 follow_bouc_wen, follow_duhem = following(bouc_wen_element), following(duhem_element)
 
 
+def bouc_wen_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
+    """Return oscillators whose element hardens, and softens."""
+    return [
+        BoucWenOscillator(slope=slope, gamma=bend, delta=way * bend, **fields)
+        for way in (-0.5, 0.5)
+    ]
+
+
+def duhem_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
+    """Return one of two pieces a curve, whose slope goes to 0 where its element's force is largest."""
+    most, rising = slope / bend, (2.0 * slope, slope, 0.0)
+    return [
+        DuhemOscillator(rising=rising, falling=rising[::-1], knots=(-most, 0.0, most), **fields)
+    ]
+
+
+@dataclass(frozen=True)
+class Element:
+    """How oscillators with one kind of element are searched.
+
+    Parameters
+    ----------
+    n_positive : int
+        Parameters of the block, the first ones, that are searched by their logarithms.
+    order : int
+        The others have the unit of this power of a force, over displacement.
+    follows : function
+        What runs the model with its derivatives.
+    starts : function
+        Models to start from, by the element's slope about no force, the share of it that 1 mm takes
+        away, and all other fields.
+    """
+
+    n_positive: int
+    order: int
+    follows: Callable[..., None]
+    starts: Callable[[float, float, dict[str, Any]], list[Oscillator]]
+
+
+ELEMENTS = {
+    "bouc-wen": Element(4, 0, follow_bouc_wen, bouc_wen_starts),
+    "duhem": Element(3, 1, follow_duhem, duhem_starts),
+}
+
+
 class FreeRuns:
     """Errors of a model on all runs, and their derivatives, which are computed with them.
 
@@ -207,11 +252,12 @@ class FreeRuns:
     ) -> None:
         self.template, self.target, self.paths = template, data.target, paths
         self.tracker, self.told = tracker, told
-        self.n_positive, self.follows = estimator.n_positive, type(estimator).follows
+        element = ELEMENTS[estimator.element]
+        self.n_positive, self.follows = element.n_positive, element.follows
         self.at_rest = estimator.at_rest
         self.step = data.sample_time or 1.0
         force, travel = (float(np.ptp(span)) for span in (data.input_range, data.output_range))
-        self.size = np.full(template.n_parameters, force**estimator.order / travel)
+        self.size = np.full(template.n_parameters, force**element.order / travel)
         self.size[: self.n_positive] = 1.0
         if template.output_offset is not None:
             self.size[-1] = travel
@@ -329,14 +375,19 @@ class FreeRuns:
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class OscillatorEstimator(SearchEstimator):
-    """An estimator of a mass, a damper, a spring and an element that remembers.
+    """Mass, damper, spring and an element that remembers, by Gauss-Newton on free runs.
 
     Parameters
     ----------
+    element : {"bouc-wen", "duhem"}
+        A Bouc-Wen element; or one whose slopes are free in either direction.
+    n_pieces : int
+        Of either curve of a Duhem element on either side of no force, where loading turns into
+        unloading, so that a corner is there; spread evenly over the element's forces.
     periodic : bool
         Whether every recording is a whole number of periods of a motion that repeats itself, as under
         a multisine after some periods. Then no start counts, and the input is taken to be band-limited
-        between samples; run such models by `Repeating.steady_state`. Otherwise recordings begin at
+        between samples; run such models by their `steady_state`. Otherwise recordings begin at
         rest, and the input goes in straight lines from sample to sample.
     fit_offset : bool
         Whether the displacement has an offset to be found; else it is 0 without force.
@@ -345,10 +396,13 @@ class OscillatorEstimator(SearchEstimator):
         no more than 1/30 rad in each.
     """
 
+    purpose = "rate"
     needs_time: ClassVar[bool] = True
 
     input: str = "force"
     output: str = "displacement"
+    element: Literal["bouc-wen", "duhem"] = "bouc-wen"
+    n_pieces: Annotated[int, Interval(ge=1, le=20)] = 2
     periodic: bool = False
     fit_offset: bool = False
     substeps: Annotated[int, Interval(ge=1, le=MOST_SUBSTEPS)] | None = None
@@ -356,31 +410,20 @@ class OscillatorEstimator(SearchEstimator):
     made_for: ClassVar[tuple[str, str] | None] = ("force", "displacement")
     effort: ClassVar[float] = 3.0
 
-    n_positive: ClassVar[int]
-    """Parameters of the block, the first ones, that are searched by their logarithms."""
-
-    order: ClassVar[int]
-    """The others have the unit of this power of a force, over displacement."""
-
-    follows: ClassVar[Callable[..., None]]
-    """What runs the model with its derivatives."""
-
-    @abstractmethod
-    def starts(self, slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
-        """Return models to start from.
-
-        Parameters
-        ----------
-        slope, bend : float
-            Of the element: slope about no force, and the share of it that 1 mm takes away.
-        fields : dict
-            All other fields.
-        """
-
     def refined(self, model: Oscillator, forces: Array) -> Oscillator | None:
-        """Return the model in a finer structure, for forces that its element has, if there is one."""
-        del model, forces
-        return None
+        """Return the model with up to twice the pieces, spread over the forces that its element has."""
+        if not isinstance(model, DuhemOscillator):
+            return None
+        n, most = len(model.knots) // 2, float(np.abs(forces).max())
+        if n == self.n_pieces and TIGHT * model.knots[-1] < most < model.knots[-1]:
+            return None
+        most *= BEYOND
+        knots = most * np.linspace(-1.0, 1.0, 1 + 2 * min(2 * n, self.n_pieces))
+        rising, falling = (
+            vector(np.interp(knots, model.knots, values))
+            for values in (model.rising, model.falling)
+        )
+        return replace(model, knots=vector(knots), rising=rising, falling=falling)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         step = data.timed()
@@ -411,7 +454,9 @@ class OscillatorEstimator(SearchEstimator):
             # an element that is bent far adds the less to the stiffness of large motion
             spring = (1.0 - share / max(1.0, bend)) * linear.stiffness
             own = {"mass": linear.mass, "damping": 0.5 * linear.damping, "stiffness": spring}
-            starts = self.starts(share * linear.stiffness, bend / most, fields | own)
+            starts = ELEMENTS[self.element].starts(
+                share * linear.stiffness, bend / most, fields | own
+            )
             tried += [begun(start) for start in starts]
         model, cost = min(tried, key=lambda one: one[1])
         if not np.isfinite(cost):
@@ -472,78 +517,32 @@ class OscillatorEstimator(SearchEstimator):
         return condition, own * np.outer(size, size)
 
 
-@dataclass(kw_only=True, repr=False, eq=False)
-class BoucWenOscillatorEstimator(OscillatorEstimator):
-    """Bouc-Wen oscillator by Gauss-Newton on free runs, begun with a linear one's stiffness shared."""
-
-    title = "Bouc–Wen oscillator"
-    purpose = "rate"
-    can = (
+BOUC_WEN_OSCILLATOR = preset(
+    OscillatorEstimator,
+    "Bouc-Wen oscillator by Gauss-Newton on free runs, begun with a linear one's stiffness shared.",
+    title="Bouc–Wen oscillator",
+    can=(
         "A mass, a damper and a spring with Bouc-Wen hysteresis inside the loop, from force "
         "to displacement: six numbers, from free runs or from periods of a steady motion."
-    )
-    cannot = (
+    ),
+    cannot=(
         "One mass, linear but for the element, whose loops are symmetric; needs time; no inverse."
-    )
-    quick = True
+    ),
+    quick=True,
+    element="bouc-wen",
+)
 
-    n_positive: ClassVar[int] = 4
-    order: ClassVar[int] = 0
-    follows: ClassVar[Callable[..., None]] = staticmethod(follow_bouc_wen)
-
-    def starts(self, slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
-        """Return an element that hardens, and one that softens."""
-        return [
-            BoucWenOscillator(slope=slope, gamma=bend, delta=way * bend, **fields)
-            for way in (-0.5, 0.5)
-        ]
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class DuhemOscillatorEstimator(OscillatorEstimator):
-    """Oscillator with free slopes, by Gauss-Newton on free runs.
-
-    Parameters
-    ----------
-    n_pieces : int
-        Of either curve on either side of no force, where loading turns into unloading, so that a corner
-        is there; spread evenly over the element's forces.
-    """
-
-    title = "Duhem oscillator"
-    purpose = "rate"
-    can = (
+DUHEM_OSCILLATOR = preset(
+    OscillatorEstimator,
+    "Oscillator with free slopes, by Gauss-Newton on free runs.",
+    title="Duhem oscillator",
+    can=(
         "A mass, a damper and a spring with hysteresis of unknown shape inside the loop: "
         "slopes of one element, free in either direction."
-    )
-    cannot = (
+    ),
+    cannot=(
         "The element remembers one number, so nothing of minor loops once they are left; "
         "slopes beyond the forces seen are held; no inverse."
-    )
-
-    n_pieces: Annotated[int, Interval(ge=1, le=20)] = 2
-
-    n_positive: ClassVar[int] = 3
-    order: ClassVar[int] = 1
-    follows: ClassVar[Callable[..., None]] = staticmethod(follow_duhem)
-
-    def starts(self, slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
-        """Return an element of two pieces a curve, whose slope goes to 0 where its force is largest."""
-        most, rising = slope / bend, (2.0 * slope, slope, 0.0)
-        return [
-            DuhemOscillator(rising=rising, falling=rising[::-1], knots=(-most, 0.0, most), **fields)
-        ]
-
-    def refined(self, model: Oscillator, forces: Array) -> Oscillator | None:
-        """Return the model with up to twice the pieces, spread over the forces that its element has."""
-        assert isinstance(model, DuhemOscillator)
-        n, most = len(model.knots) // 2, float(np.abs(forces).max())
-        if n == self.n_pieces and TIGHT * model.knots[-1] < most < model.knots[-1]:
-            return None
-        most *= BEYOND
-        knots = most * np.linspace(-1.0, 1.0, 1 + 2 * min(2 * n, self.n_pieces))
-        rising, falling = (
-            vector(np.interp(knots, model.knots, values))
-            for values in (model.rising, model.falling)
-        )
-        return replace(model, knots=vector(knots), rising=rising, falling=falling)
+    ),
+    element="duhem",
+)

@@ -106,7 +106,7 @@ def deferred(function: Function, **options: Any) -> Function:
 
 def _compile_alike(compiled: Any) -> None:
     """Let a function be compiled once for constants and variables of one type, wherever it is called."""
-    from numba.types import unliteral
+    from numba.core.types import unliteral
 
     if not hasattr(compiled, "get_call_template"):  # where compiling is disabled
         return

@@ -106,8 +106,9 @@ def deferred(function: Function, **options: Any) -> Function:
 
 def _compile_alike(compiled: Any) -> None:
     """Let a function be compiled once for constants and variables of one type, wherever it is called."""
-    from numba.core.types import unliteral
+    from numba.core import types
 
+    unliteral: Any = types.unliteral
     if not hasattr(compiled, "get_call_template"):  # where compiling is disabled
         return
     template = compiled.get_call_template

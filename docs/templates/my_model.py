@@ -113,5 +113,11 @@ class ElasticPlasticEstimator(SeparableEstimator):
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         sticking, slipping = linear.tolist()
-        numbers = slipping, sticking - slipping, float(theta[0] * np.ptp(data.input_range))
-        return ElasticPlastic(*numbers, data.input_range, self.starting_rule, **self.channels(data))
+        return ElasticPlastic(
+            slipping,
+            sticking - slipping,
+            float(theta[0] * np.ptp(data.input_range)),
+            data.input_range,
+            self.starting_rule,
+            **self.channels(data),
+        )

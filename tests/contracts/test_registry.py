@@ -51,7 +51,7 @@ def concrete(base: type, folder: str) -> set[Any]:
 
 
 ON_DISK: dict[str, Callable[[], set[Any]]] = {
-    "blocks": lambda: concrete(Block, "blocks"),
+    "blocks": lambda: concrete(Block, "blocks") | concrete(Block, "estimators"),
     "envelopes": lambda: concrete(Envelope, "blocks/hysteresis"),
     "estimators": lambda: concrete(Estimator, "estimators"),
     "faces": lambda: concrete(Face, "report/notebook"),

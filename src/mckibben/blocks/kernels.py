@@ -1,8 +1,9 @@
 """How kernels are compiled.
 
-A kernel is a numba function ``kernel(coefficients, state, inputs, outputs)`` on float64 arrays:
-one pass over time, the state changed in place, nothing allocated, nothing global. The same compiled
-kernel serves ``simulate``, ``stream`` and ``simulate_many``, so these agree to the last bit.
+A kernel is a numba function ``kernel(coefficients, state, inputs, outputs)`` on float64 arrays: it
+advances one sample, the state changed in place, nothing allocated, nothing global; the loop over samples
+is made from it. The same compiled kernel serves ``simulate``, ``stream`` and ``simulate_many``, so these
+agree to the last bit.
 """
 
 from __future__ import annotations

@@ -191,6 +191,13 @@ class Estimator(ABC):
     told: ClassVar[tuple[str, ...]] = ()
     """Settings that name channels which the model is given beside the input; of the block, too."""
 
+    solves_starts: ClassVar[bool] = False
+    """Whether a fitted `initial` is a state solved for. Where such states alone explain the recordings,
+    the model from rest being further off than the output ever moves, it is found from rest instead."""
+
+    set_apart: ClassVar[tuple[str, ...]] = ()
+    """Names of parameters that are chosen, not found."""
+
     errors_known: ClassVar[bool] = True
     """Whether standard errors of the parameters are computed."""
 
@@ -361,6 +368,16 @@ class Estimator(ABC):
         if progress is not None and not tracker.interrupted:
             progress(1.0, diagnostics.rmse)
         self.model_, self.diagnostics_ = block, diagnostics
+        settings = self.get_params()
+        if (
+            self.solves_starts
+            and settings["initial"] == "fitted"
+            and not tracker.interrupted
+            and diagnostics.rmse_from_rest > np.ptp(data.target)
+        ):
+            at_rest = type(self)(**settings | {"initial": "first_sample"})
+            at_rest._fit(recordings, rows, validation, progress)
+            vars(self).update(vars(at_rest) | settings)
         return self
 
     def check_settings(self) -> None:
@@ -446,9 +463,10 @@ class Estimator(ABC):
         """
         if not self.errors_known:
             return ()
-        found = self.diagnostics_
+        found, names = self.diagnostics_, self.fitted.parameter_names
         unknown = np.flatnonzero(np.isnan(found.standard_errors)).tolist()
-        return tuple(place for place in unknown if place not in found.at_bounds)
+        told = {*found.at_bounds, *(k for k, name in enumerate(names) if name in self.set_apart)}
+        return tuple(place for place in unknown if place not in told)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the free-running outputs of blocks where samples count, each run started as fitted.

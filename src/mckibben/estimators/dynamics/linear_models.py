@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import Interval, Len
@@ -20,18 +20,13 @@ from mckibben.estimators.core.estimator import Estimator, Grid, Initial, resting
 from mckibben.estimators.core.uncertainty import inverted, simulate_all, told_by_runs, unknown
 from mckibben.estimators.coupled.base import schedules
 from mckibben.estimators.dynamics.linear_polynomials import Orders, Polynomials, Start
-from mckibben.estimators.dynamics.linear_starts import (
-    but_input_offset,
-    explained_by_starts,
-    fit_from_rest,
-)
 from mckibben.estimators.dynamics.prediction_error import (
     arx,
     evaluate,
     minimise,
     starting_points,
 )
-from mckibben.estimators.optimisers.tracker import Progress, Tracker
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 from mckibben.recording import Recording, listed
 
@@ -102,6 +97,8 @@ class PredictionErrorEstimator(Estimator):
         "n_zeros": (1, 2, 3),
     }
     needs_time: ClassVar[bool] = True
+    solves_starts: ClassVar[bool] = True
+    set_apart: ClassVar[tuple[str, ...]] = ("input offset",)
 
     input: str | tuple[str, ...] = "pressure"
     output: str | tuple[str, ...] = "displacement"
@@ -190,18 +187,6 @@ class PredictionErrorEstimator(Estimator):
         moving = [name for name in beside if any(name in r and np.ptp(r[name]) > 0 for r in every)]
         whole = replace(self, input=(*driving, *moving), output=tuple(given))
         return super(PredictionErrorEstimator, whole).data(recordings, rows)
-
-    def _fit(
-        self,
-        recordings: Recording | Sequence[Recording],
-        rows: Sequence[Mask] | None,
-        validation: Sequence[Recording],
-        progress: Progress | None,
-    ) -> Self:
-        super()._fit(recordings, rows, validation, progress)
-        if self.initial == "fitted" and explained_by_starts(self, recordings, rows):
-            fit_from_rest(self, recordings, rows, validation, progress)
-        return self
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found: of several channels, the sum of one for every input, by output."""
@@ -300,10 +285,6 @@ class PredictionErrorEstimator(Estimator):
     def starting(self) -> Start:
         """The state before the first sample; of several inputs none is fitted."""
         return "first_sample" if self.initial == "fitted" and not self.single else self.initial
-
-    def undetermined(self) -> tuple[int, ...]:
-        """Return the places of what the recordings do not determine; the input's offset is chosen."""
-        return but_input_offset(self, super().undetermined())
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the free-running outputs of blocks where samples count, started by their rule."""

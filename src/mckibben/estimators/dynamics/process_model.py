@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge
@@ -13,18 +13,12 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.process_model import LONGEST_DELAY, ProcessModel
 from mckibben.blocks.dynamics.starts import free_responses
-from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Initial
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.core.uncertainty import covariance_of
-from mckibben.estimators.dynamics.linear_starts import (
-    but_input_offset,
-    explained_by_starts,
-    fit_from_rest,
-)
-from mckibben.estimators.optimisers.tracker import Progress, Tracker
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import Preset, preset
-from mckibben.recording import Recording
 
 Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 
@@ -52,6 +46,8 @@ class ProcessModelEstimator(SeparableEstimator):
     purpose = "rate"
     cannot = "No hysteresis; no inverse."
     needs_time: ClassVar[bool] = True
+    solves_starts: ClassVar[bool] = True
+    set_apart: ClassVar[tuple[str, ...]] = ("input offset",)
 
     effort: ClassVar[float] = 0.3
 
@@ -66,18 +62,6 @@ class ProcessModelEstimator(SeparableEstimator):
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
     fits_peaks: ClassVar[bool] = False
-
-    def _fit(
-        self,
-        recordings: Recording | Sequence[Recording],
-        rows: Sequence[Mask] | None,
-        validation: Sequence[Recording],
-        progress: Progress | None,
-    ) -> Self:
-        super()._fit(recordings, rows, validation, progress)
-        if self.initial == "fitted" and explained_by_starts(self, recordings, rows):
-            fit_from_rest(self, recordings, rows, validation, progress)
-        return self
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         data.timed(instead=", or use gpi")
@@ -102,7 +86,7 @@ class ProcessModelEstimator(SeparableEstimator):
             for place, (value, error) in enumerate(zip(values, errors, strict=True))
             if abs(value) < 2 * error and "offset" not in names[place]
         }
-        return tuple(sorted({*but_input_offset(self, super().undetermined()), *vague}))
+        return tuple(sorted({*super().undetermined(), *vague}))
 
     @property
     def n_times(self) -> int:

@@ -79,10 +79,11 @@ def test_a_plug_in_that_declares_nothing_is_listed_under_its_name(
         registry._locations.cache_clear()
 
 
-@pytest.mark.parametrize("model", [m for m in MODELS if (FITTED / f"{m}.json").exists()])
+@pytest.mark.parametrize("model", MODELS)
 def test_models_are_undone_as_said(model: str) -> None:
+    block = mckibben.load(FITTED / f"{model}.json")
     try:
-        found = inverse_of(compensator(mckibben.load(FITTED / f"{model}.json")))
+        found = inverse_of(compensator(block))
     except MckibbenError:
         found = "none"
     assert declared(model).inverse_kind.removesuffix(" where stable") == found

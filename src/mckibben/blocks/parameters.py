@@ -21,7 +21,7 @@ from mckibben.errors import ModelError
 Made = TypeVar("Made")
 
 UNCOMPUTABLE = (ArithmeticError, np.linalg.LinAlgError)
-COMPUTING = {"coefficients", "initial_state", "inverse", "inverse_start", "passes", "reachable"}
+COMPUTING = {"coefficients", "initial_state", "inverse", "passes", "reachable"}
 """Methods in which numbers may be too large or too small to compute with, as where one is made."""
 
 

@@ -14,22 +14,27 @@ models", 1995; in continuous time, as neural ordinary differential equations.
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
-from annotated_types import Gt
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Cost, Kernel, Start, needs_sample_time
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
-from mckibben.blocks.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, Rows, StoredInitial
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    FORCE,
+    STRICT,
+    ChannelField,
+    Positive,
+    Rows,
+    StoredInitial,
+)
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
-
-Positive = Annotated[FiniteFloat, Gt(0)]
 
 HEAD = 9
 """Numbers before the weights."""

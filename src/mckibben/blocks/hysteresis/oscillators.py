@@ -32,22 +32,28 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Annotated, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from annotated_types import Ge, Gt
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Cost, Run, Start, needs_sample_time
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
-from mckibben.blocks.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, StoredInitial, Vector
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    FORCE,
+    STRICT,
+    ChannelField,
+    NotNegative,
+    Positive,
+    StoredInitial,
+    Vector,
+)
 from mckibben.blocks.kernels import Step, inlined, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
-
-Positive = Annotated[FiniteFloat, Gt(0)]
 
 HEAD = 7
 """Numbers before those of the element."""
@@ -264,7 +270,7 @@ class BoucWenOscillator(Oscillator):
     )
 
     mass: Positive
-    damping: Annotated[FiniteFloat, Ge(0)]
+    damping: NotNegative
     stiffness: Positive
     slope: Positive
     gamma: FiniteFloat
@@ -358,7 +364,7 @@ class DuhemOscillator(Oscillator):
     )
 
     mass: Positive
-    damping: Annotated[FiniteFloat, Ge(0)]
+    damping: NotNegative
     stiffness: Positive
     rising: Vector
     falling: Vector

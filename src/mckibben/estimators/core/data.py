@@ -173,11 +173,6 @@ class TrainingData:
         return self.outputs[0].name
 
     @property
-    def output_unit(self) -> str:
-        """Its unit."""
-        return self.outputs[0].unit
-
-    @property
     def lowest(self) -> Array:
         """Lowest value of every input over all runs."""
         return self.once(

@@ -194,3 +194,15 @@ def test_a_supply_limits_one_muscle_too() -> None:
         if "total_limit" in limits:
             first = found
     np.testing.assert_allclose(found, first, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("error", [1e-14, 1e-13, -1e-13])
+def test_an_inverse_that_is_resumed_does_not_take_rounding_for_a_reversal(error: float) -> None:
+    compensator = GPI.example().inverse()
+    middle = np.mean(compensator.reachable())
+    stream = compensator.stream(STEP)
+    stream.step(np.array([0.9 * middle]))
+    before = stream.step(np.array([middle])).item()
+    stream.state[compensator.n_states - 2] += error * middle  # the reference that it remembers
+    stream.state[:-3] *= 1.0 + error
+    assert stream.step(np.array([middle])).item() == pytest.approx(before, abs=1e-9)

@@ -21,7 +21,7 @@ SUMS = {"reassoc", "contract"}
 """Freedom of the compiler in weighted sums."""
 
 
-ROUNDING, BRACKET, SLACK = 1e-14, 1e-15, 1e-9
+ROUNDING, BRACKET, SLACK = 1e-12, 1e-15, 1e-9
 """Relative differences: of rounding, of closed brackets, and by which limits may be passed."""
 
 NOTHING = 1e-300

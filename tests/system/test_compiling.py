@@ -126,6 +126,40 @@ def test_a_kernel_kept_does_without_the_module_that_what_it_calls_stood_in(tmp_p
         assert printed(LOOPED, tmp_path, **own) == [f"3.0 {hits}"]
 
 
+ALIKE = """
+from looping import looped
+from called import grown
+from mckibben.system.compiling import deferred
+
+@deferred
+def shrunk(x):
+    return 0.5 * x
+
+loops = [looped(looped(function)) for function in {functions}]
+print(*[loop(1.0) for loop in loops])
+print(*[sum(loop.dispatcher.stats.cache_hits.values()) for loop in loops])
+compiled = [next(iter(loop.dispatcher.overloads.values())) for loop in loops]
+print(*[one.fndesc.mangled_name for one in compiled])
+"""
+
+
+@pytest.mark.long
+def test_kernels_that_one_function_made_are_kept_each_for_itself(tmp_path: Path) -> None:
+    own = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    (tmp_path / "looping.py").write_text(LOOPING)
+    (tmp_path / "called.py").write_text(CALLED)
+    symbols = set()
+    for functions, results, hits in (
+        ("[grown]", "3.0", "0"),
+        ("[shrunk]", "0.5", "0"),
+        ("[grown, shrunk]", "3.0 0.5", "1 1"),
+    ):
+        *found, names = printed(ALIKE.format(functions=functions), tmp_path, **own)
+        assert found == [results, hits]
+        symbols |= set(names.split())
+    assert len(symbols) == 2  # by which other compiled code calls them
+
+
 def test_kernels_travel_to_other_processes() -> None:
     kernel = deferred(double)
     for _ in range(2):  # before it is compiled, and after

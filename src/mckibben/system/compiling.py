@@ -1,27 +1,34 @@
 """Functions that numba compiles when they are first run, so that importing them does not load it.
 
 What is compiled is kept for the next process. A compiled function holds those that it calls, wherever
-they stand, and the numbers that it reads by name; numba looks at its own file alone, so that all it is
-made of is kept beside it and compared.
+they stand, and the numbers that it reads by name, so that its file is named after all of them.
 """
 
 from __future__ import annotations
 
+import pickle
+import re
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cache, partial, update_wrapper
+from functools import partial, update_wrapper
 from hashlib import sha256
 from importlib import import_module
-from pickle import UnpicklingError
-from types import CodeType, ModuleType
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from mckibben.errors import DataError
+from mckibben.system.atomic import replacing
 from mckibben.system.caches import place
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+DIGEST = sha256().digest_size
+"""Bytes before what was compiled, by which a damaged file is known."""
 
 _OPTIONS = {"nogil": True, "error_model": "numpy"}
 _lock = threading.Lock()
@@ -52,9 +59,10 @@ class Deferred:
 
             with _lock:  # one of them, however many threads ask
                 if self._dispatcher is None:
-                    compiled = numba.njit(**self.targetoptions)(self.py_func)
-                    _compile_alike(compiled)
-                    _keep(compiled, self)
+                    compiled = numba.njit(**self.targetoptions)(_apart(self))
+                    if compiled is not self.py_func:  # as where compiling is disabled
+                        _compile_alike(compiled)
+                        _keep(compiled, self)
                     self._dispatcher = compiled
         return self._dispatcher
 
@@ -104,13 +112,31 @@ def deferred(function: Function, **options: Any) -> Function:
     return cast("Function", Deferred(function, _OPTIONS | options))
 
 
+def _apart(function: Deferred) -> Callable[..., Any]:
+    """Return a function named after all that it is made of, too.
+
+    Numba calls compiled code by name. Two functions of one name, as those that one function makes, would
+    be taken for each other where they come from files that two processes wrote.
+    """
+    import numba
+
+    given: Any = function.py_func
+    config: Any = numba.config
+    if config.DISABLE_JIT:
+        return cast("Callable[..., Any]", given)
+    code, known, closure = given.__code__, given.__globals__, given.__closure__
+    own = FunctionType(code, known, given.__name__, given.__defaults__, closure)
+    update_wrapper(own, given)
+    own.__kwdefaults__ = given.__kwdefaults__
+    own.__qualname__ = f"{given.__qualname__}_{made_of(function)[:32]}"
+    return own
+
+
 def _compile_alike(compiled: Any) -> None:
     """Let a function be compiled once for constants and variables of one type, wherever it is called."""
     from numba.core import types
 
     unliteral: Any = types.unliteral
-    if not hasattr(compiled, "get_call_template"):  # where compiling is disabled
-        return
     template = compiled.get_call_template
 
     def alike(args: Any, kws: Any) -> Any:
@@ -121,39 +147,75 @@ def _compile_alike(compiled: Any) -> None:
 
 def _keep(compiled: Any, function: Deferred) -> None:
     """Let numba keep a function compiled in a folder of this user's alone, if there is one."""
-    import numba
+    if folder := place():
+        compiled._cache = _Kept(folder, function)
 
-    config: Any = numba.config
-    if config.DISABLE_JIT:
-        return
-    folder = place()
-    if folder is None:
-        return
-    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
-    try:
-        # as its own ``enable_caching`` does
-        compiled._cache = _cache_class()(function.py_func)
-        kept = compiled._cache._cache_file
-        kept._source_stamp = (kept._source_stamp, made_of(function))
-    except RuntimeError:  # it has no source that could be seen to change
-        pass
-    finally:
-        config.CACHE_DIR = before
+
+class _Kept:
+    """What numba compiled of a function: a file for every signature, named after all that it is made of.
+
+    So a file is never of anything else, whatever other processes write at the same time. Numba's own
+    cache shares one file among functions of one name, as of kernels that one function made.
+
+    Parameters
+    ----------
+    folder : Path
+    function : Deferred
+    """
+
+    def __init__(self, folder: Path, function: Deferred) -> None:
+        self.cache_path = str(folder)
+        self._stem = folder / re.sub(r"[^\w.]", "", function.py_func.__qualname__)
+        self._made_of = made_of(function)
+
+    def _file(self, signature: Any, codegen: Any) -> Path:
+        import numba
+
+        versions = numba.__version__, sys.version, codegen.magic_tuple()
+        digest = sha256(repr((self._made_of, str(signature), versions)).encode()).hexdigest()
+        return self._stem.with_name(f"{self._stem.name}-{digest[:40]}.nbc")
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        """Return what was compiled for a signature, None if that is not there, or damaged."""
+        from numba.core import compiler
+
+        result: Any = compiler.CompileResult
+        target_context.refresh()
+        # ImportError: of a version in which what it calls stood in another module
+        with suppress(OSError, ImportError):
+            content = self._file(signature, target_context.codegen()).read_bytes()
+            digest, payload = content[:DIGEST], content[DIGEST:]
+            if sha256(payload).digest() == digest:
+                return result._rebuild(target_context, *pickle.loads(payload))
+        return None
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Write what was compiled for a signature, done without where that fails, as on a full disk."""
+        from numba.core import serialize
+
+        dumps: Any = serialize.dumps
+        if compiled.lifted or compiled.library.has_dynamic_globals:
+            return
+        payload = dumps(compiled._reduce())
+        file = self._file(signature, compiled.codegen)
+        with suppress(DataError), replacing(file) as new:
+            new.write_bytes(sha256(payload).digest() + payload)
 
 
 def made_of(function: Deferred) -> str:
     """Return a digest of a function, of those that it calls, however far, and of what they name."""
     digest = sha256()
-    for part in _parts(function, set()):
+    for part in _parts(function, {}):
         digest.update(part.encode() + b"\n")
     return digest.hexdigest()
 
 
-def _parts(value: Any, seen: set[int]) -> Iterator[str]:
+def _parts(value: Any, seen: dict[int, int]) -> Iterator[str]:
     """Give what tells a value from another, to compiled code that holds it."""
     if isinstance(value, Deferred):
-        if id(value) not in seen:
-            seen.add(id(value))
+        new = id(value) not in seen
+        yield f"function {seen.setdefault(id(value), len(seen))}"
+        if new:
             function = value.py_func
             yield from _parts(tuple(value.targetoptions.items()), seen)
             yield from _parts(function.__defaults__, seen)
@@ -176,7 +238,7 @@ def _parts(value: Any, seen: set[int]) -> Iterator[str]:
         yield repr(value)
 
 
-def _code_parts(code: CodeType, known: dict[str, Any], seen: set[int]) -> Iterator[str]:
+def _code_parts(code: CodeType, known: dict[str, Any], seen: dict[int, int]) -> Iterator[str]:
     yield code.co_code.hex()
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -194,26 +256,6 @@ def _code_parts(code: CodeType, known: dict[str, Any], seen: set[int]) -> Iterat
         yield name
         for members in (known, *map(vars, modules)):
             yield from _parts(members.get(name), seen)
-
-
-@cache
-def _cache_class() -> Any:
-    """Return numba's cache, done without where it fails, as on a full disk."""
-    from numba.core.caching import FunctionCache
-
-    base: Any = FunctionCache
-
-    class Cache(base):  # type: ignore[misc]  # numba has no types
-        def save_overload(self, *what: Any) -> None:
-            with suppress(OSError):
-                base.save_overload(self, *what)
-
-        def load_overload(self, *what: Any) -> Any:
-            # ImportError: of a version in which what it calls stood in another module
-            with suppress(OSError, EOFError, UnpicklingError, ImportError):
-                return base.load_overload(self, *what)
-
-    return Cache
 
 
 def resolved(function: Function) -> Function:

@@ -9,21 +9,22 @@ from __future__ import annotations
 import ast
 import inspect
 import io
+import re
 import textwrap
 import tokenize
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any
 
 from mckibben.blocks.kernels import SINGLE
 from mckibben.errors import ModelError
 
-REAL, INT = "mck_real", "int"
-"""Types of a value in C: a number, and a whole number or truth value."""
+BOOL, INT, REAL = "bool", "int", "float"
+"""Types of values, as annotated: each holds those before it."""
 
-TYPES = {"float": REAL, "int": INT, "bool": INT}
-"""Types of numbers, as annotated."""
+TYPES = {BOOL: "int", INT: "int", REAL: "mck_real"}
+"""What they are in C."""
 
 _FUNCTIONS = """acos acosh asin asinh atan atan2 atanh ceil copysign cos cosh exp expm1 fabs floor fmod
 log log10 log1p log2 pow sin sinh sqrt tan tanh trunc"""
@@ -66,6 +67,7 @@ class Source:
         closed = inspect.getclosurevars(self.function).nonlocals
         self.globals: Mapping[str, Any] = {**self.function.__globals__, **closed}
         self.body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
+        self._breaks: list[list[set[str]]] = []
 
     def refusal(self, node: ast.AST, construct: str, instead: str) -> KernelError:
         """Return the error for a construct that is outside the language."""
@@ -92,7 +94,7 @@ class Source:
         if not TYPES.keys() >= {*names}:
             fill = "return numbers, and fill arrays that are passed in"
             raise self.refusal(self.tree, f"the result {written}", fill)
-        return [TYPES[name] for name in names]
+        return names
 
     @cached_property
     def nodes(self) -> list[ast.AST]:
@@ -106,15 +108,24 @@ class Source:
         return Counter(node.id for node in names if isinstance(node.ctx, ast.Store))
 
     @cached_property
+    def changing(self) -> set[str]:
+        """Names that are assigned to more than once; arguments have been before."""
+        return {name for name, n in self.stored.items() if n > 1 or name in self.given}
+
+    @cached_property
     def counters(self) -> set[str]:
         """Names that loops count."""
         return {ast.unparse(node.target) for node in self.nodes if isinstance(node, ast.For)}
 
     @property
+    def given(self) -> list[str]:
+        """Names of the arguments."""
+        return [arg.arg for arg in self.tree.args.args]
+
+    @property
     def locals(self) -> set[str]:
-        """Names of arguments and of their sizes, and of what is assigned to."""
-        given = [arg.arg for arg in self.tree.args.args]
-        return {*self.stored, *given, *(f"{name}_size" for name in given)}
+        """Names of arguments and of what is assigned to."""
+        return {*self.stored, *self.given}
 
     @cached_property
     def matrices(self) -> set[str]:
@@ -127,10 +138,43 @@ class Source:
                 found |= {ast.unparse(target) for target in node.targets}
         return found
 
-    def constant(self, name: str) -> int | float | None:
-        """Return the number that a global name means; None where it means something else."""
-        value = self.globals.get(name)
+    def number(self, node: ast.expr) -> int | float | None:
+        """Return the number that is written out or named by a constant; None for anything else."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            number = self.number(node.operand)
+            return None if number is None else -number
+        value = getattr(node, "value", None)
+        if isinstance(node, ast.Name) and node.id not in self.locals:
+            value = self.globals.get(node.id)
         return value if isinstance(value, bool | int | float) else None
+
+    def follow(self, body: Sequence[ast.stmt], known: set[str]) -> set[str] | None:
+        """Return what is assigned on every way to the end of a body; None where no way leads there.
+
+        ``known`` are those assigned before. A name that is read where it may not be is refused.
+        """
+        for node in body:
+            for name in _read(node):
+                if name.id in self.locals - known:
+                    what = f"{name.id!r} where it may not be assigned"
+                    raise self.refusal(name, what, "assign it before the branch or loop")
+            ends: list[set[str] | None] = [known | _stored(node)]
+            if isinstance(node, ast.If):
+                ends = [self.follow(part, known) for part in (node.body, node.orelse)]
+            elif isinstance(node, ast.For | ast.While):
+                self._breaks.append([])
+                self.follow(node.body, known | _stored(node))
+                endless = isinstance(node, ast.While) and self.number(node.test)
+                ends = [*self._breaks.pop(), *([] if endless else [known])]
+            elif isinstance(node, ast.Return | ast.Break | ast.Continue):
+                if isinstance(node, ast.Break):
+                    self._breaks[-1].append(known)
+                return None
+            reached = [end for end in ends if end is not None]
+            if not reached:
+                return None
+            known = set.intersection(*reached)
+        return known
 
     def single(self, name: str) -> float | None:
         """Return a constant's value in single precision, from ``SINGLE`` of its or a kernel's module."""
@@ -149,11 +193,39 @@ def source_of(kernel: Kernel) -> Source:
 
 
 class _WithoutDerivatives(ast.NodeTransformer):
-    """Leaves out what derivatives alone ask for."""
+    """Leaves out what derivatives alone ask for: in C, ``DERIVED`` is false."""
 
-    def visit_If(self, node: ast.If) -> ast.If | None:
+    def visit_If(self, node: ast.If) -> ast.If | list[ast.stmt]:
         self.generic_visit(node)
-        return None if ast.unparse(node.test).partition(" ")[0] == "DERIVED" else node
+        all_of = isinstance(node.test, ast.BoolOp) and isinstance(node.test.op, ast.And)
+        tests = node.test.values if all_of else [node.test]  # type: ignore[attr-defined]
+        return node.orelse if "DERIVED" in map(ast.unparse, tests) else node
+
+
+def names_in(*nodes: ast.AST | None) -> list[ast.Name]:
+    """Return all names in parts of a kernel."""
+    return [n for node in nodes if node for n in ast.walk(node) if isinstance(n, ast.Name)]
+
+
+def _head(node: ast.stmt) -> list[ast.AST]:
+    """Return the parts of a statement without those of the statements inside it."""
+    return [part for part in ast.iter_child_nodes(node) if not isinstance(part, ast.stmt)]
+
+
+def _stored(node: ast.stmt) -> set[str]:
+    """Return the names that a statement itself assigns to."""
+    return {name.id for name in names_in(*_head(node)) if isinstance(name.ctx, ast.Store)}
+
+
+def _read(node: ast.stmt) -> list[ast.Name]:
+    """Return the names that a statement itself reads."""
+    both = isinstance(node, ast.AugAssign)
+    return [name for name in names_in(*_head(node)) if both or isinstance(name.ctx, ast.Load)]
+
+
+def plain(words: str) -> str:
+    """Return words that neither end nor begin a comment of C."""
+    return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", words)
 
 
 def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:
@@ -163,4 +235,4 @@ def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:
         if token.type == tokenize.COMMENT and not token.string.startswith("# type:"):
             row = token.start[0]
             alone = lines[row - 1].lstrip().startswith("#")
-            yield row, (token.string.lstrip("# ").split("  # ")[0], alone)
+            yield row, (plain(token.string.lstrip("# ").split("  # ")[0]), alone)

@@ -17,12 +17,23 @@ import re
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from mckibben.blocks.kernels import accumulate
-from mckibben.export.c.language import FUNCTIONS, INT, REAL, TYPES, Kernel, Source, source_of
-from mckibben.export.naming import WORDS
+from mckibben.export.c.language import (
+    BOOL,
+    FUNCTIONS,
+    INT,
+    REAL,
+    TYPES,
+    Kernel,
+    Source,
+    names_in,
+    plain,
+    source_of,
+)
+from mckibben.export.naming import TAKEN
 from mckibben.export.templating import literal
 
 WIDTH = 100
@@ -39,10 +50,14 @@ ARITHMETIC: dict[type[ast.AST], str] = dict(zip(_BINARY, "+-*//%", strict=True))
 _COMPARED = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 COMPARISON = dict(zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True))
 
-RESERVED = FUNCTIONS.union(
-    WORDS.split(), ["y0", "y1", "yn", "j0", "j1", "jn", "gamma", "div", "copy", "run", "parts"]
-)
-"""Names that C, <math.h> or the export's own functions have already."""
+WHOLE = 32767
+"""Largest whole number that is written out: each `int` of C holds it, and single precision."""
+
+WIDER = {
+    INT: ("a real number for a whole one", "use int(...)"),
+    BOOL: ("a number for a truth value", "compare it"),
+}
+"""What a type does not hold, and what to write instead."""
 
 
 class Value(NamedTuple):
@@ -58,7 +73,7 @@ class Value(NamedTuple):
 
     def to(self, kind: str) -> Value:
         """Return it as a real number, if it is a whole one and that is asked for."""
-        if kind == INT or self.type == kind:
+        if kind != REAL or self.type == kind:
             return self
         return Value(f"(mck_real){self.within(UNARY)}", UNARY, REAL)
 
@@ -71,10 +86,9 @@ class Whole(Counter[str]):
 
     def plus(self, other: Whole, times: int = 1) -> Whole:
         """Return the sum with another one, taken so many times."""
-        found = Whole(self)
-        for term, count in other.items():
-            found[term] += times * count
-        return found
+        terms = [*self, *(term for term in other if term not in self)]
+        sums = {term: self[term] + times * other[term] for term in terms}
+        return Whole({term: count for term, count in sums.items() if count})
 
     def value(self) -> Value:
         """Return it as C."""
@@ -82,8 +96,7 @@ class Whole(Counter[str]):
         for term, count in sorted(self.items(), key=lambda item: (not item[0], item[1] < 0)):
             factor = term if term.isidentifier() or abs(count) == 1 else f"({term})"
             words = [str(abs(count))] * (abs(count) != 1 or not term) + [factor] * bool(term)
-            if count:
-                text += (" - " if count < 0 else " + " if text else "") + " * ".join(words)
+            text += (" - " if count < 0 else " + " if text else "") + " * ".join(words)
         if text.startswith(" - "):
             text = f"-{text[3:]}"
         added = " + " in text or " - " in text
@@ -94,7 +107,8 @@ class Whole(Counter[str]):
 class View:
     """An array, or a part of one: a pointer, the place where it begins, its size, and its row length.
 
-    ``roots`` are the names of the pointers that are written to where it is.
+    ``roots`` are the names of the pointers that are written to where it is; from the last of them, the
+    pointer is at ``offset``.
     """
 
     base: str
@@ -102,14 +116,11 @@ class View:
     roots: tuple[str, ...]
     begin: Whole = field(default_factory=Whole)
     columns: Value | None = None
+    offset: Whole = field(default_factory=Whole)
 
     def place(self) -> str:
         """Return the pointer to its first number."""
-        return (
-            f"{self.base} + {self.begin.value().within(PLUS)}"
-            if any(self.begin.values())
-            else self.base
-        )
+        return f"{self.base} + {self.begin.value().within(PLUS)}" if self.begin else self.base
 
     def element(self, at: Whole) -> Value:
         """Return one of its numbers."""
@@ -132,12 +143,16 @@ class Parameter(NamedTuple):
 
 @dataclass
 class Function:
-    """A function of C: its name, what it takes and returns, which arrays it writes to, and its text."""
+    """A function of C: its name, what it takes and returns, which arrays it writes to, and its text.
+
+    ``apart`` are the arrays between which it copies, so that they may not overlap.
+    """
 
     name: str
     returns: list[str]
     parameters: list[Parameter] = field(default_factory=list)
     written: set[str] = field(default_factory=set)
+    apart: set[tuple[str, str]] = field(default_factory=set)
     text: str = ""
 
     def call(self, *arguments: tuple[str, int]) -> str:
@@ -184,8 +199,8 @@ class Translation:
 
     def free_name(self, source: Source) -> str:
         """Return a name that no function has yet, nor a local name of one begun before."""
-        taken = {*self.constants, *RESERVED, *self.names, *self._locals}
-        self._locals |= source.locals
+        taken = {*self.constants, *TAKEN, *self.names, *self._locals}
+        self._locals |= {*source.locals, *(f"{name}_size" for name in source.given)}
         plain, module = source.tree.name.strip("_"), source.function.__module__.rpartition(".")[2]
         choices = [plain, f"{module}_{plain}", *(f"{module}_{plain}_{k}" for k in range(2, 100))]
         self.names.add(free := next(each for each in choices if each not in taken))
@@ -193,7 +208,7 @@ class Translation:
 
     def constant(self, name: str, text: str) -> str:
         """Return the name of a constant, which another one of the same name does not have."""
-        while self.constants.setdefault(name, text) != text:
+        while name in TAKEN or self.constants.setdefault(name, text) != text:
             name += "_"
         return name
 
@@ -211,7 +226,7 @@ class _Translator:
         self.whole, self.source, self.bound = whole, source, bound
         self.refusal = source.refusal
         self.function = Function(whole.free_name(source), source.returns)
-        self.results = [f"result_{k}" for k in range(2, len(source.returns) + 1)]
+        self.results = [self._made(f"result_{k}") for k in range(2, len(source.returns) + 1)]
         self.types: dict[str, str] = {}
         self.arrays: dict[str, View | list[View]] = {}
         self.given: list[Parameter] = []
@@ -229,6 +244,8 @@ class _Translator:
             for name in sorted(source.stored.keys() - taken):
                 self.declared.setdefault(id(_declaring(self.body, name)), []).append(name)
             self._block(self.body)
+        if source.follow(source.body, {*source.given}) is not None and source.returns:
+            raise self.refusal(source.tree, "a way through without a result", "end with return")
         self._finish()
 
     # -- parameters --------------------------------------------------------------------------------
@@ -237,43 +254,50 @@ class _Translator:
         for place, (arg, kind) in enumerate(self.source.annotations()):
             known = self.bound.get(arg.arg)
             if isinstance(known, int):
-                names = self._unpacked(arg.arg) or [f"{arg.arg}_{k + 1}" for k in range(known)]
+                names = [self._made(f"{arg.arg}_{k + 1}") for k in range(known)]
+                names = self._unpacked(arg.arg, known) or names
                 views = [self._array(name, place, k) for k, name in enumerate(names)]
                 self.arrays |= {arg.arg: views, **dict(zip(names, views, strict=True))}
             elif kind == "Array":
                 self.arrays[arg.arg] = self._array(arg.arg, place, 0)
             elif kind in TYPES:
-                self.types[arg.arg] = TYPES[kind]
-                self.given.append(Parameter(arg.arg, self.types[arg.arg], place))
+                self.types[arg.arg] = kind
+                self.given.append(Parameter(arg.arg, kind, place))
             elif known is None:
                 what = f"the argument {arg.arg}: {kind}"
                 raise self.refusal(arg, what, "use float, int, bool, Array or kernels")
 
-    def _unpacked(self, name: str) -> list[str]:
+    def _unpacked(self, name: str, known: int) -> list[str]:
         """Return what the arrays of a tuple are called where the body unpacks it, and drop that line."""
         for statement in self.body:
-            if isinstance(statement, ast.Assign) and ast.unparse(statement.value) == name:
-                self.body.remove(statement)
-                target = statement.targets[0]
-                return [ast.unparse(each) for each in getattr(target, "elts", [target])]
+            match statement:
+                case ast.Assign([ast.Tuple(names)], ast.Name(id)) if (id, len(names)) == (name, known):
+                    self.body.remove(statement)
+                    return [ast.unparse(each) for each in names]
         return []
 
     def _array(self, name: str, place: int, item: int) -> View:
         self.given.append(Parameter(name, REAL, place, item, "itself"))
         for asks in ("size", "columns"):
-            self.given.append(Parameter(f"{name}_{asks}", INT, place, item, asks))
+            self.given.append(Parameter(self._made(f"{name}_{asks}"), INT, place, item, asks))
         pointer, size, columns = (self._safe(each.name) for each in self.given[-3:])
         rows = Value(columns) if name in self.source.matrices else None
         return View(pointer, Whole([size]), (name,), columns=rows)
 
     def _safe(self, name: str) -> str:
-        """Return a local name that C has not taken."""
-        taken = RESERVED | self.whole.names | {self.function.name}
-        return f"{name}_" if name in taken else name
+        """Return a local name that C has not taken; macros have capitals."""
+        free = not name.isupper() and name not in TAKEN | self.whole.names
+        return name if free else self._made(f"{name.lower()}_")
+
+    def _made(self, name: str) -> str:
+        """Return a name that is not among the kernel's own."""
+        while name in self.source.locals:
+            name += "_"
+        return name
 
     def _spare(self, name: str) -> str:
         self.spares += 1
-        return f"{name}_{self.spares}"
+        return self._made(f"{name}_{self.spares}")
 
     # -- statements --------------------------------------------------------------------------------
 
@@ -304,16 +328,18 @@ class _Translator:
     def _statement(self, node: ast.stmt) -> None:
         if not isinstance(node, ast.Assign):
             self._declare(*self.fresh)
+        self.alone = _whole_of(getattr(node, "value", None))
         match node:
-            case ast.Assign():
-                for target in node.targets:
-                    self._assign(target, node.value)
+            case ast.Assign(targets=[target]):
+                self._assign(target, node.value)
             case ast.AugAssign() if not self._is_array(node.target):
                 place, value = self.value(node.target), self.value(node.value)
+                self.alone = None
                 self._learn(node.target, kind := self._arithmetic(node, place, value).type)
                 word = ARITHMETIC[type(node.op)]
                 self._emit(f"{place.text} {word}= {value.to(kind).text};")
             case ast.If():
+                self.alone = _whole_of(node.test)
                 self._emit(f"if ({self.value(node.test).text}) {{")
                 self._branches(node)
             case ast.While(orelse=[]):
@@ -330,17 +356,18 @@ class _Translator:
                 value = self._call(call)
                 self._emit(f"{'(void)' * bool(value.type)}{value.text};")
             case _:
-                what = f"a statement like this ({type(node).__name__.lower()})"
-                raise self.refusal(node, what, "use =, if, while, for i in range(...), return")
+                what = f"the statement {ast.unparse(node).partition(chr(10))[0]!r}"
+                instead = "use = with one target, if, while, for i in range(...) and return"
+                raise self.refusal(node, what, instead)
 
     def _declare(self, *names: str) -> None:
         for name in sorted(names):
             self.fresh.discard(name)
-            self.pending.append(f"{self.types.get(name, INT)} {self._safe(name)};")
+            self.pending.append(f"{TYPES[self.types.get(name, BOOL)]} {self._safe(name)};")
 
     def _condition(self, node: ast.expr) -> str:
         """Return a condition before which nothing can be computed."""
-        before = len(self.pending)
+        before, self.alone = len(self.pending), _whole_of(node)
         test = self.value(node)
         if len(self.pending) > before:
             raise self.refusal(node, "this condition", "call the kernel before it")
@@ -362,17 +389,17 @@ class _Translator:
         if counter != "_" and counter in self.types:
             raise self.refusal(node, f"{counter!r} for a counter in here", "use another name")
         self.types[counter] = INT
-        low, high = [Value("0"), *map(self.value, arguments[:2])][-2:]
+        low, high = [Value("0"), *(self._as(each, INT) for each in arguments[:2])][-2:]
+        stride = self.source.number(arguments[2]) if len(arguments) == 3 else 1
+        if not isinstance(stride, int) or stride == 0:
+            raise self.refusal(node, f"the step {ast.unparse(arguments[2])!r}", "write a number")
         step = self.value(arguments[2]).text if len(arguments) == 3 else "1"
-        if self.source.locals.intersection(re.findall(r"\w+", step)):
-            raise self.refusal(node, f"the step {step}", "write a number")
-        stored = {name for name in self.source.stored if _mentions(node, name, ast.Store)}
-        if stored & {*re.findall(r"\w+", high.text)} or "(" in high.text:
+        if "(" in high.text or self._changes(high.text, node):
             end = self._spare("end")
             self._emit(f"const int {end} = {high.text};")
             high = Value(end)
         name = self._safe(counter) if counter != "_" else self._spare("k")
-        test = f"{name} {'>' if step[0] == '-' else '<'} {high.within(RELATION + 1)}"
+        test = f"{name} {'>' if stride < 0 else '<'} {high.within(RELATION + 1)}"
         moved = name + {"1": "++", "-1": "--"}.get(step, f" += {step}")
         self._emit(f"for (int {name} = {low.text}; {test}; {moved}) {{")
         self._block(node.body)
@@ -385,7 +412,7 @@ class _Translator:
         if len(parts) != len(kinds):
             what = f"{len(parts)} results for {len(kinds)}"
             raise self.refusal(value or self.source.tree, what, "return each result by its name")
-        texts = [self.value(p).to(k).text for p, k in zip(parts, kinds, strict=True)]
+        texts = [self._as(p, k).text for p, k in zip(parts, kinds, strict=True)]
         for name, text in zip(self.results, texts[1:], strict=False):
             self._emit(f"*{name} = {text};")
         self._emit(f"return {texts[0]};" if texts else "return;")
@@ -410,18 +437,44 @@ class _Translator:
                 self._set(target, self.value(value))
 
     def _assign_several(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> None:
-        names = [ast.unparse(each) for each in targets]
-        late = (ast.unparse(n) in names[:k] for k, v in enumerate(values) for n in ast.walk(v))
+        late = (self._reads(v, t) for k, v in enumerate(values) for t in targets[:k])
         if not any(late):
             for target, value in zip(targets, values, strict=True):
                 self._assign(target, value)
             return
         held = [(self._spare("held"), self.value(each)) for each in values]  # as in a swap
         for name, one in held:
-            self._emit(f"const {one.type} {name} = {one.text};")
+            self._emit(f"const {TYPES[one.type]} {name} = {one.text};")
         self._declare(*self.fresh)
         for target, (name, one) in zip(targets, held, strict=True):
             self._set(target, Value(name, ATOM, one.type))
+
+    def _reads(self, value: ast.expr, target: ast.expr) -> bool:
+        """Return whether a value may read what is assigned to a target."""
+        names = {name.id for name in names_in(value)}
+        if isinstance(target, ast.Name):
+            return target.id in names
+        own = self.view(target if self._is_array(target) else target.value)  # type: ignore[attr-defined]
+        read = (self.arrays.get(name, []) for name in names)
+        views = [view for found in read for view in (found if isinstance(found, list) else [found])]
+        return not all(self._apart(own, view) for view in views)
+
+    def _apart(self, one: View, other: View) -> bool:
+        """Return whether two parts surely have no number in common, as callers see to of arguments.
+
+        Sizes, and places where parts begin, are not negative.
+        """
+        names = one.roots[-1], other.roots[-1]
+        if names[0] != names[1]:
+            self.function.apart.add(names)
+            return True
+        ahead = other.offset.plus(other.begin).plus(one.offset, -1).plus(one.begin, -1)
+        gaps = ahead.plus(one.size, -1), Whole().plus(ahead, -1).plus(other.size, -1)
+        views = (view for view in self.arrays.values() if isinstance(view, View))
+        sizes = [{*whole} for view in views for whole in (view.size, view.offset)]
+        return any(
+            all(n > 0 and (not term or {term} in sizes) for term, n in gap.items()) for gap in gaps
+        )
 
     def _set(self, target: ast.expr, value: Value) -> None:
         opening = ""
@@ -432,8 +485,8 @@ class _Translator:
                 return
             if target.id in self.fresh:
                 self.fresh.discard(target.id)
-                changed = self.source.stored[target.id] > 1
-                opening = f"{'' if changed else 'const '}{self.types[target.id]} "
+                const = "const " * (target.id not in self.source.changing)
+                opening = f"{const}{TYPES[self.types[target.id]]} "
         place = self.value(target)
         self._emit(f"{opening}{place.text} = {value.to(place.type).text};")
 
@@ -441,8 +494,11 @@ class _Translator:
         """Note that a number of a type is assigned to a name, or that an array is written to."""
         if isinstance(target, ast.Name) and target.id in self.source.counters - {"_"}:
             raise self.refusal(target, f"{target.id!r} counted and assigned", "use two names")
-        if isinstance(target, ast.Name) and self.types.get(target.id) != REAL:
-            self.types[target.id] = kind
+        if isinstance(target, ast.Name):
+            self.types[target.id] = widest = _widest(self.types.get(target.id, BOOL), kind)
+            annotated = next((each.type for each in self.given if each.name == target.id), widest)
+            if annotated != widest:
+                raise self.refusal(target, *WIDER[annotated])
         elif isinstance(target, ast.Subscript):
             self.function.written |= {*self.view(target.value).roots}
 
@@ -451,31 +507,53 @@ class _Translator:
         if isinstance(target, ast.Name) and target.id == "_":
             return self._unused(kind)
         self._learn(target, kind)
-        if isinstance(target, ast.Name) and target.id in self.fresh:
+        if not isinstance(target, ast.Name) or self.types[target.id] != kind:
+            raise self.refusal(target, f"a result in {ast.unparse(target)!r}", "name it anew")
+        if target.id in self.fresh:
             self._declare(target.id)
         return f"&{self.value(target).text}"
 
     def _unused(self, kind: str) -> str:
         """Return a pointer for a result that is not needed."""
         name = self._spare("unused")
-        self.pending.append(f"{kind} {name};")
+        self.pending.append(f"{TYPES[kind]} {name};")
         return f"&{name}"
 
     def _name_view(self, target: ast.Name, view: View) -> None:
-        if self.source.stored[target.id] > 1:
-            raise self.refusal(target, "an array under two names", "use two names")
-        name, size = self._safe(target.id), view.size
+        if target.id in self.source.changing:
+            raise self.refusal(target, f"two arrays called {target.id!r}", "use two names")
+        name, offset = self._safe(target.id), view.offset.plus(view.begin)
         const = "" if target.id in self.function.written else "const "
         self._emit(f"{const}mck_real *{name} = {view.place()};")
-        words = re.findall(r"\w+", size.value().text)
-        if any(self.source.stored[word] > 1 for word in words):
-            self._emit(f"const int {name}_size = {size.value().text};")  # as it is now
-            size = Whole([f"{name}_size"])
-        self.arrays[target.id] = View(name, size, (target.id, *view.roots), columns=view.columns)
+        size, columns = view.size, view.columns
+        if self._changes(size.value().text):
+            size = Whole([self._kept(f"{name}_size", size.value()).text])
+        if columns and self._changes(columns.text):
+            columns = self._kept(f"{name}_columns", columns)
+        if self._changes(offset.value().text):
+            offset = Whole([name])
+        roots = (target.id, *view.roots)
+        self.arrays[target.id] = View(name, size, roots, columns=columns, offset=offset)
+
+    def _kept(self, name: str, value: Value) -> Value:
+        """Return a whole number as it is now, under a name."""
+        self._emit(f"const int {(name := self._made(name))} = {value.text};")
+        return Value(name)
+
+    def _changes(self, text: str, loop: ast.For | None = None) -> bool:
+        """Return whether what a text of C computes may be another number later, or in a loop."""
+        stored = {name.id for name in names_in(loop) if isinstance(name.ctx, ast.Store)}
+        changing = {*map(self._safe, stored if loop else self.source.changing)}
+        words = {*re.findall(r"\w+", text)}
+        views = [view for view in self.arrays.values() if isinstance(view, View)]
+        roots = {root for view in views if view.base in words for root in view.roots}
+        return bool(words & changing or roots & self.function.written)
 
     def _fill(self, target: ast.expr, value: ast.expr) -> None:
         view, k = self.view(target), self._spare("k")
         if self._is_array(value):
+            if not self._apart(view, self.view(value)):
+                raise self.refusal(value, "a copy between parts that may overlap", "write a loop")
             given = self.view(value).element(Whole([k])).text
         else:
             given = self.value(value).to(REAL).text
@@ -507,8 +585,8 @@ class _Translator:
             shape = node.args[0] if len(node.args) == 1 else None
             if node.func.attr == "reshape" and isinstance(shape, ast.Tuple):
                 base, (rows, columns) = self.view(node.func.value), shape.elts
-                size = self._product(rows, length := self.value(columns))
-                return View(base.base, size, base.roots, base.begin, length)
+                size = self._product(rows, length := self._as(columns, INT))
+                return replace(base, size=size, columns=length)
         if not isinstance(node, ast.Subscript) or isinstance(node.slice, ast.Tuple):
             raise self.refusal(node, f"{ast.unparse(node)!r} for an array", "pass one in")
         base, part = self.view(node.value), node.slice
@@ -516,18 +594,18 @@ class _Translator:
             if base.columns is None:
                 raise self.refusal(node, f"{ast.unparse(node)!r} for an array", "slice it")
             begin = base.begin.plus(self._product(part, base.columns))
-            return View(base.base, self._terms(base.columns), base.roots, begin)
+            return replace(base, size=self._terms(base.columns), begin=begin, columns=None)
         if part.step or base.columns is not None:
             raise self.refusal(node, "a slice like this", "write a loop")
         low = self._at(part.lower, base.size) if part.lower else Whole()
         high = self._at(part.upper, base.size) if part.upper else base.size
-        return View(base.base, high.plus(low, -1), base.roots, base.begin.plus(low))
+        return replace(base, size=high.plus(low, -1), begin=base.begin.plus(low))
 
     def _at(self, place: ast.expr, size: Whole) -> Whole:
         """Return a place in an array; one below 0 is counted from the end."""
-        found = self._whole(place)
-        below = isinstance(place, ast.UnaryOp) and isinstance(place.op, ast.USub)
-        return size.plus(found) if below else found
+        found, number = self._whole(place), self.source.number(place)
+        written = isinstance(place, ast.UnaryOp) and isinstance(place.op, ast.USub)
+        return size.plus(found) if written or (number or 0) < 0 else found
 
     def _whole(self, node: ast.expr) -> Whole:
         """Return a whole number as a sum."""
@@ -539,15 +617,15 @@ class _Translator:
         if isinstance(node, ast.Attribute) and node.attr == "size":
             return self.view(node.value).size
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
-            return self._product(node.left, self.value(node.right))
-        return self._terms(self.value(node))
+            return self._product(node.left, self._as(node.right, INT))
+        return self._terms(self._as(node, INT))
 
     def _terms(self, value: Value) -> Whole:
         return Whole({"": int(value.text)} if value.text.isdigit() else [value.within(TIMES)])
 
     def _product(self, times: ast.expr, value: Value) -> Whole:
         one = self._whole(times)
-        if not any(count for term, count in one.items() if term):
+        if one.keys() <= {""}:
             return Whole().plus(self._terms(value), one[""])
         return self._terms(Value(f"{one.value().within(TIMES)} * {value.within(UNARY)}", TIMES))
 
@@ -568,37 +646,32 @@ class _Translator:
     def value(self, node: ast.expr) -> Value:
         """Return a number as C."""
         match node:
-            case ast.Constant(value=float(number)):
-                return Value(self._real(number, node), ATOM, REAL)
-            case ast.Constant(value=bool(number) | int(number)):
-                return Value(str(int(number)))
+            case ast.Constant(value=bool(number) | int(number) | float(number)):
+                return self._written(number, node)
             case ast.Name():
                 return self._name(node)
             case ast.UnaryOp(op=ast.Not()):
-                return Value(f"!{self.value(node.operand).within(UNARY)}", UNARY)
+                return Value(f"!{self.value(node.operand).within(UNARY)}", UNARY, BOOL)
             case ast.UnaryOp(op=ast.USub()):
                 inner = self.value(node.operand)
                 text = inner.within(UNARY)
                 text = f"({text})" if text.startswith("-") else text
-                return Value(f"-{text}", UNARY, inner.type)
+                return Value(f"-{text}", UNARY, _widest(inner.type, INT))
             case ast.BinOp():
                 return self._arithmetic(node, self.value(node.left), self.value(node.right))
             case ast.BoolOp():
                 word, binds = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
-                values = [self.value(each) for each in node.values]
-                if any(each.type == REAL or each.text.isdigit() for each in values):
-                    raise self.refusal(node, "and, or of numbers", "compare them")
-                return Value(f" {word} ".join(each.within(EQUAL) for each in values), binds)
+                values = [self._as(each, BOOL) for each in node.values]
+                return Value(f" {word} ".join(each.within(EQUAL) for each in values), binds, BOOL)
             case ast.Compare():
                 return self._compare(node)
             case ast.IfExp():
                 test = self.value(node.test).within(AND)
-                one, other, kind = _alike(self.value(node.body), self.value(node.orelse))
+                one, other, kind = _alike(self.value(node.body), self.value(node.orelse), BOOL)
                 texts = one.within(CHOICE + 1), other.within(CHOICE + 1)
                 return Value(f"{test} ? {texts[0]} : {texts[1]}", CHOICE, kind)
             case ast.Attribute(value=ast.Name(id="np" | "math"), attr="inf" | "nan" | "pi" as name):
-                number = getattr(math, name)
-                return Value(self._real(number, node), ATOM, REAL)
+                return self._written(getattr(math, name), node)
             case ast.Attribute(attr="size"):
                 return self.view(node.value).size.value()
             case ast.Subscript():
@@ -607,21 +680,35 @@ class _Translator:
                 found = self._function(node)
                 if found.type:
                     return found
-        raise self.refusal(node, f"{ast.unparse(node)!r}", "see docs/kernels.md")
+        instead = "compute it from numbers, places in arrays and calls of kernels"
+        raise self.refusal(node, f"{ast.unparse(node)!r} for a number", instead)
+
+    def _as(self, node: ast.expr, kind: str) -> Value:
+        """Return a number as one of a type, which has to hold it."""
+        value = self.value(node)
+        if _widest(value.type, kind) != kind:
+            raise self.refusal(node, *WIDER[kind])
+        return value.to(kind)
 
     def _name(self, node: ast.Name) -> Value:
         name = node.id
-        if name in self.types or name in self.source.stored.keys() - self.source.counters:
-            return Value(self._safe(name), ATOM, self.types.get(name, INT))
-        known, kind = self.source.constant(name), INT
+        if name in self.types or name in self.source.stored:
+            return Value(self._safe(name), ATOM, self.types.get(name, BOOL))
+        known = self.source.number(node)
         if known is None:
             instead = "use numbers, arguments and constants of the module"
             raise self.refusal(node, f"the name {name!r}", instead)
-        text = str(int(known)) if math.isfinite(known) else ""
-        if isinstance(known, float):
-            single, kind = self.source.single(name) if self.whole.single else None, REAL
-            text = literal(single, single=True) if single else self._real(known, node)
-        return Value(self.whole.constant(name.strip("_").upper(), text), ATOM, kind)
+        single = self.source.single(name) if self.whole.single else None
+        found = Value(literal(single, single=True), ATOM, REAL) if single else self._written(known, node)
+        return found._replace(text=self.whole.constant(name.strip("_").upper(), found.text))
+
+    def _written(self, number: int | float, node: ast.AST) -> Value:
+        """Return a number in C, or refuse one that it does not hold."""
+        if isinstance(number, float):
+            return Value(self._real(number, node), ATOM, REAL)
+        if abs(number) > WHOLE:
+            raise self.refusal(node, f"the whole number {number}", f"write {number}.0")
+        return Value(str(int(number)), ATOM, BOOL if isinstance(number, bool) else INT)
 
     def _real(self, value: float, node: ast.AST) -> str:
         """Return a real number in C, or refuse one that single precision does not hold."""
@@ -650,7 +737,7 @@ class _Translator:
         if isinstance(node.ops[0], ast.In) and isinstance(node.comparators[0], ast.Tuple):
             choices = node.comparators[0].elts
             each = [ast.Compare(node.left, [ast.Eq()], [one]) for one in choices]
-            return self.value(ast.BoolOp(ast.Or(), [*each]))
+            return self.value(ast.copy_location(ast.BoolOp(ast.Or(), [*each]), node))
         links = []
         for op, left, right in zip(
             node.ops, [node.left, *node.comparators], node.comparators, strict=False
@@ -660,8 +747,9 @@ class _Translator:
             one, other, _ = _alike(self.value(left), self.value(right))
             word = COMPARISON[type(op)]
             text = f"{one.within(RELATION + 1)} {word} {other.within(RELATION + 1)}"
-            links.append(Value(text, EQUAL if word in ("==", "!=") else RELATION))
-        return links[0] if len(links) == 1 else Value(" && ".join(each.text for each in links), AND)
+            links.append(Value(text, EQUAL if word in ("==", "!=") else RELATION, BOOL))
+        both = " && ".join(each.text for each in links)
+        return links[0] if len(links) == 1 else Value(both, AND, BOOL)
 
     # -- calls -------------------------------------------------------------------------------------
 
@@ -725,22 +813,26 @@ class _Translator:
 
     def _call(self, node: ast.Call, pointers: Sequence[str] = ()) -> Value:
         """Return a call, whose results behind the first go where pointers say, or nowhere."""
-        if self._meaning(node.func) is accumulate:
+        callee = None if self._meaning(node.func) is accumulate else self._callee(node)
+        if (callee is None or callee.written) and node is not self.alone:
+            what = f"{ast.unparse(node.func)}(), which fills arrays, within another expression"
+            raise self.refusal(node, what, "name its result first, x = f(a)")
+        if callee is None:
             return self._accumulate(*node.args)
-        callee = self._callee(node)
         pointers = pointers or [self._unused(kind) for kind in callee.returns[1:]]
         texts = ", ".join([*self._arguments(node, callee), *pointers])
         return Value(f"{callee.name}({texts})", ATOM, next(iter(callee.returns), ""))
 
     def _arguments(self, node: ast.Call, callee: Function) -> Iterator[str]:
+        passed: dict[str, View] = {}
         for each in callee.parameters:
             given = node.args[each.place]
             if not each.asks:
-                yield self.value(given).to(each.type).text
+                yield self._as(given, each.type).text
                 continue
             items = self._meaning(given)
             item = items[each.item] if isinstance(items, list) else given
-            view = item if isinstance(item, View) else self.view(item)
+            view = passed[each.name] = item if isinstance(item, View) else self.view(item)
             if each.name in callee.written:
                 self.function.written |= {*view.roots}
             if each.asks == "itself":
@@ -751,6 +843,8 @@ class _Translator:
                 yield view.columns.text
             else:
                 raise self.refusal(given, "an array without rows here", "reshape it")
+        if not all(self._apart(passed[one], passed[other]) for one, other in callee.apart):
+            raise self.refusal(node, "parts that may overlap and are copied", "pass different arrays")
 
     def _accumulate(self, total: ast.expr, change: ast.expr, lost: ast.expr, at: ast.expr) -> Value:
         """Return a sum, which in single precision carries what rounding loses."""
@@ -773,20 +867,34 @@ class _Translator:
             if re.search(rf"\b{name}\b", body):
                 function.parameters.append(each)
                 const = "const " * (each.name not in function.written)
-                kind = f"{const}{REAL} *" if each.asks == "itself" else f"{each.type} "
+                kind = TYPES[each.type]
+                kind = f"{const}{kind} *" if each.asks == "itself" else f"{kind} "
                 words.append(kind + name)
-        words += [f"{k} *{n}" for k, n in zip(function.returns[1:], self.results, strict=True)]
-        kind = next(iter(function.returns), "void")
+        kinds = [TYPES[kind] for kind in function.returns]
+        words += [f"{k} *{n}" for k, n in zip(kinds[1:], self.results, strict=True)]
+        kind = next(iter(kinds), "void")
         head = _wrapped(f"static {kind} {function.name}({', '.join(words) or 'void'})")
-        doc = re.sub(r"`+", "`", ast.get_docstring(self.source.tree) or "").replace("*/", "* /")
+        doc = plain(re.sub(r"`+", "`", ast.get_docstring(self.source.tree) or ""))
         about = [f"/* {doc}".replace("\n", "\n * ").replace(" * \n", " *\n") + " */"] if doc else []
         function.text = "\n".join([*about, *head, "{", body, "}", ""])
 
 
 def _alike(one: Value, other: Value, kind: str = INT) -> tuple[Value, Value, str]:
     """Return two numbers in the type that holds both, and that type."""
-    kind = REAL if REAL in (one.type, other.type, kind) else INT
+    kind = _widest(one.type, other.type, kind)
     return one.to(kind), other.to(kind), kind
+
+
+def _widest(*kinds: str) -> str:
+    """Return the type that holds all of some."""
+    return max(kinds, key=[*TYPES].index)
+
+
+def _whole_of(node: ast.expr | None) -> ast.expr | None:
+    """Return the part of a value that is computed first and once."""
+    while isinstance(node, ast.UnaryOp | ast.Subscript):
+        node = node.operand if isinstance(node, ast.UnaryOp) else node.value
+    return node
 
 
 def _wrapped(line: str) -> list[str]:

@@ -43,11 +43,16 @@ FP_NORMAL FP_SUBNORMAL FP_ZERO HUGE_VAL HUGE_VALF HUGE_VALL INFINITY MATH_ERREXC
 M_2_PI M_2_SQRTPI M_E M_LN10 M_LN2 M_LOG10E M_LOG2E M_PI M_PI_2 M_PI_4 M_SQRT1_2 M_SQRT2 NAN NULL
 abort abs calloc div exit free labs llabs malloc memchr memcmp memcpy memmove memset printf putchar puts
 realloc strlen tolower toupper
-MCK_FLOAT32 MCK_H MCK_INFINITY all_finite copy mck_max mck_min mck_real mck_sum parts run
+MCK_FLOAT32 MCK_H MCK_INFINITY all_finite copy mck_copy mck_max mck_min mck_real mck_sum
+parts run
 """
 
 TAKEN = frozenset(
-    (*WORDS.split(), *OTHERS.split(), *(f + end for f in ELEMENTARY.split() for end in ("", "f", "l")))
+    (
+        *WORDS.split(),
+        *OTHERS.split(),
+        *(f + end for f in ELEMENTARY.split() for end in ("", "f", "l")),
+    )
 )
 """Names that C, C++, <math.h>, compilers or the export's own files have already."""
 
@@ -87,6 +92,15 @@ def name_from(path: Path) -> str:
 def said(text: str) -> str:
     """Return text for a comment or a string of a source file: all but harmless characters replaced."""
     return re.sub(r"[^A-Za-z0-9_ .,()^%/+=:-]|//|/\*|\*/", "_", text)[:80]
+
+
+def commented(text: str) -> str:
+    """Return text for a comment of C, which it does not end, and in which none begins.
+
+    >>> commented("a */ b")
+    'a * / b'
+    """
+    return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", text)
 
 
 def macros(names: Sequence[str]) -> list[str]:

@@ -9,16 +9,16 @@ from __future__ import annotations
 import ast
 import inspect
 import io
-import re
 import textwrap
 import tokenize
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache, cached_property
 from typing import Any
 
 from mckibben.blocks.kernels import SINGLE
 from mckibben.errors import ModelError
+from mckibben.export.naming import commented
 
 BOOL, INT, REAL = "bool", "int", "float"
 """Types of values, as annotated: each holds those before it."""
@@ -54,7 +54,11 @@ class KernelError(ModelError):
 
 
 class Source:
-    """The source of a kernel: its syntax tree, its comments, and what its global names mean."""
+    """The source of a kernel: its syntax tree, its comments, and what its names mean.
+
+    Of its local names, ``stored`` is how often each is assigned to, ``given`` are its arguments,
+    ``changing`` have more than one value in a call, and ``counters`` are counted by loops.
+    """
 
     def __init__(self, kernel: Kernel) -> None:
         self.function = kernel.py_func  # type: ignore[attr-defined]
@@ -67,7 +71,11 @@ class Source:
         closed = inspect.getclosurevars(self.function).nonlocals
         self.globals: Mapping[str, Any] = {**self.function.__globals__, **closed}
         self.body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
-        self._breaks: list[list[set[str]]] = []
+        self.given = [arg.arg for arg in tree.args.args]
+        self.stored = used(*self.body, how=ast.Store)
+        self.locals = {*self.stored, *self.given}
+        self.changing = {name for name, n in self.stored.items() if n > 1 or name in self.given}
+        self.counters = {ast.unparse(n.target) for n in ast.walk(tree) if isinstance(n, ast.For)}
 
     def refusal(self, node: ast.AST, construct: str, instead: str) -> KernelError:
         """Return the error for a construct that is outside the language."""
@@ -97,41 +105,10 @@ class Source:
         return names
 
     @cached_property
-    def nodes(self) -> list[ast.AST]:
-        """All parts of the body."""
-        return [node for statement in self.body for node in ast.walk(statement)]
-
-    @cached_property
-    def stored(self) -> Counter[str]:
-        """How often every local name is assigned to."""
-        names = [node for node in self.nodes if isinstance(node, ast.Name)]
-        return Counter(node.id for node in names if isinstance(node.ctx, ast.Store))
-
-    @cached_property
-    def changing(self) -> set[str]:
-        """Names that are assigned to more than once; arguments have been before."""
-        return {name for name, n in self.stored.items() if n > 1 or name in self.given}
-
-    @cached_property
-    def counters(self) -> set[str]:
-        """Names that loops count."""
-        return {ast.unparse(node.target) for node in self.nodes if isinstance(node, ast.For)}
-
-    @property
-    def given(self) -> list[str]:
-        """Names of the arguments."""
-        return [arg.arg for arg in self.tree.args.args]
-
-    @property
-    def locals(self) -> set[str]:
-        """Names of arguments and of what is assigned to."""
-        return {*self.stored, *self.given}
-
-    @cached_property
     def matrices(self) -> set[str]:
         """Names of arrays with two dimensions: those reshaped, or indexed with two places."""
         found = set()
-        for node in self.nodes:
+        for node in ast.walk(self.tree):
             if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Tuple):
                 found.add(ast.unparse(node.value))
             elif isinstance(node, ast.Assign) and ".reshape(" in ast.unparse(node.value):
@@ -147,34 +124,6 @@ class Source:
         if isinstance(node, ast.Name) and node.id not in self.locals:
             value = self.globals.get(node.id)
         return value if isinstance(value, bool | int | float) else None
-
-    def follow(self, body: Sequence[ast.stmt], known: set[str]) -> set[str] | None:
-        """Return what is assigned on every way to the end of a body; None where no way leads there.
-
-        ``known`` are those assigned before. A name that is read where it may not be is refused.
-        """
-        for node in body:
-            for name in _read(node):
-                if name.id in self.locals - known:
-                    what = f"{name.id!r} where it may not be assigned"
-                    raise self.refusal(name, what, "assign it before the branch or loop")
-            ends: list[set[str] | None] = [known | _stored(node)]
-            if isinstance(node, ast.If):
-                ends = [self.follow(part, known) for part in (node.body, node.orelse)]
-            elif isinstance(node, ast.For | ast.While):
-                self._breaks.append([])
-                self.follow(node.body, known | _stored(node))
-                endless = isinstance(node, ast.While) and self.number(node.test)
-                ends = [*self._breaks.pop(), *([] if endless else [known])]
-            elif isinstance(node, ast.Return | ast.Break | ast.Continue):
-                if isinstance(node, ast.Break):
-                    self._breaks[-1].append(known)
-                return None
-            reached = [end for end in ends if end is not None]
-            if not reached:
-                return None
-            known = set.intersection(*reached)
-        return known
 
     def single(self, name: str) -> float | None:
         """Return a constant's value in single precision, from ``SINGLE`` of its or a kernel's module."""
@@ -193,7 +142,7 @@ def source_of(kernel: Kernel) -> Source:
 
 
 class _WithoutDerivatives(ast.NodeTransformer):
-    """Leaves out what derivatives alone ask for: in C, ``DERIVED`` is false."""
+    """Leaves out what derivatives alone ask for: ``DERIVED`` is false in C."""
 
     def visit_If(self, node: ast.If) -> ast.If | list[ast.stmt]:
         self.generic_visit(node)
@@ -202,30 +151,10 @@ class _WithoutDerivatives(ast.NodeTransformer):
         return node.orelse if "DERIVED" in map(ast.unparse, tests) else node
 
 
-def names_in(*nodes: ast.AST | None) -> list[ast.Name]:
-    """Return all names in parts of a kernel."""
-    return [n for node in nodes if node for n in ast.walk(node) if isinstance(n, ast.Name)]
-
-
-def _head(node: ast.stmt) -> list[ast.AST]:
-    """Return the parts of a statement without those of the statements inside it."""
-    return [part for part in ast.iter_child_nodes(node) if not isinstance(part, ast.stmt)]
-
-
-def _stored(node: ast.stmt) -> set[str]:
-    """Return the names that a statement itself assigns to."""
-    return {name.id for name in names_in(*_head(node)) if isinstance(name.ctx, ast.Store)}
-
-
-def _read(node: ast.stmt) -> list[ast.Name]:
-    """Return the names that a statement itself reads."""
-    both = isinstance(node, ast.AugAssign)
-    return [name for name in names_in(*_head(node)) if both or isinstance(name.ctx, ast.Load)]
-
-
-def plain(words: str) -> str:
-    """Return words that neither end nor begin a comment of C."""
-    return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", words)
+def used(*nodes: ast.AST, how: type[ast.expr_context] = ast.expr_context) -> Counter[str]:
+    """Return how often each name is used in parts of a kernel, or read, or assigned to."""
+    names = (n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name))
+    return Counter(name.id for name in names if isinstance(name.ctx, how))
 
 
 def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:
@@ -235,4 +164,4 @@ def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:
         if token.type == tokenize.COMMENT and not token.string.startswith("# type:"):
             row = token.start[0]
             alone = lines[row - 1].lstrip().startswith("#")
-            yield row, (plain(token.string.lstrip("# ").split("  # ")[0]), alone)
+            yield row, (commented(token.string.lstrip("# ").split("  # ")[0]), alone)

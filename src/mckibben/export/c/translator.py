@@ -21,19 +21,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from mckibben.blocks.kernels import accumulate
-from mckibben.export.c.language import (
-    BOOL,
-    FUNCTIONS,
-    INT,
-    REAL,
-    TYPES,
-    Kernel,
-    Source,
-    names_in,
-    plain,
-    source_of,
-)
-from mckibben.export.naming import TAKEN
+from mckibben.export.c.language import BOOL, FUNCTIONS, INT, REAL, TYPES, Source, source_of, used
+from mckibben.export.naming import TAKEN, commented
 from mckibben.export.templating import literal
 
 WIDTH = 100
@@ -53,11 +42,11 @@ COMPARISON = dict(zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True
 WHOLE = 32767
 """Largest whole number that is written out: each `int` of C holds it, and single precision."""
 
-WIDER = {
-    INT: ("a real number for a whole one", "use int(...)"),
-    BOOL: ("a number for a truth value", "compare it"),
-}
-"""What a type does not hold, and what to write instead."""
+RETURNED = "return"
+"""What is known behind a return, a break and a continue, with all names: no way leads on from there."""
+
+FITTING = "use int(...) for a whole number, and a comparison for a truth value"
+"""What to write instead of a number whose type does not fit."""
 
 
 class Value(NamedTuple):
@@ -107,8 +96,7 @@ class Whole(Counter[str]):
 class View:
     """An array, or a part of one: a pointer, the place where it begins, its size, and its row length.
 
-    ``roots`` are the names of the pointers that are written to where it is; from the last of them, the
-    pointer is at ``offset``.
+    ``roots`` are the names of the pointers that are written to where it is.
     """
 
     base: str
@@ -116,7 +104,6 @@ class View:
     roots: tuple[str, ...]
     begin: Whole = field(default_factory=Whole)
     columns: Value | None = None
-    offset: Whole = field(default_factory=Whole)
 
     def place(self) -> str:
         """Return the pointer to its first number."""
@@ -143,16 +130,12 @@ class Parameter(NamedTuple):
 
 @dataclass
 class Function:
-    """A function of C: its name, what it takes and returns, which arrays it writes to, and its text.
-
-    ``apart`` are the arrays between which it copies, so that they may not overlap.
-    """
+    """A function of C: its name, what it takes and returns, which arrays it writes to, and its text."""
 
     name: str
     returns: list[str]
     parameters: list[Parameter] = field(default_factory=list)
     written: set[str] = field(default_factory=set)
-    apart: set[tuple[str, str]] = field(default_factory=set)
     text: str = ""
 
     def call(self, *arguments: tuple[str, int]) -> str:
@@ -180,7 +163,7 @@ class Translation:
         self._open: list[Source] = []
         self._locals: set[str] = set()
 
-    def add(self, kernel: Kernel, bound: tuple[tuple[str, Any], ...] = ()) -> Function:
+    def add(self, kernel: Any, bound: tuple[tuple[str, Any], ...] = ()) -> Function:
         """Return the function of a kernel, added with those that it calls if it is new.
 
         ``bound`` is, by parameter, the kernel that it is called with, or how many arrays of a tuple. A
@@ -233,6 +216,8 @@ class _Translator:
         self.body = list(source.body)
         self._parameters()
         self.lines: list[str] = []
+        self.breaks: list[set[str]] = []
+        given = {*source.given, *self.arrays}
         before: list[str] | None = None
         while before != self.lines:
             before, self.lines = self.lines, []
@@ -243,12 +228,11 @@ class _Translator:
             self.declared: dict[int, list[str]] = {}
             for name in sorted(source.stored.keys() - taken):
                 self.declared.setdefault(id(_declaring(self.body, name)), []).append(name)
+            self.known = {*given}
             self._block(self.body)
-        if source.follow(source.body, {*source.given}) is not None and source.returns:
+        if source.returns and RETURNED not in self.known:
             raise self.refusal(source.tree, "a way through without a result", "end with return")
         self._finish()
-
-    # -- parameters --------------------------------------------------------------------------------
 
     def _parameters(self) -> None:
         for place, (arg, kind) in enumerate(self.source.annotations()):
@@ -271,7 +255,10 @@ class _Translator:
         """Return what the arrays of a tuple are called where the body unpacks it, and drop that line."""
         for statement in self.body:
             match statement:
-                case ast.Assign([ast.Tuple(names)], ast.Name(id)) if (id, len(names)) == (name, known):
+                case ast.Assign([ast.Tuple(names)], ast.Name(id)) if (id, len(names)) == (
+                    name,
+                    known,
+                ):
                     self.body.remove(statement)
                     return [ast.unparse(each) for each in names]
         return []
@@ -298,8 +285,6 @@ class _Translator:
     def _spare(self, name: str) -> str:
         self.spares += 1
         return self._made(f"{name}_{self.spares}")
-
-    # -- statements --------------------------------------------------------------------------------
 
     def _emit(self, text: str) -> None:
         """Append a line of C with the statement's comment, behind those that have to be before it."""
@@ -332,6 +317,7 @@ class _Translator:
         match node:
             case ast.Assign(targets=[target]):
                 self._assign(target, node.value)
+                self.known |= used(target, how=ast.Store).keys()
             case ast.AugAssign() if not self._is_array(node.target):
                 place, value = self.value(node.target), self.value(node.value)
                 self.alone = None
@@ -344,14 +330,17 @@ class _Translator:
                 self._branches(node)
             case ast.While(orelse=[]):
                 self._emit(f"while ({self._condition(node.test)}) {{")
-                self._block(node.body)
-                self._emit("}")
+                self._loop(node.body, endless=bool(self.source.number(node.test)))
             case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), arguments), orelse=[]):
                 self._for(node, counter, arguments)
             case ast.Break() | ast.Continue():
                 self._emit(f"{type(node).__name__.lower()};")
+                if isinstance(node, ast.Break):
+                    self.breaks[-1] &= self.known
+                self.known = {*self.source.locals, RETURNED}
             case ast.Return():
                 self._return(node.value)
+                self.known = {*self.source.locals, RETURNED}
             case ast.Expr(value=ast.Call() as call):
                 value = self._call(call)
                 self._emit(f"{'(void)' * bool(value.type)}{value.text};")
@@ -374,16 +363,29 @@ class _Translator:
         return test.text
 
     def _branches(self, node: ast.If) -> None:
+        before = {*self.known}
         self._block(node.body)
+        one, self.known = self.known, before
         match node.orelse:
             case [ast.If() as other] if id(other) not in self.declared:
                 self._emit(f"}} else if ({self._condition(other.test)}) {{")
                 self._branches(other)
-                return
             case [_, *_]:
                 self._emit("} else {")
                 self._block(node.orelse)
+                self._emit("}")
+            case _:
+                self._emit("}")
+        self.known &= one
+
+    def _loop(self, body: Sequence[ast.stmt], *, endless: bool = False) -> None:
+        """Write the body of a loop, and what is known behind it."""
+        before = {*self.known}
+        self.breaks.append({*self.source.locals, RETURNED})
+        self._block(body)
         self._emit("}")
+        left = self.breaks.pop()
+        self.known = left if endless else before
 
     def _for(self, node: ast.For, counter: str, arguments: list[ast.expr]) -> None:
         if counter != "_" and counter in self.types:
@@ -402,8 +404,9 @@ class _Translator:
         test = f"{name} {'>' if stride < 0 else '<'} {high.within(RELATION + 1)}"
         moved = name + {"1": "++", "-1": "--"}.get(step, f" += {step}")
         self._emit(f"for (int {name} = {low.text}; {test}; {moved}) {{")
-        self._block(node.body)
-        self._emit("}")
+        self.known.add(counter)
+        self._loop(node.body)
+        self.known.discard(counter)
         self.types.pop(counter, None)
 
     def _return(self, value: ast.expr | None) -> None:
@@ -416,8 +419,6 @@ class _Translator:
         for name, text in zip(self.results, texts[1:], strict=False):
             self._emit(f"*{name} = {text};")
         self._emit(f"return {texts[0]};" if texts else "return;")
-
-    # -- assignments -------------------------------------------------------------------------------
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         match target, value:
@@ -451,35 +452,22 @@ class _Translator:
 
     def _reads(self, value: ast.expr, target: ast.expr) -> bool:
         """Return whether a value may read what is assigned to a target."""
-        names = {name.id for name in names_in(value)}
         if isinstance(target, ast.Name):
-            return target.id in names
+            return target.id in used(value)
         own = self.view(target if self._is_array(target) else target.value)  # type: ignore[attr-defined]
-        read = (self.arrays.get(name, []) for name in names)
-        views = [view for found in read for view in (found if isinstance(found, list) else [found])]
-        return not all(self._apart(own, view) for view in views)
+        return not self._roots(used(value)).isdisjoint(own.roots)
 
-    def _apart(self, one: View, other: View) -> bool:
-        """Return whether two parts surely have no number in common, as callers see to of arguments.
-
-        Sizes, and places where parts begin, are not negative.
-        """
-        names = one.roots[-1], other.roots[-1]
-        if names[0] != names[1]:
-            self.function.apart.add(names)
-            return True
-        ahead = other.offset.plus(other.begin).plus(one.offset, -1).plus(one.begin, -1)
-        gaps = ahead.plus(one.size, -1), Whole().plus(ahead, -1).plus(other.size, -1)
-        views = (view for view in self.arrays.values() if isinstance(view, View))
-        sizes = [{*whole} for view in views for whole in (view.size, view.offset)]
-        return any(
-            all(n > 0 and (not term or {term} in sizes) for term, n in gap.items()) for gap in gaps
-        )
+    def _roots(self, names: Iterable[str]) -> set[str]:
+        """Return the pointers to where arrays of some names are."""
+        found = [self.arrays[name] for name in names if name in self.arrays]
+        views = (view for each in found for view in (each if isinstance(each, list) else [each]))
+        return {root for view in views for root in view.roots}
 
     def _set(self, target: ast.expr, value: Value) -> None:
         opening = ""
         self._learn(target, value.type)
         if isinstance(target, ast.Name):
+            self.known.add(target.id)
             if target.id == "_":
                 self._emit(f"(void){value.text};")
                 return
@@ -495,10 +483,10 @@ class _Translator:
         if isinstance(target, ast.Name) and target.id in self.source.counters - {"_"}:
             raise self.refusal(target, f"{target.id!r} counted and assigned", "use two names")
         if isinstance(target, ast.Name):
-            self.types[target.id] = widest = _widest(self.types.get(target.id, BOOL), kind)
-            annotated = next((each.type for each in self.given if each.name == target.id), widest)
-            if annotated != widest:
-                raise self.refusal(target, *WIDER[annotated])
+            before = self.types.get(target.id, BOOL)
+            self.types[target.id] = _widest(before, kind)
+            if target.id in self.source.given and self.types[target.id] != before:
+                raise self.refusal(target, f"a {kind} in the {before} {target.id!r}", FITTING)
         elif isinstance(target, ast.Subscript):
             self.function.written |= {*self.view(target.value).roots}
 
@@ -511,7 +499,7 @@ class _Translator:
             raise self.refusal(target, f"a result in {ast.unparse(target)!r}", "name it anew")
         if target.id in self.fresh:
             self._declare(target.id)
-        return f"&{self.value(target).text}"
+        return f"&{self._safe(target.id)}"
 
     def _unused(self, kind: str) -> str:
         """Return a pointer for a result that is not needed."""
@@ -522,7 +510,7 @@ class _Translator:
     def _name_view(self, target: ast.Name, view: View) -> None:
         if target.id in self.source.changing:
             raise self.refusal(target, f"two arrays called {target.id!r}", "use two names")
-        name, offset = self._safe(target.id), view.offset.plus(view.begin)
+        name = self._safe(target.id)
         const = "" if target.id in self.function.written else "const "
         self._emit(f"{const}mck_real *{name} = {view.place()};")
         size, columns = view.size, view.columns
@@ -530,10 +518,7 @@ class _Translator:
             size = Whole([self._kept(f"{name}_size", size.value()).text])
         if columns and self._changes(columns.text):
             columns = self._kept(f"{name}_columns", columns)
-        if self._changes(offset.value().text):
-            offset = Whole([name])
-        roots = (target.id, *view.roots)
-        self.arrays[target.id] = View(name, size, roots, columns=columns, offset=offset)
+        self.arrays[target.id] = View(name, size, (target.id, *view.roots), columns=columns)
 
     def _kept(self, name: str, value: Value) -> Value:
         """Return a whole number as it is now, under a name."""
@@ -542,18 +527,19 @@ class _Translator:
 
     def _changes(self, text: str, loop: ast.For | None = None) -> bool:
         """Return whether what a text of C computes may be another number later, or in a loop."""
-        stored = {name.id for name in names_in(loop) if isinstance(name.ctx, ast.Store)}
-        changing = {*map(self._safe, stored if loop else self.source.changing)}
+        stored = used(loop, how=ast.Store) if loop else self.source.changing
         words = {*re.findall(r"\w+", text)}
-        views = [view for view in self.arrays.values() if isinstance(view, View)]
-        roots = {root for view in views if view.base in words for root in view.roots}
-        return bool(words & changing or roots & self.function.written)
+        read = self._roots(name for name in self.arrays if self._safe(name) in words)
+        return bool(words & {*map(self._safe, stored)} or read & self.function.written)
 
     def _fill(self, target: ast.expr, value: ast.expr) -> None:
         view, k = self.view(target), self._spare("k")
         if self._is_array(value):
-            if not self._apart(view, self.view(value)):
-                raise self.refusal(value, "a copy between parts that may overlap", "write a loop")
+            if not {*view.roots}.isdisjoint(self.view(value).roots):
+                places = f"{view.place()}, {self.view(value).place()}"
+                self._emit(f"mck_copy({places}, {view.size.value().text});")
+                self.function.written |= {*view.roots}
+                return
             given = self.view(value).element(Whole([k])).text
         else:
             given = self.value(value).to(REAL).text
@@ -565,8 +551,6 @@ class _Translator:
         self._emit(f"    {view.element(Whole([k])).text} = {given};")
         self._emit("}")
         self.function.written |= {*view.roots}
-
-    # -- arrays ------------------------------------------------------------------------------------
 
     def _is_array(self, node: ast.expr) -> bool:
         """Return whether an expression is an array, or a part of one."""
@@ -580,6 +564,7 @@ class _Translator:
     def view(self, node: ast.expr) -> View:
         """Return the array that an expression is."""
         if isinstance(node, ast.Name) and isinstance(found := self.arrays.get(node.id), View):
+            self._assigned(node)
             return found
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
             shape = node.args[0] if len(node.args) == 1 else None
@@ -641,8 +626,6 @@ class _Translator:
             raise self.refusal(node, f"{ast.unparse(node)!r}", "use one place")
         return base.element(self._product(at.elts[0], base.columns).plus(self._whole(at.elts[1])))
 
-    # -- numbers -----------------------------------------------------------------------------------
-
     def value(self, node: ast.expr) -> Value:
         """Return a number as C."""
         match node:
@@ -687,20 +670,33 @@ class _Translator:
         """Return a number as one of a type, which has to hold it."""
         value = self.value(node)
         if _widest(value.type, kind) != kind:
-            raise self.refusal(node, *WIDER[kind])
+            raise self.refusal(
+                node, f"the {value.type} {ast.unparse(node)!r} for a {kind}", FITTING
+            )
         return value.to(kind)
 
     def _name(self, node: ast.Name) -> Value:
         name = node.id
-        if name in self.types or name in self.source.stored:
+        if name in self.source.locals - self.arrays.keys():
+            self._assigned(node)
             return Value(self._safe(name), ATOM, self.types.get(name, BOOL))
         known = self.source.number(node)
         if known is None:
             instead = "use numbers, arguments and constants of the module"
             raise self.refusal(node, f"the name {name!r}", instead)
         single = self.source.single(name) if self.whole.single else None
-        found = Value(literal(single, single=True), ATOM, REAL) if single else self._written(known, node)
+        found = (
+            Value(literal(single, single=True), ATOM, REAL)
+            if single
+            else self._written(known, node)
+        )
         return found._replace(text=self.whole.constant(name.strip("_").upper(), found.text))
+
+    def _assigned(self, node: ast.Name) -> None:
+        """Refuse a name that has no value on some way to here."""
+        if node.id not in self.known:
+            what = f"{node.id!r} where it may not be assigned"
+            raise self.refusal(node, what, "assign it before the branch or loop")
 
     def _written(self, number: int | float, node: ast.AST) -> Value:
         """Return a number in C, or refuse one that it does not hold."""
@@ -750,8 +746,6 @@ class _Translator:
             links.append(Value(text, EQUAL if word in ("==", "!=") else RELATION, BOOL))
         both = " && ".join(each.text for each in links)
         return links[0] if len(links) == 1 else Value(both, AND, BOOL)
-
-    # -- calls -------------------------------------------------------------------------------------
 
     def _function(self, node: ast.Call) -> Value:
         name = ast.unparse(node.func)
@@ -824,7 +818,6 @@ class _Translator:
         return Value(f"{callee.name}({texts})", ATOM, next(iter(callee.returns), ""))
 
     def _arguments(self, node: ast.Call, callee: Function) -> Iterator[str]:
-        passed: dict[str, View] = {}
         for each in callee.parameters:
             given = node.args[each.place]
             if not each.asks:
@@ -832,7 +825,7 @@ class _Translator:
                 continue
             items = self._meaning(given)
             item = items[each.item] if isinstance(items, list) else given
-            view = passed[each.name] = item if isinstance(item, View) else self.view(item)
+            view = item if isinstance(item, View) else self.view(item)
             if each.name in callee.written:
                 self.function.written |= {*view.roots}
             if each.asks == "itself":
@@ -843,8 +836,6 @@ class _Translator:
                 yield view.columns.text
             else:
                 raise self.refusal(given, "an array without rows here", "reshape it")
-        if not all(self._apart(passed[one], passed[other]) for one, other in callee.apart):
-            raise self.refusal(node, "parts that may overlap and are copied", "pass different arrays")
 
     def _accumulate(self, total: ast.expr, change: ast.expr, lost: ast.expr, at: ast.expr) -> Value:
         """Return a sum, which in single precision carries what rounding loses."""
@@ -854,8 +845,6 @@ class _Translator:
         element = self._item(ast.Subscript(lost, at))
         self._learn(ast.Subscript(lost, at), REAL)
         return Value(f"mck_sum({one.text}, {other.text}, &{element.text})", ATOM, REAL)
-
-    # -- the whole ---------------------------------------------------------------------------------
 
     def _finish(self) -> None:
         """Write the function: its docstring, its head with the parameters that it needs, its body."""
@@ -874,7 +863,7 @@ class _Translator:
         words += [f"{k} *{n}" for k, n in zip(kinds[1:], self.results, strict=True)]
         kind = next(iter(kinds), "void")
         head = _wrapped(f"static {kind} {function.name}({', '.join(words) or 'void'})")
-        doc = plain(re.sub(r"`+", "`", ast.get_docstring(self.source.tree) or ""))
+        doc = commented(re.sub(r"`+", "`", ast.get_docstring(self.source.tree) or ""))
         about = [f"/* {doc}".replace("\n", "\n * ").replace(" * \n", " *\n") + " */"] if doc else []
         function.text = "\n".join([*about, *head, "{", body, "}", ""])
 
@@ -922,20 +911,15 @@ def _declaring(body: Sequence[ast.stmt], name: str) -> ast.stmt:
 
     It is in the innermost block that has all uses, and before a loop that may carry a value through.
     """
-    uses = [statement for statement in body if _mentions(statement, name)]
+    uses = [statement for statement in body if name in used(statement)]
     first = uses[0]
     blocks = [getattr(first, part, []) for part in ("body", "orelse")]
-    inner = [block for block in blocks if any(_mentions(each, name) for each in block)]
+    inner = [block for block in blocks if name in used(*block)]
     head = getattr(first, "test", getattr(first, "iter", None))
-    if len(uses) > 1 or len(inner) != 1 or (head is not None and _mentions(head, name)):
+    if len(uses) > 1 or len(inner) != 1 or (head is not None and name in used(head)):
         return first
     found = _declaring(inner[0], name)
-    assigns = isinstance(found, ast.Assign) and not _mentions(found, name, ast.Load)
+    assigns = isinstance(found, ast.Assign) and name not in used(found, how=ast.Load)
     if isinstance(first, ast.For | ast.While) and found in inner[0] and not assigns:
         return first
     return found
-
-
-def _mentions(node: ast.AST, name: str, how: type[ast.expr_context] = ast.expr_context) -> bool:
-    names = (each for each in ast.walk(node) if isinstance(each, ast.Name) and each.id == name)
-    return any(isinstance(each.ctx, how) for each in names)

@@ -12,7 +12,7 @@ import io
 import textwrap
 import tokenize
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
 from typing import Any
 
@@ -31,8 +31,6 @@ log log10 log1p log2 pow sin sinh sqrt tan tanh trunc"""
 
 FUNCTIONS = frozenset(_FUNCTIONS.split())
 """Functions of ``math`` that kernels may call."""
-
-Kernel = Callable[..., Any]
 
 
 class KernelError(ModelError):
@@ -60,8 +58,8 @@ class Source:
     ``changing`` have more than one value in a call, and ``counters`` are counted by loops.
     """
 
-    def __init__(self, kernel: Kernel) -> None:
-        self.function = kernel.py_func  # type: ignore[attr-defined]
+    def __init__(self, kernel: Any) -> None:
+        self.function = kernel.py_func
         lines, self._first = inspect.getsourcelines(self.function)
         text = textwrap.dedent("".join(lines))
         tree = ast.parse(text).body[0]
@@ -88,9 +86,7 @@ class Source:
         if given.vararg or given.kwarg or given.kwonlyargs or given.defaults or given.posonlyargs:
             raise self.refusal(self.tree, "default or variable arguments", "name every argument")
         for arg in given.args:
-            if arg.annotation is None:
-                raise self.refusal(arg, f"the argument {arg.arg!r} without a type", "annotate it")
-            yield arg, ast.unparse(arg.annotation)
+            yield arg, ast.unparse(arg.annotation) if arg.annotation else "without a type"
 
     @cached_property
     def returns(self) -> list[str]:
@@ -135,10 +131,8 @@ class Source:
         return SINGLE.get(name)
 
 
-@cache
-def source_of(kernel: Kernel) -> Source:
-    """Return the source of a kernel."""
-    return Source(kernel)
+source_of = cache(Source)
+"""The source of a kernel, read once."""
 
 
 class _WithoutDerivatives(ast.NodeTransformer):

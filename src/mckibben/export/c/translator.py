@@ -14,7 +14,6 @@ from __future__ import annotations
 import ast
 import math
 import re
-import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,10 +22,7 @@ from typing import Any, NamedTuple
 from mckibben.blocks.kernels import accumulate
 from mckibben.export.c.language import BOOL, FUNCTIONS, INT, REAL, TYPES, Source, source_of, used
 from mckibben.export.naming import TAKEN, commented
-from mckibben.export.templating import literal
-
-WIDTH = 100
-"""Columns of a line of C."""
+from mckibben.export.templating import literal, wrapped
 
 LEAST, MOST = 1e-6, 3.4e38
 """Range of the sizes of constants that are the same in both precisions."""
@@ -41,9 +37,6 @@ COMPARISON = dict(zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True
 
 WHOLE = 32767
 """Largest whole number that is written out: each `int` of C holds it, and single precision."""
-
-RETURNED = "return"
-"""What is known behind a return, a break and a continue, with all names: no way leads on from there."""
 
 FITTING = "use int(...) for a whole number, and a comparison for a truth value"
 """What to write instead of a number whose type does not fit."""
@@ -147,12 +140,7 @@ class Function:
 class Translation:
     """Functions of C in the order in which they need one another, and the constants that they use.
 
-    Parameters
-    ----------
-    single : bool
-        In single instead of double precision.
-    taken : iterable of str
-        Names that others have.
+    They are in ``single`` or in double precision, and have names that are not ``taken``.
     """
 
     def __init__(self, *, single: bool = False, taken: Iterable[str] = ()) -> None:
@@ -217,6 +205,7 @@ class _Translator:
         self._parameters()
         self.lines: list[str] = []
         self.breaks: list[set[str]] = []
+        self.nowhere = {*source.locals, "return"}  # known where no way leads on
         given = {*source.given, *self.arrays}
         before: list[str] | None = None
         while before != self.lines:
@@ -230,7 +219,7 @@ class _Translator:
                 self.declared.setdefault(id(_declaring(self.body, name)), []).append(name)
             self.known = {*given}
             self._block(self.body)
-        if source.returns and RETURNED not in self.known:
+        if source.returns and "return" not in self.known:
             raise self.refusal(source.tree, "a way through without a result", "end with return")
         self._finish()
 
@@ -254,13 +243,11 @@ class _Translator:
     def _unpacked(self, name: str, known: int) -> list[str]:
         """Return what the arrays of a tuple are called where the body unpacks it, and drop that line."""
         for statement in self.body:
-            match statement:
-                case ast.Assign([ast.Tuple(names)], ast.Name(id)) if (id, len(names)) == (
-                    name,
-                    known,
-                ):
+            if isinstance(statement, ast.Assign) and ast.unparse(statement.value) == name:
+                names = [ast.unparse(n) for n in getattr(statement.targets[0], "elts", [])]
+                if len(names) == known:
                     self.body.remove(statement)
-                    return [ast.unparse(each) for each in names]
+                    return names
         return []
 
     def _array(self, name: str, place: int, item: int) -> View:
@@ -291,7 +278,7 @@ class _Translator:
         words, self.comment = f" /* {self.comment} */" if self.comment else "", ""
         pending, self.pending = self.pending, []
         for line in (*pending, text + words):
-            self.lines += _wrapped("    " * self.depth + line)
+            self.lines += wrapped("    " * self.depth + line)
 
     def _block(self, body: Sequence[ast.stmt]) -> None:
         self.depth += 1
@@ -313,23 +300,21 @@ class _Translator:
     def _statement(self, node: ast.stmt) -> None:
         if not isinstance(node, ast.Assign):
             self._declare(*self.fresh)
-        self.alone = _whole_of(getattr(node, "value", None))
+        self.alone = _alone(node)
         match node:
             case ast.Assign(targets=[target]):
                 self._assign(target, node.value)
                 self.known |= used(target, how=ast.Store).keys()
             case ast.AugAssign() if not self._is_array(node.target):
                 place, value = self.value(node.target), self.value(node.value)
-                self.alone = None
                 self._learn(node.target, kind := self._arithmetic(node, place, value).type)
                 word = ARITHMETIC[type(node.op)]
                 self._emit(f"{place.text} {word}= {value.to(kind).text};")
             case ast.If():
-                self.alone = _whole_of(node.test)
                 self._emit(f"if ({self.value(node.test).text}) {{")
                 self._branches(node)
             case ast.While(orelse=[]):
-                self._emit(f"while ({self._condition(node.test)}) {{")
+                self._emit(f"while ({self._condition(node)}) {{")
                 self._loop(node.body, endless=bool(self.source.number(node.test)))
             case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), arguments), orelse=[]):
                 self._for(node, counter, arguments)
@@ -337,10 +322,10 @@ class _Translator:
                 self._emit(f"{type(node).__name__.lower()};")
                 if isinstance(node, ast.Break):
                     self.breaks[-1] &= self.known
-                self.known = {*self.source.locals, RETURNED}
+                self.known = {*self.nowhere}
             case ast.Return():
                 self._return(node.value)
-                self.known = {*self.source.locals, RETURNED}
+                self.known = {*self.nowhere}
             case ast.Expr(value=ast.Call() as call):
                 value = self._call(call)
                 self._emit(f"{'(void)' * bool(value.type)}{value.text};")
@@ -354,12 +339,12 @@ class _Translator:
             self.fresh.discard(name)
             self.pending.append(f"{TYPES[self.types.get(name, BOOL)]} {self._safe(name)};")
 
-    def _condition(self, node: ast.expr) -> str:
+    def _condition(self, node: ast.If | ast.While) -> str:
         """Return a condition before which nothing can be computed."""
-        before, self.alone = len(self.pending), _whole_of(node)
-        test = self.value(node)
+        before, self.alone = len(self.pending), _alone(node)
+        test = self.value(node.test)
         if len(self.pending) > before:
-            raise self.refusal(node, "this condition", "call the kernel before it")
+            raise self.refusal(node.test, "this condition", "call the kernel before it")
         return test.text
 
     def _branches(self, node: ast.If) -> None:
@@ -368,20 +353,19 @@ class _Translator:
         one, self.known = self.known, before
         match node.orelse:
             case [ast.If() as other] if id(other) not in self.declared:
-                self._emit(f"}} else if ({self._condition(other.test)}) {{")
+                self._emit(f"}} else if ({self._condition(other)}) {{")
                 self._branches(other)
-            case [_, *_]:
-                self._emit("} else {")
-                self._block(node.orelse)
-                self._emit("}")
-            case _:
+            case orelse:
+                if orelse:
+                    self._emit("} else {")
+                self._block(orelse)
                 self._emit("}")
         self.known &= one
 
     def _loop(self, body: Sequence[ast.stmt], *, endless: bool = False) -> None:
         """Write the body of a loop, and what is known behind it."""
         before = {*self.known}
-        self.breaks.append({*self.source.locals, RETURNED})
+        self.breaks.append({*self.nowhere})
         self._block(body)
         self._emit("}")
         left = self.breaks.pop()
@@ -454,8 +438,7 @@ class _Translator:
         """Return whether a value may read what is assigned to a target."""
         if isinstance(target, ast.Name):
             return target.id in used(value)
-        own = self.view(target if self._is_array(target) else target.value)  # type: ignore[attr-defined]
-        return not self._roots(used(value)).isdisjoint(own.roots)
+        return bool(self._roots(used(target)) & self._roots(used(value)))
 
     def _roots(self, names: Iterable[str]) -> set[str]:
         """Return the pointers to where arrays of some names are."""
@@ -515,15 +498,12 @@ class _Translator:
         self._emit(f"{const}mck_real *{name} = {view.place()};")
         size, columns = view.size, view.columns
         if self._changes(size.value().text):
-            size = Whole([self._kept(f"{name}_size", size.value()).text])
+            held = self._made(f"{name}_size")
+            self._emit(f"const int {held} = {size.value().text};")  # as it is now
+            size = Whole([held])
         if columns and self._changes(columns.text):
-            columns = self._kept(f"{name}_columns", columns)
+            raise self.refusal(target, "rows of a length that changes", "assign the length once")
         self.arrays[target.id] = View(name, size, (target.id, *view.roots), columns=columns)
-
-    def _kept(self, name: str, value: Value) -> Value:
-        """Return a whole number as it is now, under a name."""
-        self._emit(f"const int {(name := self._made(name))} = {value.text};")
-        return Value(name)
 
     def _changes(self, text: str, loop: ast.For | None = None) -> bool:
         """Return whether what a text of C computes may be another number later, or in a loop."""
@@ -534,11 +514,11 @@ class _Translator:
 
     def _fill(self, target: ast.expr, value: ast.expr) -> None:
         view, k = self.view(target), self._spare("k")
+        self.function.written |= {*view.roots}
         if self._is_array(value):
             if not {*view.roots}.isdisjoint(self.view(value).roots):
                 places = f"{view.place()}, {self.view(value).place()}"
                 self._emit(f"mck_copy({places}, {view.size.value().text});")
-                self.function.written |= {*view.roots}
                 return
             given = self.view(value).element(Whole([k])).text
         else:
@@ -550,7 +530,6 @@ class _Translator:
         self._emit(f"for (int {k} = 0; {k} < {size}; {k}++) {{")
         self._emit(f"    {view.element(Whole([k])).text} = {given};")
         self._emit("}")
-        self.function.written |= {*view.roots}
 
     def _is_array(self, node: ast.expr) -> bool:
         """Return whether an expression is an array, or a part of one."""
@@ -670,9 +649,8 @@ class _Translator:
         """Return a number as one of a type, which has to hold it."""
         value = self.value(node)
         if _widest(value.type, kind) != kind:
-            raise self.refusal(
-                node, f"the {value.type} {ast.unparse(node)!r} for a {kind}", FITTING
-            )
+            what = f"the {value.type} {ast.unparse(node)!r} for a {kind}"
+            raise self.refusal(node, what, FITTING)
         return value.to(kind)
 
     def _name(self, node: ast.Name) -> Value:
@@ -685,11 +663,10 @@ class _Translator:
             instead = "use numbers, arguments and constants of the module"
             raise self.refusal(node, f"the name {name!r}", instead)
         single = self.source.single(name) if self.whole.single else None
-        found = (
-            Value(literal(single, single=True), ATOM, REAL)
-            if single
-            else self._written(known, node)
-        )
+        if single is None:
+            found = self._written(known, node)
+        else:
+            found = Value(literal(single, single=True), ATOM, REAL)
         return found._replace(text=self.whole.constant(name.strip("_").upper(), found.text))
 
     def _assigned(self, node: ast.Name) -> None:
@@ -735,9 +712,8 @@ class _Translator:
             each = [ast.Compare(node.left, [ast.Eq()], [one]) for one in choices]
             return self.value(ast.copy_location(ast.BoolOp(ast.Or(), [*each]), node))
         links = []
-        for op, left, right in zip(
-            node.ops, [node.left, *node.comparators], node.comparators, strict=False
-        ):
+        lefts = [node.left, *node.comparators]
+        for op, left, right in zip(node.ops, lefts, node.comparators, strict=False):
             if type(op) not in COMPARISON:
                 raise self.refusal(node, "this comparison", "use < <= > >= == != or in")
             one, other, _ = _alike(self.value(left), self.value(right))
@@ -783,17 +759,12 @@ class _Translator:
         if not hasattr(kernel, "py_func"):
             what = f"a call of {ast.unparse(node.func)}()"
             raise self.refusal(node, what, "call kernels, min, max, abs, math.…")
-        names = [arg.arg for arg in source_of(kernel).tree.args.args]
+        names = source_of(kernel).given
         if len(names) != len(node.args) or node.keywords:
             raise self.refusal(node, "arguments by name", "give every argument by its place")
-        bound: list[tuple[str, Any]] = []
-        for parameter, given in zip(names, node.args, strict=True):
-            known = self._meaning(given)
-            if isinstance(known, list):
-                bound.append((parameter, len(known)))
-            elif hasattr(known, "py_func"):
-                bound.append((parameter, known))
-        return self.whole.add(kernel, tuple(bound))
+        known = zip(names, map(self._meaning, node.args), strict=True)
+        bound = [(name, len(each) if isinstance(each, list) else each) for name, each in known]
+        return self.whole.add(kernel, tuple(each for each in bound if each[1] is not None))
 
     def _meaning(self, node: ast.expr) -> Any:
         """Return the kernel that a name means, or the arrays of a tuple; None for all else."""
@@ -801,9 +772,9 @@ class _Translator:
             return node.elts
         if not isinstance(node, ast.Name) or node.id in self.types:
             return None
-        if node.id in self.arrays:
-            return self.arrays[node.id]
-        return self.bound.get(node.id, self.source.globals.get(node.id))
+        known = self.bound.get(node.id, self.source.globals.get(node.id))
+        arrays = self.arrays.get(node.id)
+        return arrays if isinstance(arrays, list) else known if hasattr(known, "py_func") else None
 
     def _call(self, node: ast.Call, pointers: Sequence[str] = ()) -> Value:
         """Return a call, whose results behind the first go where pointers say, or nowhere."""
@@ -856,13 +827,13 @@ class _Translator:
             if re.search(rf"\b{name}\b", body):
                 function.parameters.append(each)
                 const = "const " * (each.name not in function.written)
-                kind = TYPES[each.type]
-                kind = f"{const}{kind} *" if each.asks == "itself" else f"{kind} "
-                words.append(kind + name)
-        kinds = [TYPES[kind] for kind in function.returns]
-        words += [f"{k} *{n}" for k, n in zip(kinds[1:], self.results, strict=True)]
-        kind = next(iter(kinds), "void")
-        head = _wrapped(f"static {kind} {function.name}({', '.join(words) or 'void'})")
+                pointer = each.asks == "itself"
+                words.append(
+                    f"{const}mck_real *{name}" if pointer else f"{TYPES[each.type]} {name}"
+                )
+        kind, *kinds = [TYPES[each] for each in function.returns] or ["void"]
+        words += [f"{each} *{name}" for each, name in zip(kinds, self.results, strict=True)]
+        head = wrapped(f"static {kind} {function.name}({', '.join(words) or 'void'})")
         doc = commented(re.sub(r"`+", "`", ast.get_docstring(self.source.tree) or ""))
         about = [f"/* {doc}".replace("\n", "\n * ").replace(" * \n", " *\n") + " */"] if doc else []
         function.text = "\n".join([*about, *head, "{", body, "}", ""])
@@ -879,19 +850,14 @@ def _widest(*kinds: str) -> str:
     return max(kinds, key=[*TYPES].index)
 
 
-def _whole_of(node: ast.expr | None) -> ast.expr | None:
-    """Return the part of a value that is computed first and once."""
-    while isinstance(node, ast.UnaryOp | ast.Subscript):
-        node = node.operand if isinstance(node, ast.UnaryOp) else node.value
-    return node
-
-
-def _wrapped(line: str) -> list[str]:
-    """Return a line of C as lines that are short enough."""
-    rest = " " * (len(line) - len(line.lstrip()) + 8)
-    line = re.sub(r"(const|mck_real|int) (?=\*?\w)", "\\1\u00a0", line)  # types stay with names
-    lines = textwrap.wrap(line, WIDTH, subsequent_indent=rest, break_on_hyphens=False)
-    return [each.replace("\u00a0", " ") for each in lines]
+def _alone(node: ast.stmt) -> ast.expr | None:
+    """Return the part of a statement that is computed before all else and once, as in Python."""
+    value = getattr(node, "value", getattr(node, "test", None))
+    while isinstance(value, ast.UnaryOp | ast.Subscript):
+        value = value.operand if isinstance(value, ast.UnaryOp) else value.value
+    targets = (each for target in getattr(node, "targets", []) for each in ast.walk(target))
+    places = [each for each in targets if isinstance(each, ast.Subscript)]
+    return None if isinstance(node, ast.AugAssign) or len(places) > 1 else value
 
 
 def _without_idle(text: str) -> str:

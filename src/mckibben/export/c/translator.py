@@ -38,8 +38,8 @@ COMPARISON = dict(zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True
 WHOLE = 32767
 """Largest whole number that is written out: each `int` of C holds it, and single precision."""
 
-FITTING = "use int(...) for a whole number, and a comparison for a truth value"
-"""What to write instead of a number whose type does not fit."""
+FITTING = {INT: "take int(...) of it", BOOL: "compare it"}
+"""What to write instead of a number that a type does not hold."""
 
 
 class Value(NamedTuple):
@@ -469,7 +469,7 @@ class _Translator:
             before = self.types.get(target.id, BOOL)
             self.types[target.id] = _widest(before, kind)
             if target.id in self.source.given and self.types[target.id] != before:
-                raise self.refusal(target, f"a {kind} in the {before} {target.id!r}", FITTING)
+                raise self.refusal(target, f"the {kind} in {target.id!r}", "use two names")
         elif isinstance(target, ast.Subscript):
             self.function.written |= {*self.view(target.value).roots}
 
@@ -649,8 +649,8 @@ class _Translator:
         """Return a number as one of a type, which has to hold it."""
         value = self.value(node)
         if _widest(value.type, kind) != kind:
-            what = f"the {value.type} {ast.unparse(node)!r} for a {kind}"
-            raise self.refusal(node, what, FITTING)
+            what = f"{ast.unparse(node)!r}, of type {value.type}, for {kind}"
+            raise self.refusal(node, what, FITTING[kind])
         return value.to(kind)
 
     def _name(self, node: ast.Name) -> Value:

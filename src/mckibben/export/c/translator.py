@@ -376,10 +376,10 @@ class _Translator:
             raise self.refusal(node, f"{counter!r} for a counter in here", "use another name")
         self.types[counter] = INT
         low, high = [Value("0"), *(self._as(each, INT) for each in arguments[:2])][-2:]
-        stride = self.source.number(arguments[2]) if len(arguments) == 3 else 1
-        if not isinstance(stride, int) or stride == 0:
-            raise self.refusal(node, f"the step {ast.unparse(arguments[2])!r}", "write a number")
-        step = self.value(arguments[2]).text if len(arguments) == 3 else "1"
+        by = arguments[2] if len(arguments) == 3 else ast.Constant(1)
+        step, stride = self._as(by, INT).text, self.source.number(by)
+        if not stride:
+            raise self.refusal(node, f"the step {ast.unparse(by)!r}", "write a number")
         if "(" in high.text or self._changes(high.text, node):
             end = self._spare("end")
             self._emit(f"const int {end} = {high.text};")
@@ -422,8 +422,13 @@ class _Translator:
                 self._set(target, self.value(value))
 
     def _assign_several(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> None:
-        late = (self._reads(v, t) for k, v in enumerate(values) for t in targets[:k])
-        if not any(late):
+        before = [(target, value) for k, value in enumerate(values) for target in targets[:k]]
+        if not any(
+            target.id in used(value)
+            if isinstance(target, ast.Name)
+            else self._roots(used(target)) & self._roots(used(value))
+            for target, value in before
+        ):
             for target, value in zip(targets, values, strict=True):
                 self._assign(target, value)
             return
@@ -433,12 +438,6 @@ class _Translator:
         self._declare(*self.fresh)
         for target, (name, one) in zip(targets, held, strict=True):
             self._set(target, Value(name, ATOM, one.type))
-
-    def _reads(self, value: ast.expr, target: ast.expr) -> bool:
-        """Return whether a value may read what is assigned to a target."""
-        if isinstance(target, ast.Name):
-            return target.id in used(value)
-        return bool(self._roots(used(target)) & self._roots(used(value)))
 
     def _roots(self, names: Iterable[str]) -> set[str]:
         """Return the pointers to where arrays of some names are."""
@@ -474,21 +473,17 @@ class _Translator:
             self.function.written |= {*self.view(target.value).roots}
 
     def _pointer(self, target: ast.expr, kind: str) -> str:
-        """Return a pointer to where a result is written."""
+        """Return a pointer to where a result is written; that of `_` is not needed."""
         if isinstance(target, ast.Name) and target.id == "_":
-            return self._unused(kind)
+            name = self._spare("unused")
+            self.pending.append(f"{TYPES[kind]} {name};")
+            return f"&{name}"
         self._learn(target, kind)
         if not isinstance(target, ast.Name) or self.types[target.id] != kind:
             raise self.refusal(target, f"a result in {ast.unparse(target)!r}", "name it anew")
         if target.id in self.fresh:
             self._declare(target.id)
         return f"&{self._safe(target.id)}"
-
-    def _unused(self, kind: str) -> str:
-        """Return a pointer for a result that is not needed."""
-        name = self._spare("unused")
-        self.pending.append(f"{TYPES[kind]} {name};")
-        return f"&{name}"
 
     def _name_view(self, target: ast.Name, view: View) -> None:
         if target.id in self.source.changing:
@@ -567,9 +562,8 @@ class _Translator:
 
     def _at(self, place: ast.expr, size: Whole) -> Whole:
         """Return a place in an array; one below 0 is counted from the end."""
-        found, number = self._whole(place), self.source.number(place)
-        written = isinstance(place, ast.UnaryOp) and isinstance(place.op, ast.USub)
-        return size.plus(found) if written or (number or 0) < 0 else found
+        below = isinstance(place, ast.UnaryOp) or (self.source.number(place) or 0) < 0
+        return size.plus(self._whole(place)) if below else self._whole(place)
 
     def _whole(self, node: ast.expr) -> Whole:
         """Return a whole number as a sum."""
@@ -676,22 +670,17 @@ class _Translator:
             raise self.refusal(node, what, "assign it before the branch or loop")
 
     def _written(self, number: int | float, node: ast.AST) -> Value:
-        """Return a number in C, or refuse one that it does not hold."""
-        if isinstance(number, float):
-            return Value(self._real(number, node), ATOM, REAL)
-        if abs(number) > WHOLE:
-            raise self.refusal(node, f"the whole number {number}", f"write {number}.0")
-        return Value(str(int(number)), ATOM, BOOL if isinstance(number, bool) else INT)
-
-    def _real(self, value: float, node: ast.AST) -> str:
-        """Return a real number in C, or refuse one that single precision does not hold."""
+        """Return a number in C, or refuse one that `int` or single precision does not hold."""
+        if not isinstance(number, float):
+            if abs(number) > WHOLE:
+                raise self.refusal(node, f"the whole number {number}", f"write {number}.0")
+            return Value(str(int(number)), ATOM, BOOL if isinstance(number, bool) else INT)
         kept = self.whole.single or isinstance(node, ast.Constant)
-        if math.isnan(value):
-            return "((mck_real)NAN)"
-        if value and not LEAST < abs(value) < MOST and math.isfinite(value) and kept:
-            what = f"the number {value!r}, which single precision has no room for, or rounds away"
+        if kept and number and math.isfinite(number) and not LEAST < abs(number) < MOST:
+            what = f"the number {number!r}, which single precision has no room for, or rounds away"
             raise self.refusal(node, what, "name it, and add it to the table SINGLE of the module")
-        return literal(value, single=self.whole.single)
+        text = literal(number, single=self.whole.single)
+        return Value("((mck_real)NAN)" if math.isnan(number) else text, ATOM, REAL)
 
     def _arithmetic(self, node: ast.BinOp | ast.AugAssign, one: Value, other: Value) -> Value:
         squared = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
@@ -707,21 +696,21 @@ class _Translator:
         return Value(f"{one.within(binds)} {word} {other.within(binds + 1)}", binds, kind)
 
     def _compare(self, node: ast.Compare) -> Value:
-        if isinstance(node.ops[0], ast.In) and isinstance(node.comparators[0], ast.Tuple):
-            choices = node.comparators[0].elts
-            each = [ast.Compare(node.left, [ast.Eq()], [one]) for one in choices]
-            return self.value(ast.copy_location(ast.BoolOp(ast.Or(), [*each]), node))
-        links = []
         lefts = [node.left, *node.comparators]
-        for op, left, right in zip(node.ops, lefts, node.comparators, strict=False):
-            if type(op) not in COMPARISON:
-                raise self.refusal(node, "this comparison", "use < <= > >= == != or in")
-            one, other, _ = _alike(self.value(left), self.value(right))
-            word = COMPARISON[type(op)]
-            text = f"{one.within(RELATION + 1)} {word} {other.within(RELATION + 1)}"
-            links.append(Value(text, EQUAL if word in ("==", "!=") else RELATION, BOOL))
-        both = " && ".join(each.text for each in links)
-        return links[0] if len(links) == 1 else Value(both, AND, BOOL)
+        links = [*zip(lefts, node.ops, node.comparators, strict=False)]
+        left, op, right = links[0]
+        if isinstance(op, ast.In) and isinstance(right, ast.Tuple):
+            links = [(left, ast.Eq(), each) for each in right.elts]
+        if len(links) > 1:
+            each = [ast.copy_location(ast.Compare(a, [b], [c]), node) for a, b, c in links]
+            either = ast.Or() if isinstance(op, ast.In) else ast.And()
+            return self.value(ast.BoolOp(either, [*each]))
+        if type(op) not in COMPARISON:
+            raise self.refusal(node, "this comparison", "use < <= > >= == != or in")
+        one, other, _ = _alike(self.value(left), self.value(right))
+        word = COMPARISON[type(op)]
+        text = f"{one.within(RELATION + 1)} {word} {other.within(RELATION + 1)}"
+        return Value(text, EQUAL if word in ("==", "!=") else RELATION, BOOL)
 
     def _function(self, node: ast.Call) -> Value:
         name = ast.unparse(node.func)
@@ -784,7 +773,8 @@ class _Translator:
             raise self.refusal(node, what, "name its result first, x = f(a)")
         if callee is None:
             return self._accumulate(*node.args)
-        pointers = pointers or [self._unused(kind) for kind in callee.returns[1:]]
+        nowhere = ast.Name("_", ast.Store())
+        pointers = pointers or [self._pointer(nowhere, kind) for kind in callee.returns[1:]]
         texts = ", ".join([*self._arguments(node, callee), *pointers])
         return Value(f"{callee.name}({texts})", ATOM, next(iter(callee.returns), ""))
 
@@ -799,14 +789,11 @@ class _Translator:
             view = item if isinstance(item, View) else self.view(item)
             if each.name in callee.written:
                 self.function.written |= {*view.roots}
-            if each.asks == "itself":
-                yield view.place()
-            elif each.asks == "size":
-                yield view.size.value().text
-            elif view.columns is not None:
-                yield view.columns.text
-            else:
+            if each.asks == "columns" and view.columns is None:
                 raise self.refusal(given, "an array without rows here", "reshape it")
+            columns = view.columns.text if view.columns else ""
+            size = view.size.value().text
+            yield {"itself": view.place(), "size": size, "columns": columns}[each.asks]
 
     def _accumulate(self, total: ast.expr, change: ast.expr, lost: ast.expr, at: ast.expr) -> Value:
         """Return a sum, which in single precision carries what rounding loses."""
@@ -863,13 +850,10 @@ def _alone(node: ast.stmt) -> ast.expr | None:
 def _without_idle(text: str) -> str:
     """Return a body without constants that only sizes were read from, which C does not need."""
     pattern = re.compile(r"^ *const (?:int|mck_real) \*?(\w+) = (?:(?!\w\()[^;])*;\n?", re.M)
-    while True:
-        for found in pattern.finditer(text):
-            if len(re.findall(rf"\b{found[1]}\b", text)) == 1:
-                text = text.replace(found[0], "", 1)
-                break
-        else:
-            return text
+    for found in pattern.finditer(text):
+        if len(re.findall(rf"\b{found[1]}\b", text)) == 1:
+            return _without_idle(text.replace(found[0], "", 1))
+    return text
 
 
 def _declaring(body: Sequence[ast.stmt], name: str) -> ast.stmt:

@@ -254,3 +254,242 @@ REFUSED = {
     takes_text: 0,
 }
 """Kernels outside the language, and the line behind ``def`` that is."""
+
+DOWN, LAST, MANY = -1, -1, 3_000_000_000
+
+
+@kernel
+def moved(a: Array) -> float:
+    a[0] += 0.3
+    return a[0]
+
+
+@kernel
+def moved_and_told(a: Array) -> tuple[float, int]:
+    a[0] += 0.3
+    return a[0], int(a[1])
+
+
+@kernel
+def counts_down_by_name(a: Array) -> float:
+    y = 0.0
+    for i in range(2, -1, DOWN):
+        y = 10.0 * y + a[i]
+    return y + a[LAST]
+
+
+@kernel
+def shifts_up(a: Array) -> float:
+    a[1:] = a[:-1]
+    return a[2]
+
+
+@kernel
+def shifts_down(a: Array) -> float:
+    rest = a[1:]
+    a[:-1] = rest
+    return a[0]
+
+
+@kernel
+def stands_alone(a: Array) -> float:
+    y, n = moved_and_told(a)
+    x = -moved(a)
+    if not moved(a):
+        y = 0.0
+    a[n] = moved(a)
+    return x + y
+
+
+@kernel
+def has_derivatives_and_else(a: Array) -> float:
+    if DERIVED and a[0] > 0.0:
+        a[0] = 0.0
+    elif a[0] > 0.0:
+        a[0] = 5.0
+    if DERIVED or a[1] > 0.0:
+        a[1] = 7.0
+    return a[0]
+
+
+@kernel
+def assigns_what_it_reads(a: Array) -> float:
+    n = 0
+    part = a[1:]
+    a[1], y = 5.0, part[n]
+    a[0], a[2] = a[2], a[n]
+    return y
+
+
+@kernel
+def shortens(n: int, a: Array) -> float:
+    part = a[:n]
+    n = 1
+    return 10.0 * part.size + n
+
+
+@kernel
+def keeps_sizes(a: Array) -> float:
+    part = a[: int(a[1])]
+    a[1] = 0.0
+    return part.size + shortens(3, a)
+
+
+@kernel
+def is_full_of_names(a: Array) -> float:
+    """Names that C has */ /* already??/"""
+    NULL, M_PI, INFINITY, mck_real, DOWN_ = 1.0, 2.0, 3.0, 4.0, 5.0
+    k_1, div, div_, a_size, result_2 = 6.0, 7.0, 8.0, 9.0, 10.0  # a comment */ ends /* here
+    a[:] = NULL
+    rint, isnan, hypot = M_PI + INFINITY, mck_real + DOWN_, k_1 + div * div_ + a_size * DOWN
+    return rint + isnan * hypot + result_2 * a.size
+
+
+@kernel
+def leaves_in_many_ways(a: Array) -> float:
+    k = 0
+    while True:
+        if a[k] > 1.0:
+            y = a[k]
+            break
+        if k == 2:
+            return -1.0
+        k += 1
+    if y > 2.0:
+        y, z = 2.0, 1.0
+    else:
+        z = math.floor(y)
+    for _ in range(int(y)):
+        z += 1.0
+    return z
+
+
+@kernel
+def compares_in_a_chain(a: Array) -> float:
+    return 1.0 if 0.5 < moved(a) < 1.0 else 0.0
+
+
+@kernel
+def assigns_twice(a: Array) -> float:
+    x = y = moved(a)
+    return x + y
+
+
+@kernel
+def subtracts_what_moved(a: Array) -> float:
+    return moved(a) - 10.0 * a[0]
+
+
+@kernel
+def adds_what_moved(a: Array) -> float:
+    a[0] += moved(a)
+    return a[0]
+
+
+@kernel
+def puts_where_it_moved(a: Array) -> float:
+    a[int(a[0])] = moved(a)
+    return a[0]
+
+
+@kernel
+def tells_an_array(a: Array) -> float:
+    x, a[2] = moved_and_told(a)
+    return x
+
+
+@kernel
+def chooses_a_count(a: Array) -> float:
+    n = int(a[1])
+    return 1.0 * (n or 7)
+
+
+@kernel
+def returns_a_floor(a: Array) -> int:
+    return math.floor(a[1])
+
+
+@kernel
+def indexes_by_a_floor(a: Array) -> float:
+    n = math.floor(a[1])
+    return a[n]
+
+
+@kernel  # noqa: RET503
+def ends_without_a_result(a: Array) -> float:  # type: ignore[return]
+    while a[0] < 1.0:
+        if a[0] > 0.0:
+            return a[0]
+
+
+@kernel
+def assigns_in_one_branch(a: Array) -> float:
+    if a[0] > 0.0:
+        y = 1.0
+    return y
+
+
+@kernel
+def names_a_part_in_a_loop(a: Array) -> float:
+    for k in range(int(a[1])):
+        part = a[k:]
+    return part[0]
+
+
+@kernel
+def multiplies_by_a_million(a: Array) -> float:
+    return 1.0 * int(a[2]) * 1_000_000
+
+
+@kernel
+def counts_beyond_c(a: Array) -> float:
+    return a[0] * MANY
+
+
+@kernel
+def counts_beyond_single(a: Array) -> float:
+    return a[0] + 16_777_217
+
+
+@kernel
+def halves_a_count(n: int) -> float:
+    n = n / 2  # type: ignore[assignment]
+    return n + 1.0
+
+
+@kernel
+def stays(a: Array) -> float:
+    for i in range(0, 3, 0):
+        a[i] = 1.0
+    return a[0]
+
+
+EDGES: dict[Any, int | None] = {
+    counts_down_by_name: None,
+    shifts_up: None,
+    shifts_down: None,
+    stands_alone: None,
+    has_derivatives_and_else: None,
+    assigns_what_it_reads: None,
+    keeps_sizes: None,
+    is_full_of_names: None,
+    leaves_in_many_ways: None,
+    compares_in_a_chain: 1,
+    assigns_twice: 1,
+    subtracts_what_moved: 1,
+    adds_what_moved: 1,
+    puts_where_it_moved: 1,
+    tells_an_array: 1,
+    chooses_a_count: 2,
+    returns_a_floor: 1,
+    indexes_by_a_floor: 2,
+    ends_without_a_result: 0,
+    assigns_in_one_branch: 3,
+    names_a_part_in_a_loop: 3,
+    multiplies_by_a_million: 1,
+    counts_beyond_c: 1,
+    counts_beyond_single: 1,
+    halves_a_count: 1,
+    stays: 1,
+}
+"""Kernels where Python and C part easily: None where C has Python's numbers, else the line refused."""

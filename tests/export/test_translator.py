@@ -25,6 +25,17 @@ Run = Callable[[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]], None]
 SIZES = {"coefficients": 7, "state": 6, "inputs": 1, "outputs": 2}
 
 
+def built(source: str, folder: Path) -> Path:
+    """Return a library of a C program."""
+    (folder / "program.c").write_text(source)
+    library = folder / f"program{len(list(folder.iterdir()))}.so"
+    command = ["cc", *FLAGS, "-shared", "-fPIC", f"-I{SHARED.parent}", f"-I{folder}"]
+    command += [str(folder / "program.c"), "-lm", "-o", str(library)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr + source
+    return library
+
+
 def compiled(kernel: Any, folder: Path, *, single: bool = False, change: str = "") -> Run:
     """Return a step, translated and compiled, that runs over many samples."""
     translation = Translation(single=single)
@@ -49,12 +60,7 @@ void run(const mck_real *coefficients, mck_real *state, const mck_real *in, mck_
 }}
 """
     (folder / "mck_config.h").write_text("#define MCK_FLOAT32\n" if single else "")
-    (folder / "program.c").write_text(source)
-    library = folder / f"program{len(list(folder.iterdir()))}.so"
-    command = ["cc", *FLAGS, "-shared", "-fPIC", f"-I{SHARED.parent}", f"-I{folder}"]
-    command += [str(folder / "program.c"), "-lm", "-o", str(library)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr + text
+    library = built(source, folder)
     loaded = ctypes.CDLL(str(library))
     loaded.run.argtypes = [*[ctypes.c_void_p] * 4, ctypes.c_int]
 
@@ -122,13 +128,39 @@ def test_constants_are_named_and_fit_the_precision() -> None:
         assert f"#define CLOSED {value}" in translation.text()
 
 
-@pytest.mark.parametrize("kernel", programs.REFUSED, ids=lambda each: each.__name__)
-def test_what_is_outside_the_language_is_refused_where_it_stands(kernel: Any) -> None:
-    with pytest.raises(KernelError) as refused:
+def refused(kernel: Any, line: int) -> bool:
+    """Return whether a kernel is refused at a line behind its ``def``, with what to write instead."""
+    with pytest.raises(KernelError) as error:
         Translation().add(kernel)
     lines, first = getsourcelines(kernel.py_func)
-    start = next(k for k, line in enumerate(lines) if line.startswith("def "))
-    assert refused.value.file == programs.__file__
-    assert refused.value.line == first + start + programs.REFUSED[kernel]
-    assert refused.value.construct
-    assert refused.value.instead
+    start = next(k for k, text in enumerate(lines) if text.startswith("def "))
+    found = error.value
+    assert (found.file, found.line) == (programs.__file__, first + start + line)
+    return bool(found.construct and found.instead) and "docs/" not in found.instead
+
+
+@pytest.mark.parametrize("kernel", programs.REFUSED, ids=lambda each: each.__name__)
+def test_what_is_outside_the_language_is_refused_where_it_stands(kernel: Any) -> None:
+    assert refused(kernel, programs.REFUSED[kernel])
+
+
+@needs("cc")
+@pytest.mark.parametrize("kernel", programs.EDGES, ids=lambda each: each.__name__)
+@pytest.mark.parametrize("values", [(0.4, 2.0, 3000.0), (1.7, 1.0, -1.0)], ids=["small", "large"])
+def test_c_has_pythons_numbers_or_the_kernel_is_refused(
+    kernel: Any, values: tuple[float, ...], tmp_path: Path
+) -> None:
+    line = programs.EDGES[kernel]
+    if line is not None:
+        assert refused(kernel, line)
+        return
+    translation = Translation()
+    call = translation.add(kernel).call(("a", len(values)))
+    run = "double run(double *a);\ndouble run(double *a)\n{\n"
+    (tmp_path / "mck_config.h").write_text("")
+    source = f'#include "mck.h"\n{translation.text()}\n{run}    return {call};\n}}\n'
+    library = ctypes.CDLL(str(built(source, tmp_path)))
+    library.run.restype, library.run.argtypes = ctypes.c_double, [ctypes.c_void_p]
+    c, python = np.array(values), np.array(values)
+    assert library.run(c.ctypes.data) == kernel.py_func(python)
+    np.testing.assert_array_equal(c, python)

@@ -26,6 +26,36 @@ stdatomic stdbool stddef stdint stdio stdlib string tgmath time uchar wchar unit
 RESERVED = frozenset((*WORDS.split(), *HEADERS.split()))
 """Words of C and C++, and headers that a model's own would stand before."""
 
+ELEMENTARY = """
+acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh erf erfc exp exp2 expm1 fabs fdim
+floor fma fmax fmin fmod frexp hypot ilogb ldexp lgamma llrint llround log log10 log1p log2 logb lrint
+lround modf nan nearbyint nextafter nexttoward pow remainder remquo rint round scalbln scalbn sin sinh
+sqrt tan tanh tgamma trunc
+"""
+"""Functions of <math.h>, which have twins that end in f and in l."""
+
+OTHERS = """
+alignas alignof and asm bitand bitor compl concept constexpr decltype explicit export mutable noexcept
+not nullptr or requires typeid typename typeof using wchar_t xor
+double_t float_t fpclassify gamma isfinite isgreater isinf isless isnan isnormal isunordered j0 j1 jn
+signbit signgam y0 y1 yn FP_FAST_FMA FP_FAST_FMAF FP_FAST_FMAL FP_ILOGB0 FP_ILOGBNAN FP_INFINITE FP_NAN
+FP_NORMAL FP_SUBNORMAL FP_ZERO HUGE_VAL HUGE_VALF HUGE_VALL INFINITY MATH_ERREXCEPT MATH_ERRNO M_1_PI
+M_2_PI M_2_SQRTPI M_E M_LN10 M_LN2 M_LOG10E M_LOG2E M_PI M_PI_2 M_PI_4 M_SQRT1_2 M_SQRT2 NAN NULL
+abort abs calloc div exit free labs llabs malloc memchr memcmp memcpy memmove memset printf putchar puts
+realloc strlen tolower toupper
+MCK_FLOAT32 MCK_H MCK_INFINITY all_finite copy mck_copy mck_max mck_min mck_real mck_sum
+parts run
+"""
+
+TAKEN = frozenset(
+    (
+        *WORDS.split(),
+        *OTHERS.split(),
+        *(f + end for f in ELEMENTARY.split() for end in ("", "f", "l")),
+    )
+)
+"""Names that C, C++, <math.h>, compilers or the export's own files have already."""
+
 LONGEST = 40
 
 
@@ -62,6 +92,15 @@ def name_from(path: Path) -> str:
 def said(text: str) -> str:
     """Return text for a comment or a string of a source file: all but harmless characters replaced."""
     return re.sub(r"[^A-Za-z0-9_ .,()^%/+=:-]|//|/\*|\*/", "_", text)[:80]
+
+
+def commented(text: str) -> str:
+    """Return text for a comment of C, which it does not end, and in which none begins.
+
+    >>> commented("a */ b")
+    'a * / b'
+    """
+    return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", text)
 
 
 def macros(names: Sequence[str]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -18,6 +19,9 @@ MARKUP = (".xml.j2", ".html.j2")
 
 WIDTH = 92
 """Of rows of numbers, in columns."""
+
+CODE_WIDTH = 100
+"""Of lines of C, in columns."""
 
 
 def render(package: str, template: str, content: Mapping[str, Any]) -> str:
@@ -64,3 +68,11 @@ def rows(values: Iterable[float], *, single: bool = False) -> list[str]:
     """Return lines of an initialiser, each ending in a comma."""
     lines = textwrap.wrap(literals(values, single=single), WIDTH, break_on_hyphens=False)
     return [f"{line.rstrip(',')}," for line in lines]
+
+
+def wrapped(line: str) -> list[str]:
+    """Return a line of C as lines that are short enough; types stay with their names."""
+    rest = " " * (len(line) - len(line.lstrip()) + 8)
+    line = re.sub(r"(const|mck_real|int) (?=\*?\w)", "\\1\u00a0", line)
+    lines = textwrap.wrap(line, CODE_WIDTH, subsequent_indent=rest, break_on_hyphens=False)
+    return [each.replace("\u00a0", " ") for each in lines]

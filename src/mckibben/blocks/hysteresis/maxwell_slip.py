@@ -76,7 +76,8 @@ def _advance(u: float, c: Array, state: Array, lost: Array) -> None:
     du = u - state[n]
     change = stretch(du, c[1])
     for i in range(n):
-        state[i] = slip(accumulate(state[i], change, lost, i), du, c[5 + m + i], c[2])
+        deflection = accumulate(state[i], change, lost, i)
+        state[i] = slip(deflection, du, c[5 + m + i], c[2])
     state[n] = u
 
 

@@ -128,9 +128,11 @@ def follow(
     missing = target - total
     slack = SLACK * abs(highest - lowest)
     if target > previous and missing > ROUNDING * size:
-        return 1.0, rise_to(target, highest, r, w, s) > highest + slack
+        risen = rise_to(target, highest, r, w, s)
+        return 1.0, risen > highest + slack
     if target < previous and missing < -ROUNDING * size:
-        return -1.0, fall_to(target, lowest, r, w, s) < lowest - slack
+        fallen = fall_to(target, lowest, r, w, s)
+        return -1.0, fallen < lowest - slack
     above = missing > w[0] * slack and s[0] >= highest
     below = missing < -w[0] * slack and s[0] <= lowest
     return 0.0, above or below

@@ -12,26 +12,25 @@ import io
 import textwrap
 import tokenize
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
 from typing import Any
 
 from mckibben.blocks.kernels import SINGLE
 from mckibben.errors import ModelError
+from mckibben.export.naming import commented
 
-REAL, INT = "mck_real", "int"
-"""Types of a value in C: a number, and a whole number or truth value."""
+BOOL, INT, REAL = "bool", "int", "float"
+"""Types of values, as annotated: each holds those before it."""
 
-TYPES = {"float": REAL, "int": INT, "bool": INT}
-"""Types of numbers, as annotated."""
+TYPES = {BOOL: "int", INT: "int", REAL: "mck_real"}
+"""What they are in C."""
 
 _FUNCTIONS = """acos acosh asin asinh atan atan2 atanh ceil copysign cos cosh exp expm1 fabs floor fmod
 log log10 log1p log2 pow sin sinh sqrt tan tanh trunc"""
 
 FUNCTIONS = frozenset(_FUNCTIONS.split())
 """Functions of ``math`` that kernels may call."""
-
-Kernel = Callable[..., Any]
 
 
 class KernelError(ModelError):
@@ -53,10 +52,14 @@ class KernelError(ModelError):
 
 
 class Source:
-    """The source of a kernel: its syntax tree, its comments, and what its global names mean."""
+    """The source of a kernel: its syntax tree, its comments, and what its names mean.
 
-    def __init__(self, kernel: Kernel) -> None:
-        self.function = kernel.py_func  # type: ignore[attr-defined]
+    Of its local names, ``stored`` is how often each is assigned to, ``given`` are its arguments,
+    ``changing`` have more than one value in a call, and ``counters`` are counted by loops.
+    """
+
+    def __init__(self, kernel: Any) -> None:
+        self.function = kernel.py_func
         lines, self._first = inspect.getsourcelines(self.function)
         text = textwrap.dedent("".join(lines))
         tree = ast.parse(text).body[0]
@@ -66,6 +69,11 @@ class Source:
         closed = inspect.getclosurevars(self.function).nonlocals
         self.globals: Mapping[str, Any] = {**self.function.__globals__, **closed}
         self.body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
+        self.given = [arg.arg for arg in tree.args.args]
+        self.stored = used(*self.body, how=ast.Store)
+        self.locals = {*self.stored, *self.given}
+        self.changing = {name for name, n in self.stored.items() if n > 1 or name in self.given}
+        self.counters = {ast.unparse(n.target) for n in ast.walk(tree) if isinstance(n, ast.For)}
 
     def refusal(self, node: ast.AST, construct: str, instead: str) -> KernelError:
         """Return the error for a construct that is outside the language."""
@@ -78,9 +86,7 @@ class Source:
         if given.vararg or given.kwarg or given.kwonlyargs or given.defaults or given.posonlyargs:
             raise self.refusal(self.tree, "default or variable arguments", "name every argument")
         for arg in given.args:
-            if arg.annotation is None:
-                raise self.refusal(arg, f"the argument {arg.arg!r} without a type", "annotate it")
-            yield arg, ast.unparse(arg.annotation)
+            yield arg, ast.unparse(arg.annotation) if arg.annotation else "without a type"
 
     @cached_property
     def returns(self) -> list[str]:
@@ -92,44 +98,27 @@ class Source:
         if not TYPES.keys() >= {*names}:
             fill = "return numbers, and fill arrays that are passed in"
             raise self.refusal(self.tree, f"the result {written}", fill)
-        return [TYPES[name] for name in names]
-
-    @cached_property
-    def nodes(self) -> list[ast.AST]:
-        """All parts of the body."""
-        return [node for statement in self.body for node in ast.walk(statement)]
-
-    @cached_property
-    def stored(self) -> Counter[str]:
-        """How often every local name is assigned to."""
-        names = [node for node in self.nodes if isinstance(node, ast.Name)]
-        return Counter(node.id for node in names if isinstance(node.ctx, ast.Store))
-
-    @cached_property
-    def counters(self) -> set[str]:
-        """Names that loops count."""
-        return {ast.unparse(node.target) for node in self.nodes if isinstance(node, ast.For)}
-
-    @property
-    def locals(self) -> set[str]:
-        """Names of arguments and of their sizes, and of what is assigned to."""
-        given = [arg.arg for arg in self.tree.args.args]
-        return {*self.stored, *given, *(f"{name}_size" for name in given)}
+        return names
 
     @cached_property
     def matrices(self) -> set[str]:
         """Names of arrays with two dimensions: those reshaped, or indexed with two places."""
         found = set()
-        for node in self.nodes:
+        for node in ast.walk(self.tree):
             if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Tuple):
                 found.add(ast.unparse(node.value))
             elif isinstance(node, ast.Assign) and ".reshape(" in ast.unparse(node.value):
                 found |= {ast.unparse(target) for target in node.targets}
         return found
 
-    def constant(self, name: str) -> int | float | None:
-        """Return the number that a global name means; None where it means something else."""
-        value = self.globals.get(name)
+    def number(self, node: ast.expr) -> int | float | None:
+        """Return the number that is written out or named by a constant; None for anything else."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            number = self.number(node.operand)
+            return None if number is None else -number
+        value = getattr(node, "value", None)
+        if isinstance(node, ast.Name) and node.id not in self.locals:
+            value = self.globals.get(node.id)
         return value if isinstance(value, bool | int | float) else None
 
     def single(self, name: str) -> float | None:
@@ -142,18 +131,24 @@ class Source:
         return SINGLE.get(name)
 
 
-@cache
-def source_of(kernel: Kernel) -> Source:
-    """Return the source of a kernel."""
-    return Source(kernel)
+source_of = cache(Source)
+"""The source of a kernel, read once."""
 
 
 class _WithoutDerivatives(ast.NodeTransformer):
-    """Leaves out what derivatives alone ask for."""
+    """Leaves out what derivatives alone ask for: ``DERIVED`` is false in C."""
 
-    def visit_If(self, node: ast.If) -> ast.If | None:
+    def visit_If(self, node: ast.If) -> ast.If | list[ast.stmt]:
         self.generic_visit(node)
-        return None if ast.unparse(node.test).partition(" ")[0] == "DERIVED" else node
+        all_of = isinstance(node.test, ast.BoolOp) and isinstance(node.test.op, ast.And)
+        tests = node.test.values if all_of else [node.test]  # type: ignore[attr-defined]
+        return node.orelse if "DERIVED" in map(ast.unparse, tests) else node
+
+
+def used(*nodes: ast.AST, how: type[ast.expr_context] = ast.expr_context) -> Counter[str]:
+    """Return how often each name is used in parts of a kernel, or read, or assigned to."""
+    names = (n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name))
+    return Counter(name.id for name in names if isinstance(name.ctx, how))
 
 
 def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:
@@ -163,4 +158,4 @@ def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:
         if token.type == tokenize.COMMENT and not token.string.startswith("# type:"):
             row = token.start[0]
             alone = lines[row - 1].lstrip().startswith("#")
-            yield row, (token.string.lstrip("# ").split("  # ")[0], alone)
+            yield row, (commented(token.string.lstrip("# ").split("  # ")[0]), alone)

@@ -14,19 +14,15 @@ from __future__ import annotations
 import ast
 import math
 import re
-import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from mckibben.blocks.kernels import accumulate
-from mckibben.export.c.language import FUNCTIONS, INT, REAL, TYPES, Kernel, Source, source_of
-from mckibben.export.naming import WORDS
-from mckibben.export.templating import literal
-
-WIDTH = 100
-"""Columns of a line of C."""
+from mckibben.export.c.language import BOOL, FUNCTIONS, INT, REAL, TYPES, Source, source_of, used
+from mckibben.export.naming import TAKEN, commented
+from mckibben.export.templating import literal, wrapped
 
 LEAST, MOST = 1e-6, 3.4e38
 """Range of the sizes of constants that are the same in both precisions."""
@@ -39,10 +35,11 @@ ARITHMETIC: dict[type[ast.AST], str] = dict(zip(_BINARY, "+-*//%", strict=True))
 _COMPARED = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 COMPARISON = dict(zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True))
 
-RESERVED = FUNCTIONS.union(
-    WORDS.split(), ["y0", "y1", "yn", "j0", "j1", "jn", "gamma", "div", "copy", "run", "parts"]
-)
-"""Names that C, <math.h> or the export's own functions have already."""
+WHOLE = 32767
+"""Largest whole number that is written out: each `int` of C holds it, and single precision."""
+
+FITTING = {INT: "take int(...) of it", BOOL: "compare it"}
+"""What to write instead of a number that a type does not hold."""
 
 
 class Value(NamedTuple):
@@ -58,7 +55,7 @@ class Value(NamedTuple):
 
     def to(self, kind: str) -> Value:
         """Return it as a real number, if it is a whole one and that is asked for."""
-        if kind == INT or self.type == kind:
+        if kind != REAL or self.type == kind:
             return self
         return Value(f"(mck_real){self.within(UNARY)}", UNARY, REAL)
 
@@ -71,10 +68,9 @@ class Whole(Counter[str]):
 
     def plus(self, other: Whole, times: int = 1) -> Whole:
         """Return the sum with another one, taken so many times."""
-        found = Whole(self)
-        for term, count in other.items():
-            found[term] += times * count
-        return found
+        terms = [*self, *(term for term in other if term not in self)]
+        sums = {term: self[term] + times * other[term] for term in terms}
+        return Whole({term: count for term, count in sums.items() if count})
 
     def value(self) -> Value:
         """Return it as C."""
@@ -82,8 +78,7 @@ class Whole(Counter[str]):
         for term, count in sorted(self.items(), key=lambda item: (not item[0], item[1] < 0)):
             factor = term if term.isidentifier() or abs(count) == 1 else f"({term})"
             words = [str(abs(count))] * (abs(count) != 1 or not term) + [factor] * bool(term)
-            if count:
-                text += (" - " if count < 0 else " + " if text else "") + " * ".join(words)
+            text += (" - " if count < 0 else " + " if text else "") + " * ".join(words)
         if text.startswith(" - "):
             text = f"-{text[3:]}"
         added = " + " in text or " - " in text
@@ -105,11 +100,7 @@ class View:
 
     def place(self) -> str:
         """Return the pointer to its first number."""
-        return (
-            f"{self.base} + {self.begin.value().within(PLUS)}"
-            if any(self.begin.values())
-            else self.base
-        )
+        return f"{self.base} + {self.begin.value().within(PLUS)}" if self.begin else self.base
 
     def element(self, at: Whole) -> Value:
         """Return one of its numbers."""
@@ -149,12 +140,7 @@ class Function:
 class Translation:
     """Functions of C in the order in which they need one another, and the constants that they use.
 
-    Parameters
-    ----------
-    single : bool
-        In single instead of double precision.
-    taken : iterable of str
-        Names that others have.
+    They are in ``single`` or in double precision, and have names that are not ``taken``.
     """
 
     def __init__(self, *, single: bool = False, taken: Iterable[str] = ()) -> None:
@@ -165,7 +151,7 @@ class Translation:
         self._open: list[Source] = []
         self._locals: set[str] = set()
 
-    def add(self, kernel: Kernel, bound: tuple[tuple[str, Any], ...] = ()) -> Function:
+    def add(self, kernel: Any, bound: tuple[tuple[str, Any], ...] = ()) -> Function:
         """Return the function of a kernel, added with those that it calls if it is new.
 
         ``bound`` is, by parameter, the kernel that it is called with, or how many arrays of a tuple. A
@@ -184,8 +170,8 @@ class Translation:
 
     def free_name(self, source: Source) -> str:
         """Return a name that no function has yet, nor a local name of one begun before."""
-        taken = {*self.constants, *RESERVED, *self.names, *self._locals}
-        self._locals |= source.locals
+        taken = {*self.constants, *TAKEN, *self.names, *self._locals}
+        self._locals |= {*source.locals, *(f"{name}_size" for name in source.given)}
         plain, module = source.tree.name.strip("_"), source.function.__module__.rpartition(".")[2]
         choices = [plain, f"{module}_{plain}", *(f"{module}_{plain}_{k}" for k in range(2, 100))]
         self.names.add(free := next(each for each in choices if each not in taken))
@@ -193,7 +179,7 @@ class Translation:
 
     def constant(self, name: str, text: str) -> str:
         """Return the name of a constant, which another one of the same name does not have."""
-        while self.constants.setdefault(name, text) != text:
+        while name in TAKEN or self.constants.setdefault(name, text) != text:
             name += "_"
         return name
 
@@ -211,13 +197,16 @@ class _Translator:
         self.whole, self.source, self.bound = whole, source, bound
         self.refusal = source.refusal
         self.function = Function(whole.free_name(source), source.returns)
-        self.results = [f"result_{k}" for k in range(2, len(source.returns) + 1)]
+        self.results = [self._made(f"result_{k}") for k in range(2, len(source.returns) + 1)]
         self.types: dict[str, str] = {}
         self.arrays: dict[str, View | list[View]] = {}
         self.given: list[Parameter] = []
         self.body = list(source.body)
         self._parameters()
         self.lines: list[str] = []
+        self.breaks: list[set[str]] = []
+        self.nowhere = {*source.locals, "return"}  # known where no way leads on
+        given = {*source.given, *self.arrays}
         before: list[str] | None = None
         while before != self.lines:
             before, self.lines = self.lines, []
@@ -228,61 +217,68 @@ class _Translator:
             self.declared: dict[int, list[str]] = {}
             for name in sorted(source.stored.keys() - taken):
                 self.declared.setdefault(id(_declaring(self.body, name)), []).append(name)
+            self.known = {*given}
             self._block(self.body)
+        if source.returns and "return" not in self.known:
+            raise self.refusal(source.tree, "a way through without a result", "end with return")
         self._finish()
-
-    # -- parameters --------------------------------------------------------------------------------
 
     def _parameters(self) -> None:
         for place, (arg, kind) in enumerate(self.source.annotations()):
             known = self.bound.get(arg.arg)
             if isinstance(known, int):
-                names = self._unpacked(arg.arg) or [f"{arg.arg}_{k + 1}" for k in range(known)]
+                names = [self._made(f"{arg.arg}_{k + 1}") for k in range(known)]
+                names = self._unpacked(arg.arg, known) or names
                 views = [self._array(name, place, k) for k, name in enumerate(names)]
                 self.arrays |= {arg.arg: views, **dict(zip(names, views, strict=True))}
             elif kind == "Array":
                 self.arrays[arg.arg] = self._array(arg.arg, place, 0)
             elif kind in TYPES:
-                self.types[arg.arg] = TYPES[kind]
-                self.given.append(Parameter(arg.arg, self.types[arg.arg], place))
+                self.types[arg.arg] = kind
+                self.given.append(Parameter(arg.arg, kind, place))
             elif known is None:
                 what = f"the argument {arg.arg}: {kind}"
                 raise self.refusal(arg, what, "use float, int, bool, Array or kernels")
 
-    def _unpacked(self, name: str) -> list[str]:
+    def _unpacked(self, name: str, known: int) -> list[str]:
         """Return what the arrays of a tuple are called where the body unpacks it, and drop that line."""
         for statement in self.body:
             if isinstance(statement, ast.Assign) and ast.unparse(statement.value) == name:
-                self.body.remove(statement)
-                target = statement.targets[0]
-                return [ast.unparse(each) for each in getattr(target, "elts", [target])]
+                names = [ast.unparse(n) for n in getattr(statement.targets[0], "elts", [])]
+                if len(names) == known:
+                    self.body.remove(statement)
+                    return names
         return []
 
     def _array(self, name: str, place: int, item: int) -> View:
         self.given.append(Parameter(name, REAL, place, item, "itself"))
         for asks in ("size", "columns"):
-            self.given.append(Parameter(f"{name}_{asks}", INT, place, item, asks))
+            self.given.append(Parameter(self._made(f"{name}_{asks}"), INT, place, item, asks))
         pointer, size, columns = (self._safe(each.name) for each in self.given[-3:])
         rows = Value(columns) if name in self.source.matrices else None
         return View(pointer, Whole([size]), (name,), columns=rows)
 
     def _safe(self, name: str) -> str:
-        """Return a local name that C has not taken."""
-        taken = RESERVED | self.whole.names | {self.function.name}
-        return f"{name}_" if name in taken else name
+        """Return a local name that C has not taken; macros have capitals."""
+        free = not name.isupper() and name not in TAKEN | self.whole.names
+        return name if free else self._made(f"{name.lower()}_")
+
+    def _made(self, name: str) -> str:
+        """Return a name that is not among the kernel's own."""
+        while name in self.source.locals:
+            name += "_"
+        return name
 
     def _spare(self, name: str) -> str:
         self.spares += 1
-        return f"{name}_{self.spares}"
-
-    # -- statements --------------------------------------------------------------------------------
+        return self._made(f"{name}_{self.spares}")
 
     def _emit(self, text: str) -> None:
         """Append a line of C with the statement's comment, behind those that have to be before it."""
         words, self.comment = f" /* {self.comment} */" if self.comment else "", ""
         pending, self.pending = self.pending, []
         for line in (*pending, text + words):
-            self.lines += _wrapped("    " * self.depth + line)
+            self.lines += wrapped("    " * self.depth + line)
 
     def _block(self, body: Sequence[ast.stmt]) -> None:
         self.depth += 1
@@ -304,10 +300,11 @@ class _Translator:
     def _statement(self, node: ast.stmt) -> None:
         if not isinstance(node, ast.Assign):
             self._declare(*self.fresh)
+        self.alone = _alone(node)
         match node:
-            case ast.Assign():
-                for target in node.targets:
-                    self._assign(target, node.value)
+            case ast.Assign(targets=[target]):
+                self._assign(target, node.value)
+                self.known |= used(target, how=ast.Store).keys()
             case ast.AugAssign() if not self._is_array(node.target):
                 place, value = self.value(node.target), self.value(node.value)
                 self._learn(node.target, kind := self._arithmetic(node, place, value).type)
@@ -317,66 +314,83 @@ class _Translator:
                 self._emit(f"if ({self.value(node.test).text}) {{")
                 self._branches(node)
             case ast.While(orelse=[]):
-                self._emit(f"while ({self._condition(node.test)}) {{")
-                self._block(node.body)
-                self._emit("}")
+                self._emit(f"while ({self._condition(node)}) {{")
+                self._loop(node.body, endless=bool(self.source.number(node.test)))
             case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), arguments), orelse=[]):
                 self._for(node, counter, arguments)
             case ast.Break() | ast.Continue():
                 self._emit(f"{type(node).__name__.lower()};")
+                if isinstance(node, ast.Break):
+                    self.breaks[-1] &= self.known
+                self.known = {*self.nowhere}
             case ast.Return():
                 self._return(node.value)
+                self.known = {*self.nowhere}
             case ast.Expr(value=ast.Call() as call):
                 value = self._call(call)
                 self._emit(f"{'(void)' * bool(value.type)}{value.text};")
             case _:
-                what = f"a statement like this ({type(node).__name__.lower()})"
-                raise self.refusal(node, what, "use =, if, while, for i in range(...), return")
+                what = f"the statement {ast.unparse(node).partition(chr(10))[0]!r}"
+                instead = "use = with one target, if, while, for i in range(...) and return"
+                raise self.refusal(node, what, instead)
 
     def _declare(self, *names: str) -> None:
         for name in sorted(names):
             self.fresh.discard(name)
-            self.pending.append(f"{self.types.get(name, INT)} {self._safe(name)};")
+            self.pending.append(f"{TYPES[self.types.get(name, BOOL)]} {self._safe(name)};")
 
-    def _condition(self, node: ast.expr) -> str:
+    def _condition(self, node: ast.If | ast.While) -> str:
         """Return a condition before which nothing can be computed."""
-        before = len(self.pending)
-        test = self.value(node)
+        before, self.alone = len(self.pending), _alone(node)
+        test = self.value(node.test)
         if len(self.pending) > before:
-            raise self.refusal(node, "this condition", "call the kernel before it")
+            raise self.refusal(node.test, "this condition", "call the kernel before it")
         return test.text
 
     def _branches(self, node: ast.If) -> None:
+        before = {*self.known}
         self._block(node.body)
+        one, self.known = self.known, before
         match node.orelse:
             case [ast.If() as other] if id(other) not in self.declared:
-                self._emit(f"}} else if ({self._condition(other.test)}) {{")
+                self._emit(f"}} else if ({self._condition(other)}) {{")
                 self._branches(other)
-                return
-            case [_, *_]:
-                self._emit("} else {")
-                self._block(node.orelse)
+            case orelse:
+                if orelse:
+                    self._emit("} else {")
+                self._block(orelse)
+                self._emit("}")
+        self.known &= one
+
+    def _loop(self, body: Sequence[ast.stmt], *, endless: bool = False) -> None:
+        """Write the body of a loop, and what is known behind it."""
+        before = {*self.known}
+        self.breaks.append({*self.nowhere})
+        self._block(body)
         self._emit("}")
+        left = self.breaks.pop()
+        self.known = left if endless else before
 
     def _for(self, node: ast.For, counter: str, arguments: list[ast.expr]) -> None:
         if counter != "_" and counter in self.types:
             raise self.refusal(node, f"{counter!r} for a counter in here", "use another name")
         self.types[counter] = INT
-        low, high = [Value("0"), *map(self.value, arguments[:2])][-2:]
-        step = self.value(arguments[2]).text if len(arguments) == 3 else "1"
-        if self.source.locals.intersection(re.findall(r"\w+", step)):
-            raise self.refusal(node, f"the step {step}", "write a number")
-        stored = {name for name in self.source.stored if _mentions(node, name, ast.Store)}
-        if stored & {*re.findall(r"\w+", high.text)} or "(" in high.text:
+        low, high = [Value("0"), *(self._as(each, INT) for each in arguments[:2])][-2:]
+        by = arguments[2] if len(arguments) == 3 else ast.Constant(1)
+        step, stride = self._as(by, INT).text, self.source.number(by)
+        if not stride:
+            raise self.refusal(node, f"the step {ast.unparse(by)!r}", "write a number")
+        if "(" in high.text or self._changes(high.text, node):
             end = self._spare("end")
             self._emit(f"const int {end} = {high.text};")
             high = Value(end)
         name = self._safe(counter) if counter != "_" else self._spare("k")
-        test = f"{name} {'>' if step[0] == '-' else '<'} {high.within(RELATION + 1)}"
+        test = f"{name} {'>' if stride < 0 else '<'} {high.within(RELATION + 1)}"
         moved = name + {"1": "++", "-1": "--"}.get(step, f" += {step}")
         self._emit(f"for (int {name} = {low.text}; {test}; {moved}) {{")
-        self._block(node.body)
-        self._emit("}")
+        self.known.add(counter)
+        self._loop(node.body)
+        self.known.discard(counter)
         self.types.pop(counter, None)
 
     def _return(self, value: ast.expr | None) -> None:
@@ -385,12 +399,10 @@ class _Translator:
         if len(parts) != len(kinds):
             what = f"{len(parts)} results for {len(kinds)}"
             raise self.refusal(value or self.source.tree, what, "return each result by its name")
-        texts = [self.value(p).to(k).text for p, k in zip(parts, kinds, strict=True)]
+        texts = [self._as(p, k).text for p, k in zip(parts, kinds, strict=True)]
         for name, text in zip(self.results, texts[1:], strict=False):
             self._emit(f"*{name} = {text};")
         self._emit(f"return {texts[0]};" if texts else "return;")
-
-    # -- assignments -------------------------------------------------------------------------------
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         match target, value:
@@ -410,30 +422,41 @@ class _Translator:
                 self._set(target, self.value(value))
 
     def _assign_several(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> None:
-        names = [ast.unparse(each) for each in targets]
-        late = (ast.unparse(n) in names[:k] for k, v in enumerate(values) for n in ast.walk(v))
-        if not any(late):
+        before = [(target, value) for k, value in enumerate(values) for target in targets[:k]]
+        if not any(
+            target.id in used(value)
+            if isinstance(target, ast.Name)
+            else self._roots(used(target)) & self._roots(used(value))
+            for target, value in before
+        ):
             for target, value in zip(targets, values, strict=True):
                 self._assign(target, value)
             return
         held = [(self._spare("held"), self.value(each)) for each in values]  # as in a swap
         for name, one in held:
-            self._emit(f"const {one.type} {name} = {one.text};")
+            self._emit(f"const {TYPES[one.type]} {name} = {one.text};")
         self._declare(*self.fresh)
         for target, (name, one) in zip(targets, held, strict=True):
             self._set(target, Value(name, ATOM, one.type))
+
+    def _roots(self, names: Iterable[str]) -> set[str]:
+        """Return the pointers to where arrays of some names are."""
+        found = [self.arrays[name] for name in names if name in self.arrays]
+        views = (view for each in found for view in (each if isinstance(each, list) else [each]))
+        return {root for view in views for root in view.roots}
 
     def _set(self, target: ast.expr, value: Value) -> None:
         opening = ""
         self._learn(target, value.type)
         if isinstance(target, ast.Name):
+            self.known.add(target.id)
             if target.id == "_":
                 self._emit(f"(void){value.text};")
                 return
             if target.id in self.fresh:
                 self.fresh.discard(target.id)
-                changed = self.source.stored[target.id] > 1
-                opening = f"{'' if changed else 'const '}{self.types[target.id]} "
+                const = "const " * (target.id not in self.source.changing)
+                opening = f"{const}{TYPES[self.types[target.id]]} "
         place = self.value(target)
         self._emit(f"{opening}{place.text} = {value.to(place.type).text};")
 
@@ -441,41 +464,57 @@ class _Translator:
         """Note that a number of a type is assigned to a name, or that an array is written to."""
         if isinstance(target, ast.Name) and target.id in self.source.counters - {"_"}:
             raise self.refusal(target, f"{target.id!r} counted and assigned", "use two names")
-        if isinstance(target, ast.Name) and self.types.get(target.id) != REAL:
-            self.types[target.id] = kind
+        if isinstance(target, ast.Name):
+            before = self.types.get(target.id, BOOL)
+            self.types[target.id] = _widest(before, kind)
+            if target.id in self.source.given and self.types[target.id] != before:
+                raise self.refusal(target, f"the {kind} in {target.id!r}", "use two names")
         elif isinstance(target, ast.Subscript):
             self.function.written |= {*self.view(target.value).roots}
 
     def _pointer(self, target: ast.expr, kind: str) -> str:
-        """Return a pointer to where a result is written."""
+        """Return a pointer to where a result is written; that of `_` is not needed."""
         if isinstance(target, ast.Name) and target.id == "_":
-            return self._unused(kind)
+            name = self._spare("unused")
+            self.pending.append(f"{TYPES[kind]} {name};")
+            return f"&{name}"
         self._learn(target, kind)
-        if isinstance(target, ast.Name) and target.id in self.fresh:
+        if not isinstance(target, ast.Name) or self.types[target.id] != kind:
+            raise self.refusal(target, f"a result in {ast.unparse(target)!r}", "name it anew")
+        if target.id in self.fresh:
             self._declare(target.id)
-        return f"&{self.value(target).text}"
-
-    def _unused(self, kind: str) -> str:
-        """Return a pointer for a result that is not needed."""
-        name = self._spare("unused")
-        self.pending.append(f"{kind} {name};")
-        return f"&{name}"
+        return f"&{self._safe(target.id)}"
 
     def _name_view(self, target: ast.Name, view: View) -> None:
-        if self.source.stored[target.id] > 1:
-            raise self.refusal(target, "an array under two names", "use two names")
-        name, size = self._safe(target.id), view.size
+        if target.id in self.source.changing:
+            raise self.refusal(target, f"two arrays called {target.id!r}", "use two names")
+        name = self._safe(target.id)
         const = "" if target.id in self.function.written else "const "
         self._emit(f"{const}mck_real *{name} = {view.place()};")
-        words = re.findall(r"\w+", size.value().text)
-        if any(self.source.stored[word] > 1 for word in words):
-            self._emit(f"const int {name}_size = {size.value().text};")  # as it is now
-            size = Whole([f"{name}_size"])
-        self.arrays[target.id] = View(name, size, (target.id, *view.roots), columns=view.columns)
+        size, columns = view.size, view.columns
+        if self._changes(size.value().text):
+            held = self._made(f"{name}_size")
+            self._emit(f"const int {held} = {size.value().text};")  # as it is now
+            size = Whole([held])
+        if columns and self._changes(columns.text):
+            raise self.refusal(target, "rows of a length that changes", "assign the length once")
+        self.arrays[target.id] = View(name, size, (target.id, *view.roots), columns=columns)
+
+    def _changes(self, text: str, loop: ast.For | None = None) -> bool:
+        """Return whether what a text of C computes may be another number later, or in a loop."""
+        stored = used(loop, how=ast.Store) if loop else self.source.changing
+        words = {*re.findall(r"\w+", text)}
+        read = self._roots(name for name in self.arrays if self._safe(name) in words)
+        return bool(words & {*map(self._safe, stored)} or read & self.function.written)
 
     def _fill(self, target: ast.expr, value: ast.expr) -> None:
         view, k = self.view(target), self._spare("k")
+        self.function.written |= {*view.roots}
         if self._is_array(value):
+            if not {*view.roots}.isdisjoint(self.view(value).roots):
+                places = f"{view.place()}, {self.view(value).place()}"
+                self._emit(f"mck_copy({places}, {view.size.value().text});")
+                return
             given = self.view(value).element(Whole([k])).text
         else:
             given = self.value(value).to(REAL).text
@@ -486,9 +525,6 @@ class _Translator:
         self._emit(f"for (int {k} = 0; {k} < {size}; {k}++) {{")
         self._emit(f"    {view.element(Whole([k])).text} = {given};")
         self._emit("}")
-        self.function.written |= {*view.roots}
-
-    # -- arrays ------------------------------------------------------------------------------------
 
     def _is_array(self, node: ast.expr) -> bool:
         """Return whether an expression is an array, or a part of one."""
@@ -502,13 +538,14 @@ class _Translator:
     def view(self, node: ast.expr) -> View:
         """Return the array that an expression is."""
         if isinstance(node, ast.Name) and isinstance(found := self.arrays.get(node.id), View):
+            self._assigned(node)
             return found
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
             shape = node.args[0] if len(node.args) == 1 else None
             if node.func.attr == "reshape" and isinstance(shape, ast.Tuple):
                 base, (rows, columns) = self.view(node.func.value), shape.elts
-                size = self._product(rows, length := self.value(columns))
-                return View(base.base, size, base.roots, base.begin, length)
+                size = self._product(rows, length := self._as(columns, INT))
+                return replace(base, size=size, columns=length)
         if not isinstance(node, ast.Subscript) or isinstance(node.slice, ast.Tuple):
             raise self.refusal(node, f"{ast.unparse(node)!r} for an array", "pass one in")
         base, part = self.view(node.value), node.slice
@@ -516,18 +553,17 @@ class _Translator:
             if base.columns is None:
                 raise self.refusal(node, f"{ast.unparse(node)!r} for an array", "slice it")
             begin = base.begin.plus(self._product(part, base.columns))
-            return View(base.base, self._terms(base.columns), base.roots, begin)
+            return replace(base, size=self._terms(base.columns), begin=begin, columns=None)
         if part.step or base.columns is not None:
             raise self.refusal(node, "a slice like this", "write a loop")
         low = self._at(part.lower, base.size) if part.lower else Whole()
         high = self._at(part.upper, base.size) if part.upper else base.size
-        return View(base.base, high.plus(low, -1), base.roots, base.begin.plus(low))
+        return replace(base, size=high.plus(low, -1), begin=base.begin.plus(low))
 
     def _at(self, place: ast.expr, size: Whole) -> Whole:
         """Return a place in an array; one below 0 is counted from the end."""
-        found = self._whole(place)
-        below = isinstance(place, ast.UnaryOp) and isinstance(place.op, ast.USub)
-        return size.plus(found) if below else found
+        below = isinstance(place, ast.UnaryOp) or (self.source.number(place) or 0) < 0
+        return size.plus(self._whole(place)) if below else self._whole(place)
 
     def _whole(self, node: ast.expr) -> Whole:
         """Return a whole number as a sum."""
@@ -539,15 +575,15 @@ class _Translator:
         if isinstance(node, ast.Attribute) and node.attr == "size":
             return self.view(node.value).size
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
-            return self._product(node.left, self.value(node.right))
-        return self._terms(self.value(node))
+            return self._product(node.left, self._as(node.right, INT))
+        return self._terms(self._as(node, INT))
 
     def _terms(self, value: Value) -> Whole:
         return Whole({"": int(value.text)} if value.text.isdigit() else [value.within(TIMES)])
 
     def _product(self, times: ast.expr, value: Value) -> Whole:
         one = self._whole(times)
-        if not any(count for term, count in one.items() if term):
+        if one.keys() <= {""}:
             return Whole().plus(self._terms(value), one[""])
         return self._terms(Value(f"{one.value().within(TIMES)} * {value.within(UNARY)}", TIMES))
 
@@ -563,42 +599,35 @@ class _Translator:
             raise self.refusal(node, f"{ast.unparse(node)!r}", "use one place")
         return base.element(self._product(at.elts[0], base.columns).plus(self._whole(at.elts[1])))
 
-    # -- numbers -----------------------------------------------------------------------------------
-
     def value(self, node: ast.expr) -> Value:
         """Return a number as C."""
         match node:
-            case ast.Constant(value=float(number)):
-                return Value(self._real(number, node), ATOM, REAL)
-            case ast.Constant(value=bool(number) | int(number)):
-                return Value(str(int(number)))
+            case ast.Constant(value=bool(number) | int(number) | float(number)):
+                return self._written(number, node)
             case ast.Name():
                 return self._name(node)
             case ast.UnaryOp(op=ast.Not()):
-                return Value(f"!{self.value(node.operand).within(UNARY)}", UNARY)
+                return Value(f"!{self.value(node.operand).within(UNARY)}", UNARY, BOOL)
             case ast.UnaryOp(op=ast.USub()):
                 inner = self.value(node.operand)
                 text = inner.within(UNARY)
                 text = f"({text})" if text.startswith("-") else text
-                return Value(f"-{text}", UNARY, inner.type)
+                return Value(f"-{text}", UNARY, _widest(inner.type, INT))
             case ast.BinOp():
                 return self._arithmetic(node, self.value(node.left), self.value(node.right))
             case ast.BoolOp():
                 word, binds = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
-                values = [self.value(each) for each in node.values]
-                if any(each.type == REAL or each.text.isdigit() for each in values):
-                    raise self.refusal(node, "and, or of numbers", "compare them")
-                return Value(f" {word} ".join(each.within(EQUAL) for each in values), binds)
+                values = [self._as(each, BOOL) for each in node.values]
+                return Value(f" {word} ".join(each.within(EQUAL) for each in values), binds, BOOL)
             case ast.Compare():
                 return self._compare(node)
             case ast.IfExp():
                 test = self.value(node.test).within(AND)
-                one, other, kind = _alike(self.value(node.body), self.value(node.orelse))
+                one, other, kind = _alike(self.value(node.body), self.value(node.orelse), BOOL)
                 texts = one.within(CHOICE + 1), other.within(CHOICE + 1)
                 return Value(f"{test} ? {texts[0]} : {texts[1]}", CHOICE, kind)
             case ast.Attribute(value=ast.Name(id="np" | "math"), attr="inf" | "nan" | "pi" as name):
-                number = getattr(math, name)
-                return Value(self._real(number, node), ATOM, REAL)
+                return self._written(getattr(math, name), node)
             case ast.Attribute(attr="size"):
                 return self.view(node.value).size.value()
             case ast.Subscript():
@@ -607,31 +636,51 @@ class _Translator:
                 found = self._function(node)
                 if found.type:
                     return found
-        raise self.refusal(node, f"{ast.unparse(node)!r}", "see docs/kernels.md")
+        instead = "compute it from numbers, places in arrays and calls of kernels"
+        raise self.refusal(node, f"{ast.unparse(node)!r} for a number", instead)
+
+    def _as(self, node: ast.expr, kind: str) -> Value:
+        """Return a number as one of a type, which has to hold it."""
+        value = self.value(node)
+        if _widest(value.type, kind) != kind:
+            what = f"{ast.unparse(node)!r}, of type {value.type}, for {kind}"
+            raise self.refusal(node, what, FITTING[kind])
+        return value.to(kind)
 
     def _name(self, node: ast.Name) -> Value:
         name = node.id
-        if name in self.types or name in self.source.stored.keys() - self.source.counters:
-            return Value(self._safe(name), ATOM, self.types.get(name, INT))
-        known, kind = self.source.constant(name), INT
+        if name in self.source.locals - self.arrays.keys():
+            self._assigned(node)
+            return Value(self._safe(name), ATOM, self.types.get(name, BOOL))
+        known = self.source.number(node)
         if known is None:
             instead = "use numbers, arguments and constants of the module"
             raise self.refusal(node, f"the name {name!r}", instead)
-        text = str(int(known)) if math.isfinite(known) else ""
-        if isinstance(known, float):
-            single, kind = self.source.single(name) if self.whole.single else None, REAL
-            text = literal(single, single=True) if single else self._real(known, node)
-        return Value(self.whole.constant(name.strip("_").upper(), text), ATOM, kind)
+        single = self.source.single(name) if self.whole.single else None
+        if single is None:
+            found = self._written(known, node)
+        else:
+            found = Value(literal(single, single=True), ATOM, REAL)
+        return found._replace(text=self.whole.constant(name.strip("_").upper(), found.text))
 
-    def _real(self, value: float, node: ast.AST) -> str:
-        """Return a real number in C, or refuse one that single precision does not hold."""
+    def _assigned(self, node: ast.Name) -> None:
+        """Refuse a name that has no value on some way to here."""
+        if node.id not in self.known:
+            what = f"{node.id!r} where it may not be assigned"
+            raise self.refusal(node, what, "assign it before the branch or loop")
+
+    def _written(self, number: int | float, node: ast.AST) -> Value:
+        """Return a number in C, or refuse one that `int` or single precision does not hold."""
+        if not isinstance(number, float):
+            if abs(number) > WHOLE:
+                raise self.refusal(node, f"the whole number {number}", f"write {number}.0")
+            return Value(str(int(number)), ATOM, BOOL if isinstance(number, bool) else INT)
         kept = self.whole.single or isinstance(node, ast.Constant)
-        if math.isnan(value):
-            return "((mck_real)NAN)"
-        if value and not LEAST < abs(value) < MOST and math.isfinite(value) and kept:
-            what = f"the number {value!r}, which single precision has no room for, or rounds away"
+        if kept and number and math.isfinite(number) and not LEAST < abs(number) < MOST:
+            what = f"the number {number!r}, which single precision has no room for, or rounds away"
             raise self.refusal(node, what, "name it, and add it to the table SINGLE of the module")
-        return literal(value, single=self.whole.single)
+        text = literal(number, single=self.whole.single)
+        return Value("((mck_real)NAN)" if math.isnan(number) else text, ATOM, REAL)
 
     def _arithmetic(self, node: ast.BinOp | ast.AugAssign, one: Value, other: Value) -> Value:
         squared = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
@@ -647,23 +696,21 @@ class _Translator:
         return Value(f"{one.within(binds)} {word} {other.within(binds + 1)}", binds, kind)
 
     def _compare(self, node: ast.Compare) -> Value:
-        if isinstance(node.ops[0], ast.In) and isinstance(node.comparators[0], ast.Tuple):
-            choices = node.comparators[0].elts
-            each = [ast.Compare(node.left, [ast.Eq()], [one]) for one in choices]
-            return self.value(ast.BoolOp(ast.Or(), [*each]))
-        links = []
-        for op, left, right in zip(
-            node.ops, [node.left, *node.comparators], node.comparators, strict=False
-        ):
-            if type(op) not in COMPARISON:
-                raise self.refusal(node, "this comparison", "use < <= > >= == != or in")
-            one, other, _ = _alike(self.value(left), self.value(right))
-            word = COMPARISON[type(op)]
-            text = f"{one.within(RELATION + 1)} {word} {other.within(RELATION + 1)}"
-            links.append(Value(text, EQUAL if word in ("==", "!=") else RELATION))
-        return links[0] if len(links) == 1 else Value(" && ".join(each.text for each in links), AND)
-
-    # -- calls -------------------------------------------------------------------------------------
+        lefts = [node.left, *node.comparators]
+        links = [*zip(lefts, node.ops, node.comparators, strict=False)]
+        left, op, right = links[0]
+        if isinstance(op, ast.In) and isinstance(right, ast.Tuple):
+            links = [(left, ast.Eq(), each) for each in right.elts]
+        if len(links) > 1:
+            each = [ast.copy_location(ast.Compare(a, [b], [c]), node) for a, b, c in links]
+            either = ast.Or() if isinstance(op, ast.In) else ast.And()
+            return self.value(ast.BoolOp(either, [*each]))
+        if type(op) not in COMPARISON:
+            raise self.refusal(node, "this comparison", "use < <= > >= == != or in")
+        one, other, _ = _alike(self.value(left), self.value(right))
+        word = COMPARISON[type(op)]
+        text = f"{one.within(RELATION + 1)} {word} {other.within(RELATION + 1)}"
+        return Value(text, EQUAL if word in ("==", "!=") else RELATION, BOOL)
 
     def _function(self, node: ast.Call) -> Value:
         name = ast.unparse(node.func)
@@ -701,17 +748,12 @@ class _Translator:
         if not hasattr(kernel, "py_func"):
             what = f"a call of {ast.unparse(node.func)}()"
             raise self.refusal(node, what, "call kernels, min, max, abs, math.…")
-        names = [arg.arg for arg in source_of(kernel).tree.args.args]
+        names = source_of(kernel).given
         if len(names) != len(node.args) or node.keywords:
             raise self.refusal(node, "arguments by name", "give every argument by its place")
-        bound: list[tuple[str, Any]] = []
-        for parameter, given in zip(names, node.args, strict=True):
-            known = self._meaning(given)
-            if isinstance(known, list):
-                bound.append((parameter, len(known)))
-            elif hasattr(known, "py_func"):
-                bound.append((parameter, known))
-        return self.whole.add(kernel, tuple(bound))
+        known = zip(names, map(self._meaning, node.args), strict=True)
+        bound = [(name, len(each) if isinstance(each, list) else each) for name, each in known]
+        return self.whole.add(kernel, tuple(each for each in bound if each[1] is not None))
 
     def _meaning(self, node: ast.expr) -> Any:
         """Return the kernel that a name means, or the arrays of a tuple; None for all else."""
@@ -719,16 +761,20 @@ class _Translator:
             return node.elts
         if not isinstance(node, ast.Name) or node.id in self.types:
             return None
-        if node.id in self.arrays:
-            return self.arrays[node.id]
-        return self.bound.get(node.id, self.source.globals.get(node.id))
+        known = self.bound.get(node.id, self.source.globals.get(node.id))
+        arrays = self.arrays.get(node.id)
+        return arrays if isinstance(arrays, list) else known if hasattr(known, "py_func") else None
 
     def _call(self, node: ast.Call, pointers: Sequence[str] = ()) -> Value:
         """Return a call, whose results behind the first go where pointers say, or nowhere."""
-        if self._meaning(node.func) is accumulate:
+        callee = None if self._meaning(node.func) is accumulate else self._callee(node)
+        if (callee is None or callee.written) and node is not self.alone:
+            what = f"{ast.unparse(node.func)}(), which fills arrays, within another expression"
+            raise self.refusal(node, what, "name its result first, x = f(a)")
+        if callee is None:
             return self._accumulate(*node.args)
-        callee = self._callee(node)
-        pointers = pointers or [self._unused(kind) for kind in callee.returns[1:]]
+        nowhere = ast.Name("_", ast.Store())
+        pointers = pointers or [self._pointer(nowhere, kind) for kind in callee.returns[1:]]
         texts = ", ".join([*self._arguments(node, callee), *pointers])
         return Value(f"{callee.name}({texts})", ATOM, next(iter(callee.returns), ""))
 
@@ -736,21 +782,18 @@ class _Translator:
         for each in callee.parameters:
             given = node.args[each.place]
             if not each.asks:
-                yield self.value(given).to(each.type).text
+                yield self._as(given, each.type).text
                 continue
             items = self._meaning(given)
             item = items[each.item] if isinstance(items, list) else given
             view = item if isinstance(item, View) else self.view(item)
             if each.name in callee.written:
                 self.function.written |= {*view.roots}
-            if each.asks == "itself":
-                yield view.place()
-            elif each.asks == "size":
-                yield view.size.value().text
-            elif view.columns is not None:
-                yield view.columns.text
-            else:
+            if each.asks == "columns" and view.columns is None:
                 raise self.refusal(given, "an array without rows here", "reshape it")
+            columns = view.columns.text if view.columns else ""
+            size = view.size.value().text
+            yield {"itself": view.place(), "size": size, "columns": columns}[each.asks]
 
     def _accumulate(self, total: ast.expr, change: ast.expr, lost: ast.expr, at: ast.expr) -> Value:
         """Return a sum, which in single precision carries what rounding loses."""
@@ -760,8 +803,6 @@ class _Translator:
         element = self._item(ast.Subscript(lost, at))
         self._learn(ast.Subscript(lost, at), REAL)
         return Value(f"mck_sum({one.text}, {other.text}, &{element.text})", ATOM, REAL)
-
-    # -- the whole ---------------------------------------------------------------------------------
 
     def _finish(self) -> None:
         """Write the function: its docstring, its head with the parameters that it needs, its body."""
@@ -773,40 +814,46 @@ class _Translator:
             if re.search(rf"\b{name}\b", body):
                 function.parameters.append(each)
                 const = "const " * (each.name not in function.written)
-                kind = f"{const}{REAL} *" if each.asks == "itself" else f"{each.type} "
-                words.append(kind + name)
-        words += [f"{k} *{n}" for k, n in zip(function.returns[1:], self.results, strict=True)]
-        kind = next(iter(function.returns), "void")
-        head = _wrapped(f"static {kind} {function.name}({', '.join(words) or 'void'})")
-        doc = re.sub(r"`+", "`", ast.get_docstring(self.source.tree) or "").replace("*/", "* /")
+                pointer = each.asks == "itself"
+                words.append(
+                    f"{const}mck_real *{name}" if pointer else f"{TYPES[each.type]} {name}"
+                )
+        kind, *kinds = [TYPES[each] for each in function.returns] or ["void"]
+        words += [f"{each} *{name}" for each, name in zip(kinds, self.results, strict=True)]
+        head = wrapped(f"static {kind} {function.name}({', '.join(words) or 'void'})")
+        doc = commented(re.sub(r"`+", "`", ast.get_docstring(self.source.tree) or ""))
         about = [f"/* {doc}".replace("\n", "\n * ").replace(" * \n", " *\n") + " */"] if doc else []
         function.text = "\n".join([*about, *head, "{", body, "}", ""])
 
 
 def _alike(one: Value, other: Value, kind: str = INT) -> tuple[Value, Value, str]:
     """Return two numbers in the type that holds both, and that type."""
-    kind = REAL if REAL in (one.type, other.type, kind) else INT
+    kind = _widest(one.type, other.type, kind)
     return one.to(kind), other.to(kind), kind
 
 
-def _wrapped(line: str) -> list[str]:
-    """Return a line of C as lines that are short enough."""
-    rest = " " * (len(line) - len(line.lstrip()) + 8)
-    line = re.sub(r"(const|mck_real|int) (?=\*?\w)", "\\1\u00a0", line)  # types stay with names
-    lines = textwrap.wrap(line, WIDTH, subsequent_indent=rest, break_on_hyphens=False)
-    return [each.replace("\u00a0", " ") for each in lines]
+def _widest(*kinds: str) -> str:
+    """Return the type that holds all of some."""
+    return max(kinds, key=[*TYPES].index)
+
+
+def _alone(node: ast.stmt) -> ast.expr | None:
+    """Return the part of a statement that is computed before all else and once, as in Python."""
+    value = getattr(node, "value", getattr(node, "test", None))
+    while isinstance(value, ast.UnaryOp | ast.Subscript):
+        value = value.operand if isinstance(value, ast.UnaryOp) else value.value
+    targets = (each for target in getattr(node, "targets", []) for each in ast.walk(target))
+    places = [each for each in targets if isinstance(each, ast.Subscript)]
+    return None if isinstance(node, ast.AugAssign) or len(places) > 1 else value
 
 
 def _without_idle(text: str) -> str:
     """Return a body without constants that only sizes were read from, which C does not need."""
     pattern = re.compile(r"^ *const (?:int|mck_real) \*?(\w+) = (?:(?!\w\()[^;])*;\n?", re.M)
-    while True:
-        for found in pattern.finditer(text):
-            if len(re.findall(rf"\b{found[1]}\b", text)) == 1:
-                text = text.replace(found[0], "", 1)
-                break
-        else:
-            return text
+    for found in pattern.finditer(text):
+        if len(re.findall(rf"\b{found[1]}\b", text)) == 1:
+            return _without_idle(text.replace(found[0], "", 1))
+    return text
 
 
 def _declaring(body: Sequence[ast.stmt], name: str) -> ast.stmt:
@@ -814,20 +861,15 @@ def _declaring(body: Sequence[ast.stmt], name: str) -> ast.stmt:
 
     It is in the innermost block that has all uses, and before a loop that may carry a value through.
     """
-    uses = [statement for statement in body if _mentions(statement, name)]
+    uses = [statement for statement in body if name in used(statement)]
     first = uses[0]
     blocks = [getattr(first, part, []) for part in ("body", "orelse")]
-    inner = [block for block in blocks if any(_mentions(each, name) for each in block)]
+    inner = [block for block in blocks if name in used(*block)]
     head = getattr(first, "test", getattr(first, "iter", None))
-    if len(uses) > 1 or len(inner) != 1 or (head is not None and _mentions(head, name)):
+    if len(uses) > 1 or len(inner) != 1 or (head is not None and name in used(head)):
         return first
     found = _declaring(inner[0], name)
-    assigns = isinstance(found, ast.Assign) and not _mentions(found, name, ast.Load)
+    assigns = isinstance(found, ast.Assign) and name not in used(found, how=ast.Load)
     if isinstance(first, ast.For | ast.While) and found in inner[0] and not assigns:
         return first
     return found
-
-
-def _mentions(node: ast.AST, name: str, how: type[ast.expr_context] = ast.expr_context) -> bool:
-    names = (each for each in ast.walk(node) if isinstance(each, ast.Name) and each.id == name)
-    return any(isinstance(each.ctx, how) for each in names)

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Board, Kernel, Ports, Run, Start, needs_sample_time
+from mckibben.blocks.base import Block, Board, Kernel, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vector
 from mckibben.blocks.kernels import kernel, step
@@ -28,7 +28,6 @@ from mckibben.errors import ModelError
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 from mckibben.registry import load
-from mckibben.system.compiling import in_turn
 
 WIDENS = 0.05
 """Share of a range beyond its end at which a band is twice as wide."""
@@ -426,31 +425,13 @@ class Banded(Composition):
 
         An explicit state may be this block's own, or the model's.
         """
-        if initial is None or isinstance(initial, str) or len(initial) == self.forward.n_states:
-            own, motion = initial, None
-        else:
-            own, motion = self._shared_initial(initial)
-        states = self.forward.initial_state(first, own), self.band.initial_state(first, motion)
-        return np.concatenate(states)
+        if initial is None or isinstance(initial, str) or len(initial) != self.forward.n_states:
+            return super().initial_state(first, initial)
+        own = self.forward.initial_state(first, initial)
+        return np.concatenate([own, self.band.initial_state(first)])
 
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        n_inputs = inputs.shape[1]
-        modelled = np.empty((len(inputs), len(self.forward.outputs)))
-        both = np.empty((len(inputs), n_inputs + modelled.shape[1]))
-        own, motion = self._states(state)
-
-        def gather() -> None:
-            both[:, :n_inputs] = inputs
-            both[:, n_inputs:] = modelled
-
-        return in_turn(
-            self.forward.bind(sample_time, own, inputs, modelled),
-            gather,
-            self.band.bind(sample_time, motion, both, outputs),
-        )
-
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
-        return board.call(self.band, [*given, *self.forward.wired(board, given)])
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+        return self.band.wired(board, [*taken, *self.forward.wired(board, taken)])
 
     def joined(self, parts: Sequence[str]) -> str:
         return r"y = P[u],\quad (y^{-},\, y^{+}) = \text{band}[u, y]"

@@ -67,12 +67,21 @@ class Cost:
 
 
 class Board(Protocol):
-    """Where blocks are laid out as calls in order; signals are named by text."""
+    """Where blocks are laid out as calls in order, on signals that it names as it likes.
 
-    def call(self, block: Block, given: Sequence[str]) -> list[str]:
+    Attributes
+    ----------
+    from_rest : bool
+        Whether blocks are started by what those before them give at rest, as in C, where these cannot
+        be run before the start.
+    """
+
+    from_rest: bool
+
+    def call(self, block: Block, taken: Sequence[Any]) -> list[Any]:
         """Run a block on signals, and return those that it gives."""
 
-    def add(self, terms: Sequence[str]) -> str:
+    def add(self, terms: Sequence[Any]) -> Any:
         """Return the sum of signals."""
 
     def resume(self, state: Sequence[float]) -> None:
@@ -192,8 +201,8 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def n_states(self) -> int:
-        """Length of the state vector."""
-        return 0
+        """Length of the state vector: of all parts, one after another."""
+        return sum(part.n_states for part in getattr(self, "parts", ()))
 
     @property
     def n_fitted(self) -> int:
@@ -203,7 +212,15 @@ class Block(DrawsItself, Parametrised):
     @property
     def n_scratch(self) -> int:
         """How many numbers a step computes in beside the state, for code that cannot allocate."""
-        return 0
+        return sum(part.n_scratch for part in getattr(self, "parts", ()))
+
+    def shares(self, state: Array) -> list[tuple[Any, Array]]:
+        """Return every part with its own of a state, as a view; nothing where there are no parts."""
+        shares = []
+        for part in getattr(self, "parts", ()):
+            own, state = np.split(state, [part.n_states])
+            shares.append((part, own))
+        return shares
 
     @property
     def start(self) -> Initial:
@@ -294,9 +311,9 @@ class Block(DrawsItself, Parametrised):
         for name in self.increasing:
             yield name, getattr(self, name)
 
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
-        """Lay the block out on a board, and return the signals that it gives."""
-        return board.call(self, given)
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+        """Lay the block out on a board, run on signals, and return those that it gives."""
+        return board.call(self, taken)
 
     def inverse(self) -> Block:
         """Return the block that undoes this one.
@@ -502,12 +519,12 @@ class Block(DrawsItself, Parametrised):
 
     def report(self, state: Array) -> None:
         """Warn of what happened during a run that its user should know, read off the final state."""
-        del state
+        for part, own in self.shares(state):
+            part.report(own)
 
     def n_clipped(self, state: Array) -> int:
         """Return how many samples were clipped, or not solved, in a run that ended in a state."""
-        del state
-        return 0
+        return sum(part.n_clipped(own) for part, own in self.shares(state))
 
     def _inputs_from(self, recording: Recording) -> Array:
         for channel in self.inputs:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Ge
@@ -20,9 +20,9 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Board, Kernel, Ports, Run, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Board, Kernel, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Composition
-from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Vector
+from mckibben.blocks.fields import STRICT, Channel, Channels, Vector
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.saving import nested
@@ -269,44 +269,14 @@ class FeedforwardFeedback(Composition):
         """All inputs but the references."""
         return tuple(channel.name for channel in self.inputs[len(self.feedback.driven) :])
 
-    @cached_property
-    def _taken(self) -> list[int]:
-        """Which inputs the compensator takes."""
-        return [self.inputs.index(channel) for channel in self.compensator.inputs]
-
     @property
     def outputs(self) -> tuple[Channel, ...]:
         return self.compensator.outputs
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        own, feedback = self._shared_initial(initial)
-        n = len(self.feedback.driven)
-        both = np.concatenate([first[: 2 * n], np.zeros(n)])
-        ahead = self.compensator.initial_state(np.asarray(first)[self._taken], own)
-        return np.concatenate([ahead, self.feedback.initial_state(both, feedback)])
-
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        n, length = len(self.feedback.driven), inputs.shape[0]
-        ahead, asked = self._states(state)
-        wanted = np.empty((length, len(self.compensator.inputs)))
-        base = np.empty((length, len(self.outputs)))
-        given = np.empty((length, len(self.feedback.inputs)))
-        compensate = self.compensator.bind(sample_time, ahead, wanted, base)
-        correct = self.feedback.bind(sample_time, asked, given, outputs)
-
-        def run() -> None:
-            wanted[:] = inputs[:, self._taken]
-            compensate()
-            given[:, : 2 * n] = inputs[:, : 2 * n]
-            given[:, 2 * n :] = base
-            correct()
-
-        return run
-
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
-        n = len(self.feedback.driven)
-        bases = self.compensator.wired(board, [given[place] for place in self._taken])
-        return self.feedback.wired(board, [*given[: 2 * n], *bases])
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+        own = [self.inputs.index(channel) for channel in self.compensator.inputs]
+        bases = self.compensator.wired(board, [taken[place] for place in own])
+        return self.feedback.wired(board, [*taken[: 2 * len(self.feedback.driven)], *bases])
 
     def joined(self, parts: Sequence[str]) -> str:
         """Return the sum of what both give, the feedback from the compensator's references."""

@@ -18,7 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Cost, Kernel, Start, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.kernels import kernel
-from mckibben.blocks.notation import indexed, lettered
+from mckibben.blocks.notation import lettered
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.registry import load
@@ -303,11 +303,7 @@ class Inverse(Block):
 
     def worked(self) -> tuple[str, ...]:
         """Return which channels go in and come out; P is the block that follows."""
-        letters = []
-        for letter, channels in (("y", self.forward.outputs), (r"\hat{u}", self.outputs)):
-            for place, channel in enumerate(channels):
-                own = indexed(letter, (place,), 1) if len(channels) > 1 else letter
-                letters.append(lettered(own, channel.name, channel.unit))
+        letters = lettered("y", self.forward.outputs) + lettered(r"\hat{u}", self.outputs)
         return (r",\quad ".join([*letters, r"P\text{: the model below}"]),)
 
     @classmethod

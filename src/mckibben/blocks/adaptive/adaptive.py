@@ -17,7 +17,7 @@ from dataclasses import dataclass as plain_dataclass
 from dataclasses import replace
 from functools import cached_property
 from statistics import NormalDist
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt
@@ -47,7 +47,7 @@ from mckibben.blocks.base import (
     explicit_state,
     needs_sample_time,
 )
-from mckibben.blocks.compose import Series
+from mckibben.blocks.compose import Layout, Series
 from mckibben.blocks.feedback import MEASURED
 from mckibben.blocks.fields import STRICT, Channel, Initial, Vector, vector
 from mckibben.blocks.inverse import Inverse, Invertible
@@ -217,7 +217,7 @@ class Adaptive(Block):
     def _check_memory(self, state: Array) -> None:
         """Refuse a state, or what is learnt of one, that learning never comes to."""
         if self.parts and len(state) == self.n_states:
-            for part, share in zip(self.parts, self._states(state), strict=True):
+            for part, share in self.shares(state):
                 if part is self.core:
                     self.core._check_memory(share)  # of this class
                 else:
@@ -372,14 +372,14 @@ class Adaptive(Block):
     def n_states(self) -> int:
         """The inverse's, what more learning wants of the last sample, and what is learnt."""
         if self.parts:
-            return sum(part.n_states for part in self.parts)
+            return super().n_states
         return self.fixed.n_states + self.learnable.n_more_states + self.n_learnt
 
     @property
     def n_scratch(self) -> int:
         """Three numbers a parameter, what more the family wants, and those of the inverse."""
         if self.parts:
-            return sum(part.n_scratch for part in self.parts)
+            return super().n_scratch
         more = self.learnable.n_more_scratch + self.fixed.n_scratch
         return 3 * self.learnable.fitted.size + more
 
@@ -399,7 +399,7 @@ class Adaptive(Block):
         start = self.start if initial is None else initial
         if self.parts:
             named = initial is None and isinstance(start, str)  # each starts by a rule of its own
-            return self._initial_states(first, None if named else start)
+            return Layout(self).initial_state(first, None if named else start)
         if isinstance(start, str):
             return super().initial_state(first, start)
         asked = first[: len(first) - len(self.measured)]
@@ -414,35 +414,8 @@ class Adaptive(Block):
         state[: self.fixed.n_states] = self.fixed.initial_state(asked, start)
         return state
 
-    def _initial_states(self, first: Array, start: Initial | None) -> Array:
-        """Return the states of all parts, each started from the first sample that reaches it."""
-        own: Sequence[Initial | None] = [start] * len(self.parts)
-        if start is not None and not isinstance(start, str):
-            own = [share.tolist() for share in self._states(explicit_state(self, start))]
-        left, states = iter(zip(self.parts, own, strict=True)), []
-
-        def given(sample: Array) -> Array:
-            part, initial = next(left)
-            states.append(part.initial_state(sample, initial))
-            outputs = np.empty((1, len(part.outputs)))
-            part.bind(1.0, states[-1].copy(), sample[np.newaxis], outputs)()
-            return outputs[0]
-
-        behind, before = self._around
-        asked = np.array(first, dtype=np.float64)
-        if behind:
-            asked = np.concatenate([given(asked[k : k + 1].copy()) for k in range(2)])
-        found = given(asked)
-        if before:
-            given(found)
-        return np.concatenate(states)
-
-    def _states(self, state: Array) -> list[Array]:
-        """Return the states of the parts of a series, as views."""
-        return np.split(state, np.cumsum([part.n_states for part in self.parts])[:-1])
-
     def _core_state(self, state: Array) -> Array:
-        return self._states(state)[self.parts.index(self.core)] if self.parts else state
+        return next((own for part, own in self.shares(state) if part is self.core), state)
 
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return what is not learnt of a state of the core, theta, used, root and senses, as views."""
@@ -497,38 +470,16 @@ class Adaptive(Block):
         return self.fixed.cost(sample_time) + Cost(learnt, learnt)
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that undoes the parts in order."""
-        if not self.parts:
-            return super().bind(sample_time, state, inputs, outputs)
-        n = inputs.shape[0]
-        behind, before = self._around
-        columns, undone = np.empty((2, n, 1)), np.empty((2, n, 1))
-        asked, given = np.empty((n, 2)), np.empty((n, 1)) if before else outputs
-        states = iter(self._states(state))
-        runs: list[Run] = []
-        if behind:
-            runs = [behind.bind(sample_time, next(states), columns[k], undone[k]) for k in range(2)]
-        learn = self.core.bind(sample_time, next(states), asked, given)
-        last = before.bind(sample_time, next(states), given, outputs) if before else None
+        """Return a function that runs what learns; of a series, all parts."""
+        run = Layout(self).bind if self.parts else super().bind
+        return run(sample_time, state, inputs, outputs)
 
-        def run() -> None:
-            asked[:] = inputs
-            for k, undo in enumerate(runs):
-                columns[k, :, 0] = inputs[:, k]
-                undo()
-                asked[:, k] = undone[k, :, 0]
-            learn()
-            if last is not None:
-                last()
-
-        return run
-
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         """Lay out the parts; those behind the core twice."""
         if not self.parts:
-            return super().wired(board, given)
+            return super().wired(board, taken)
         behind, before = self._around
-        signals = [behind.wired(board, [signal])[0] for signal in given] if behind else given
+        signals = [behind.wired(board, [signal])[0] for signal in taken] if behind else taken
         found = self.core.wired(board, signals)
         found = before.wired(board, found) if before else found
         if not isinstance(self.start, str):
@@ -536,17 +487,17 @@ class Adaptive(Block):
         return found
 
     def report(self, state: Array) -> None:
-        """Pass on what the parts of a series have to say."""
+        """Warn as the inverse that does not learn would; of a series, as all parts do."""
         if self.parts:
-            for part, share in zip(self.parts, self._states(state), strict=True):
-                part.report(share)
+            super().report(state)
+        else:
+            self.fixed.report(state[: self.fixed.n_states])
 
     def n_clipped(self, state: Array) -> int:
-        """Return the samples that parts of a series clipped."""
-        if not self.parts:
-            return 0
-        shares = zip(self.parts, self._states(state), strict=True)
-        return sum(part.n_clipped(share) for part, share in shares)
+        """Return what the inverse that does not learn would count; of a series, all parts."""
+        if self.parts:
+            return super().n_clipped(state)
+        return self.fixed.n_clipped(state[: self.fixed.n_states])
 
     # -- what is learnt ----------------------------------------------------------------------
 

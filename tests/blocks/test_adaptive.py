@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import Block, ModelError, ModelWarning, Series, load
-from mckibben.blocks.adaptive.adaptive import Adaptive, adaptive, alarm_limit
+from mckibben.blocks.adaptive import Adaptive, adaptive, alarm_limit
 from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI

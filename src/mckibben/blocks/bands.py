@@ -18,15 +18,15 @@ from pydantic import BeforeValidator, Field, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Board, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.base import Block, Board, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vector
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 from mckibben.numerals import numeral
-from mckibben.recording import Recording
 from mckibben.registry import load
 
 WIDENS = 0.05
@@ -201,7 +201,7 @@ class Band(Block):
 
     kind: ClassVar[str] = "band"
     ports: ClassVar[Ports] = ("driving", "given"), (), ("given",)
-    kernel: ClassVar[Kernel] = band_step
+    kernel: ClassVar[Step] = band_step
     start_kernel: ClassVar[Start] = band_start
     parameters: ClassVar[tuple[str, ...]] = ("shift", "log_scale")
     notation: ClassVar[Notation] = Notation(
@@ -366,6 +366,14 @@ class Banded(Composition):
     forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     band: Annotated[InstanceOf[Band], BeforeValidator(nested)]
 
+    path_dependent = same_as("forward.path_dependent")
+    sample_time = same_as("forward.sample_time")
+    inputs = same_as("forward.inputs")
+    scheduling = same_as("forward.scheduling")
+    outputs = same_as("band.outputs")
+    start = same_as("forward.start")
+    start_on = same_as("forward.start_on")
+
     def __post_init__(self) -> None:
         self.check_parts()
         if self.band.inputs != (*self.forward.inputs, *self.forward.outputs):
@@ -391,34 +399,6 @@ class Banded(Composition):
     @property
     def parts(self) -> tuple[Block, ...]:  # type: ignore[override]
         return (self.forward, self.band)
-
-    @property
-    def path_dependent(self) -> bool:  # type: ignore[override]
-        return self.forward.path_dependent
-
-    @property
-    def sample_time(self) -> float | None:  # type: ignore[override]
-        return self.forward.sample_time
-
-    @property
-    def inputs(self) -> tuple[Channel, ...]:
-        return self.forward.inputs
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        return self.forward.scheduling
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Each of the model's, then its lower and its upper end."""
-        return self.band.outputs
-
-    @property
-    def start(self) -> Initial:
-        return self.forward.start
-
-    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        return self.forward.start_on(recording, initial)
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the model's state, then that of a motion that begins at rest.

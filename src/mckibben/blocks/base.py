@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from control import StateSpace, TransferFunction
 
 Run = Callable[[], None]
-Kernel = Step
 Start = Callable[..., None]
 
 VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
@@ -98,7 +97,7 @@ class Block(DrawsItself, Parametrised):
 
     face: ClassVar[str] = "block"
 
-    kernel: ClassVar[Kernel]
+    kernel: ClassVar[Step]
     """Advances one sample, ``kernel(coefficients, state, inputs, outputs)``. One with a parameter
     ``scratch`` behind the state is given `n_scratch` numbers to compute in."""
 
@@ -120,7 +119,7 @@ class Block(DrawsItself, Parametrised):
     what it gives where none was shown any data."""
 
     undoing: ClassVar[bool] = False
-    """Whether blocks of this class undo another, which `undone` gives."""
+    """Whether blocks of this class undo another, which `forward_model` gives."""
 
     no_inverse: ClassVar[str] = (
         "has no exact inverse. Remedy: use an invertible model (pi, gpi, mpi)."
@@ -164,6 +163,11 @@ class Block(DrawsItself, Parametrised):
     def scheduling(self) -> tuple[str, ...]:
         """Names of the inputs that schedule the block but are not driven through it."""
         return tuple(channel.name for channel in self._channels(*self.ports[1]))
+
+    @property
+    def n_driven(self) -> int:
+        """How many inputs, the first ones, are driven through the block."""
+        return len(self.inputs) - len(self.scheduling)
 
     @property
     def outputs(self) -> tuple[Channel, ...]:
@@ -254,29 +258,17 @@ class Block(DrawsItself, Parametrised):
         return self.coefficients(self.sample_time or 1.0)
 
     def state_at(self, first: Array, output: Array) -> Array | None:
-        """Return the state at rest at a first input where the output is known, for models of it.
-
-        None, by default, where past outputs are no part of the state.
-        """
-        del first, output
+        """Return the state at rest at a first input and output; None where outputs are no part of it."""
         return None
 
     def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
         """Return the start to use on a recording, which some rules look at; by default as given."""
-        del recording
         return initial
 
     # -- its kernel --------------------------------------------------------------------------
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the numbers that the kernel reads, one-dimensional; by default the parameters.
-
-        Raises
-        ------
-        ModelError
-            If the block has no kernel: it is composed of others, each of which has its own.
-        """
-        del sample_time
+        """Return the numbers that the kernel reads, one-dimensional; by default the parameters."""
         if getattr(self, "kernel", None) is None:
             raise ModelError(
                 f"{self.kind!r} is neither one kernel nor a composition, so it cannot be exported. "
@@ -306,7 +298,7 @@ class Block(DrawsItself, Parametrised):
         """Return what a step costs."""
         return Cost.of(self.coefficients(sample_time), self.n_states)
 
-    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+    def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Give the name and the numbers of every field that is `increasing`."""
         for name in self.increasing:
             yield name, getattr(self, name)
@@ -316,17 +308,11 @@ class Block(DrawsItself, Parametrised):
         return board.call(self, taken)
 
     def inverse(self) -> Block:
-        """Return the block that undoes this one.
-
-        Raises
-        ------
-        ModelError
-            If this block has no inverse; the text says which condition fails and what to do.
-        """
+        """Return the block that undoes this one; a `ModelError` says why there is none."""
         raise ModelError(f"{self.kind!r} {self.no_inverse}")
 
     @property
-    def undone(self) -> Block | None:
+    def forward_model(self) -> Block | None:
         """Of a compensator, the model that it undoes; None where it undoes none, as feedback alone."""
         try:
             return self.inverse()
@@ -334,10 +320,9 @@ class Block(DrawsItself, Parametrised):
             return None
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the outputs that can be reached whatever happened before, lowest and highest.
+        """Return the lowest and highest outputs that can be reached whatever happened before.
 
-        Each has shape (n_outputs,). Bounded by the block's own input range where it has one;
-        infinite where it has none.
+        Each has shape (n_outputs,); by default they are infinite.
         """
         n = len(self.outputs)
         return np.full(n, -np.inf), np.full(n, np.inf)
@@ -357,17 +342,8 @@ class Block(DrawsItself, Parametrised):
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return a linear block as a state-space system; its state is 0 at the operating point.
 
-        Parameters
-        ----------
-        sample_time : float, optional
-            Time between samples [s]; needed by blocks that are continuous in time.
-
-        Raises
-        ------
-        ModelError
-            If it is not linear.
+        The time between samples [s] is needed by blocks that are continuous in time.
         """
-        del sample_time
         raise ModelError(
             f"{self.kind!r} is not linear, so it has no transfer function. Remedy: hand over a linear "
             "model (oe, arx, armax, bj, p1 to p3), or look at its describing function."

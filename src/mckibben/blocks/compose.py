@@ -255,7 +255,7 @@ class Series(Composition):
     def __post_init__(self) -> None:
         self.check_parts()
         for before, after in pairwise(self.parts):
-            driven = len(after.inputs) - len(after.scheduling)
+            driven = after.n_driven
             if len(before.outputs) != driven:
                 raise ModelError(
                     f"{before.kind!r} gives {len(before.outputs)} output(s), {after.kind!r} behind it "
@@ -267,7 +267,7 @@ class Series(Composition):
         """Those of the first part, then scheduling inputs of later parts."""
         channels = {channel.name: channel for channel in self.parts[0].inputs}
         for part in self.parts[1:]:
-            for channel in part.inputs[len(part.inputs) - len(part.scheduling) :]:
+            for channel in part.inputs[part.n_driven :]:
                 channels.setdefault(channel.name, channel)
         return tuple(channels.values())
 
@@ -275,7 +275,7 @@ class Series(Composition):
     def scheduling(self) -> tuple[str, ...]:
         """Names of all scheduling inputs."""
         first = self.parts[0]
-        driven = {c.name for c in first.inputs[: len(first.inputs) - len(first.scheduling)]}
+        driven = {c.name for c in first.inputs[: first.n_driven]}
         return tuple(c.name for c in self.inputs if c.name not in driven)
 
     @property
@@ -295,7 +295,7 @@ class Series(Composition):
                     "behind it would start from another sample than in Python. Remedy: start it from "
                     "'first_sample'."
                 )
-            driven = signals[: len(part.inputs) - len(part.scheduling)]
+            driven = signals[: part.n_driven]
             signals = part.wired(board, [*driven, *(by_name[name] for name in part.scheduling)])
         return signals
 

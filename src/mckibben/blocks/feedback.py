@@ -20,11 +20,12 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Board, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Board, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import STRICT, Channel, Channels, Vector
-from mckibben.blocks.kernels import accumulate, kernel, step
+from mckibben.blocks.kernels import Step, accumulate, kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -96,7 +97,7 @@ class PIDFeedback(Block):
 
     kind: ClassVar[str] = "pid"
     ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = pid_step
+    kernel: ClassVar[Step] = pid_step
     start_kernel: ClassVar[Start] = pid_start
     rate_dependent: ClassVar[bool] = True
     no_inverse: ClassVar[str] = "has no inverse. Remedy: invert the model of the muscle."
@@ -178,7 +179,7 @@ class PIDFeedback(Block):
 
     def behind(self, compensator: Block) -> Self:
         """Return the same feedback on top of what a compensator gives."""
-        references = compensator.inputs[: len(compensator.inputs) - len(compensator.scheduling)]
+        references = compensator.inputs[: compensator.n_driven]
         outputs = compensator.outputs
         beside = (*_called(references, MEASURED), *_called(outputs, "_base"))
         return replace(self, driven=references, scheduled=beside, given=outputs, late=True)
@@ -218,10 +219,15 @@ class FeedforwardFeedback(Composition):
     compensator: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     feedback: Annotated[InstanceOf[PIDFeedback], BeforeValidator(nested)]
 
+    path_dependent = same_as("compensator.path_dependent")
+    forward_model = same_as("compensator.forward_model")
+    samples_ahead = same_as("compensator.samples_ahead")
+    outputs = same_as("compensator.outputs")
+
     def __post_init__(self) -> None:
         self.check_parts()
         n = len(self.compensator.outputs)
-        n_driven = len(self.compensator.inputs) - len(self.compensator.scheduling)
+        n_driven = self.compensator.n_driven
         if (len(self.feedback.driven), len(self.feedback.scheduled)) != (n_driven, n + n_driven):
             raise ModelError(
                 f"feedback of {len(self.feedback.driven)} references with "
@@ -241,18 +247,6 @@ class FeedforwardFeedback(Composition):
         return (self.compensator, self.feedback)
 
     @property
-    def path_dependent(self) -> bool:  # type: ignore[override]
-        return self.compensator.path_dependent
-
-    @property
-    def undone(self) -> Block | None:
-        return self.compensator.undone
-
-    @property
-    def samples_ahead(self) -> int:  # type: ignore[override]
-        return self.compensator.samples_ahead
-
-    @property
     def measured(self) -> tuple[Channel, ...]:
         """What is measured."""
         return self.feedback.scheduled[: len(self.feedback.driven)]
@@ -268,10 +262,6 @@ class FeedforwardFeedback(Composition):
     def scheduling(self) -> tuple[str, ...]:
         """All inputs but the references."""
         return tuple(channel.name for channel in self.inputs[len(self.feedback.driven) :])
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        return self.compensator.outputs
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         own = [self.inputs.index(channel) for channel in self.compensator.inputs]

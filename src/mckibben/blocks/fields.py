@@ -52,6 +52,9 @@ def rows(value: Any) -> Any:
 Rows = Annotated[tuple[Vector, ...], BeforeValidator(rows)]
 """Rows of finite numbers."""
 
+LONGEST_DELAY = 254
+"""Samples by which an output may come late."""
+
 Positive = Annotated[FiniteFloat, Gt(0)]
 NotNegative = Annotated[FiniteFloat, Ge(0)]
 

@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from functools import wraps
 from inspect import isfunction
 from itertools import islice
+from operator import attrgetter
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -144,6 +145,11 @@ class Parametrised(metaclass=Checked):
         values = iter(parameter_vector(self, parameters).tolist())
         fields = {name: _refilled(getattr(self, name), values) for name in self.parameters}
         return replace(self, **fields)  # type: ignore[type-var]
+
+
+def same_as(path: str) -> Any:
+    """Return a property that is an attribute of a part: ``"part.attribute"``."""
+    return property(attrgetter(path), doc=f"``{path}``")
 
 
 def parameter_vector(part: Parametrised, parameters: ArrayLike) -> Array:

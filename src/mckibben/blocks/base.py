@@ -11,7 +11,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, overload
+from typing import Any, ClassVar, Protocol, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,11 +27,6 @@ from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.system.compiling import bound
 from mckibben.system.showing import DrawsItself
-
-if TYPE_CHECKING:
-    from scipy.signal import dlti, lti
-
-    from control import StateSpace, TransferFunction
 
 Run = Callable[[], None]
 Start = Callable[..., None]
@@ -90,9 +85,8 @@ class Board(Protocol):
 class Block(DrawsItself, Parametrised):
     """An immutable parameter set with dynamics.
 
-    Concrete blocks are frozen dataclasses, registered under `kind`. They know their inputs and
-    outputs, their state, how to run, and where it exists their exact inverse. They know nothing of
-    data or fitting.
+    Concrete blocks are frozen dataclasses, registered under `kind`. They know nothing of data or
+    fitting.
     """
 
     face: ClassVar[str] = "block"
@@ -353,13 +347,8 @@ class Block(DrawsItself, Parametrised):
         """Return the transfer function of what is continuous in time, without dead time; else None."""
         return None
 
-    def to_scipy(self, sample_time: float | None = None) -> dlti | lti:
-        """Return a linear model as a system of SciPy; see `mckibben.blocks.linear.as_scipy`."""
-        return as_scipy(self, sample_time)
-
-    def to_control(self, sample_time: float | None = None) -> StateSpace | TransferFunction:
-        """Return a linear model as one of python-control; see `mckibben.blocks.linear.as_control`."""
-        return as_control(self, sample_time)
+    to_scipy = as_scipy
+    to_control = as_control
 
     @classmethod
     @abstractmethod
@@ -417,9 +406,8 @@ class Block(DrawsItself, Parametrised):
                     f"the output of {self.kind!r} is not finite on {data.name}. "
                     "Remedy: this model does not suit these data; identify it again."
                 )
-            names = [channel.name for channel in self.outputs]
-            modelled = dict(zip(names, outputs.T, strict=True))
             units = {channel.name: channel.unit for channel in self.outputs}
+            modelled = dict(zip(units, outputs.T, strict=True))
             kept = data.select([channel.name for channel in self.inputs])
             return kept.with_channels(units, **modelled)
         try:
@@ -432,15 +420,7 @@ class Block(DrawsItself, Parametrised):
         return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
 
     def stream(self, sample_time: float | None = None, *, initial: Initial | None = None) -> Stream:
-        """Return a stepper for use sample by sample, in the state before the first sample.
-
-        Parameters
-        ----------
-        sample_time : float, optional
-            Time between steps [s]; needed by rate-dependent blocks.
-        initial : {"first_sample", "virgin"} or sequence of float, optional
-            Memory before the first step; default is the block's own.
-        """
+        """Return a stepper for use sample by sample, before the first sample; see `Stream`."""
         return Stream(self, sample_time, initial)
 
     def simulate_many(
@@ -466,8 +446,7 @@ class Block(DrawsItself, Parametrised):
         -------
         array, shape (k, n), or (k, n, n_outputs) for several outputs
         """
-        sets = np.atleast_2d(np.asarray(parameters, dtype=np.float64))
-        blocks = [self.unpack(row) for row in sets]
+        blocks = [self.unpack(row) for row in np.atleast_2d(parameters)]
         inputs = self._inputs_from_array(np.asarray(data, dtype=np.float64))
         outputs = run_many(blocks, inputs, sample_time=sample_time, initial=initial)
         return outputs[:, :, 0] if outputs.shape[2] == 1 else outputs

@@ -56,13 +56,12 @@ def look(
     Every input, scaled to the range that calibration saw, gives its level, how far it is from its last
     reversals (plays of several widths, over their widths: 1 where the play is drawn along, less where
     the input just turned), and how far it is from its own past (lags of several times). Every modelled
-    output gives its level. All is known at the sample itself, so that a stream knows it, too.
+    output gives its level.
 
     ``x`` are ``n_driving`` inputs, then modelled outputs, of the lowest, then highest ``ends``;
     ``widths`` are of plays, as shares of the range, and ``keeps`` what lags keep of themselves from
-    sample to sample. The state has plays and lags of the first input, then of the next, as shares of
-    its range. How far a sample is beyond an end is a share of that channel's range, the largest of
-    all.
+    sample to sample. The state has plays and lags of every input. How far a sample is beyond an end is
+    a share of that channel's range, the largest of all.
     """
     beyond, place, slot = 0.0, 0, 0
     for j in range(x.size):
@@ -316,11 +315,6 @@ def check_level(level: float, units: int, unit: str) -> None:
     """Refuse a level that is none, or that so few exchangeable units do not allow.
 
     A new one is as likely as each of them to be missed most, and nothing bounds by how much.
-
-    Raises
-    ------
-    ModelError
-        Naming the highest level there is, and how many units the one asked for needs.
     """
     if not 0.0 < level < 1.0:
         raise ModelError(f"the level is {level:g}. Remedy: give one above 0 and below 1, as 0.9.")
@@ -378,13 +372,7 @@ class Banded(Composition):
             )
 
     def at(self, level: float) -> Self:
-        """Return the model with its band at another level.
-
-        Raises
-        ------
-        ModelError
-            On a level outside 0 to 1, or one that calibration had too few runs for.
-        """
+        """Return the model with its band at another level, as `check_level` allows."""
         return replace(self, band=replace(self.band, level=float(level)))
 
     @property

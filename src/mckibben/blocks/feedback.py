@@ -172,25 +172,23 @@ class PIDFeedback(Block):
 
         Parameters are those of the class; without kd the derivative is left out.
         """
-        kd = [0.0] * len(kp) if kd is None else kd
-        gains = (tuple(kp), tuple(ki), tuple(kd))
-        measured = _called(references, MEASURED)
-        return cls(*gains, limits, filter_time, references, measured, outputs)
+        gains = tuple(kp), tuple(ki), (0.0,) * len(kp) if kd is None else tuple(kd)
+        return cls(*gains, limits, filter_time, references, _called(references, MEASURED), outputs)
 
     def behind(self, compensator: Block) -> Self:
         """Return the same feedback on top of what a compensator gives."""
-        references = compensator.inputs[: compensator.n_driven]
-        outputs = compensator.outputs
+        references, outputs = compensator.inputs[: compensator.n_driven], compensator.outputs
         beside = (*_called(references, MEASURED), *_called(outputs, "_base"))
         return replace(self, driven=references, scheduled=beside, given=outputs, late=True)
 
     @classmethod
     def example(cls) -> Self:
-        driven = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
-        given = tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2))
-        beside = (*_called(driven, MEASURED), *_called(given, "_base"))
-        gains = ((0.05, 0.04), (0.2, 0.3), (0.002, 0.0))
-        return cls(*gains, (0.0, 5.0), 0.1, driven, beside, given, late=True)
+        from mckibben.blocks.coupled.balance import Balance
+
+        compensator = Balance.example()
+        gains = (0.05, 0.04), (0.2, 0.3), (0.002, 0.0)
+        ends = compensator.inputs[:2], compensator.outputs
+        return cls.of(*ends, *gains, limits=(0.0, 5.0)).behind(compensator)
 
 
 def _called(channels: Channels, ending: str) -> Channels:

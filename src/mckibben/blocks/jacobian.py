@@ -69,11 +69,6 @@ def _moved(value: Any, numbers: Iterator[float]) -> Any:
     return other
 
 
-def _numbers(block: Block, sample_time: float | None) -> list[Array]:
-    """Return the coefficients of all kernels."""
-    return [each.coefficients(sample_time) for _, each in _laid_out(block).calls()]
-
-
 class Tangents:
     """Free runs of a block with their derivatives by its parameters, stretch by stretch.
 
@@ -84,11 +79,6 @@ class Tangents:
         [s].
     places : sequence of int, optional
         Of k parameters in `pack`; all by default.
-
-    Raises
-    ------
-    ModelError
-        If a part is not a kernel.
     """
 
     def __init__(
@@ -97,7 +87,7 @@ class Tangents:
         self.block = block
         values = block.pack()
         self._layout = _laid_out(block)
-        own = _numbers(block, sample_time)
+        own = [each.coefficients(sample_time) for _, each in self._layout.calls()]
         places = range(values.size) if places is None else places
         self.n_places = len(places)
         self._numbers: list[list[Complex]] = []
@@ -105,7 +95,7 @@ class Tangents:
             slopes = _coefficient_slopes(block, values, place, sample_time)
             self._numbers.append([_complex(*pair) for pair in zip(own, slopes, strict=True)])
         if not places:
-            self._numbers.append([numbers.astype(np.complex128) for numbers in own])
+            self._numbers.append([_complex(numbers, np.zeros(numbers.size)) for numbers in own])
         blocks = [each for _, each in self._layout.calls()]
         ends = np.cumsum([0, *(each.n_states for each in blocks)]).tolist()
         self._states = list(starmap(slice, pairwise(ends)))
@@ -114,11 +104,7 @@ class Tangents:
     def start(self, first: Array, initial: Initial | None = None) -> Complex:
         """Return the states before a first input, with derivatives, shape (k or 1, n_states).
 
-        Parameters
-        ----------
-        first : array, shape (n_inputs,)
-        initial : {"first_sample", "virgin"} or sequence of float, optional
-            As of `Block.initial_state`.
+        Parameters are those of `Block.initial_state`.
         """
         rule = initial if initial is None or isinstance(initial, str) else None
         given = None if initial is rule else self.block.initial_state(first, initial)
@@ -206,20 +192,21 @@ def _coefficient_slopes(
 
     Of ever shorter differences, those that agree best: a gain may have a pole nearby.
     """
-    sizes = [numbers.size for numbers in _numbers(block, sample_time)]
 
-    def moved(change: float) -> Array:
+    def moved(change: float) -> list[Array]:
         other = values.copy()
         other[place] += change
-        return np.concatenate(_numbers(_moved(block, iter(other.tolist())), sample_time))
+        calls = _laid_out(_moved(block, iter(other.tolist()))).calls()
+        return [each.coefficients(sample_time) for _, each in calls]
 
     tried: list[Array] = []
-    found, apart = np.zeros(sum(sizes)), np.full(sum(sizes), np.inf)
+    ends = np.cumsum([numbers.size for numbers in moved(0.0)])
+    found, apart = np.zeros(ends[-1]), np.full(ends[-1], np.inf)
     for share in CHANGES:
         change = share * (abs(values[place]) or 1.0)
         slopes = np.zeros(found.size)
         for times, weight in enumerate(WEIGHTS, 1):
-            above, below = moved(times * change), moved(-times * change)
+            above, below = (np.concatenate(moved(way * change)) for way in (times, -times))
             moves = above != below  # infinite ones do not
             slopes[moves] += weight * (above[moves] - below[moves]) / change
         if tried:
@@ -229,7 +216,7 @@ def _coefficient_slopes(
             if (apart <= AGREEING * np.abs(found)).all():
                 break
         tried.append(slopes)
-    return np.split(found, np.cumsum(sizes)[:-1])
+    return np.split(found, ends[:-1])
 
 
 def jacobian(
@@ -253,11 +240,6 @@ def jacobian(
         the block's own.
     places : sequence of int, optional
         Of the k parameters, in `pack`; all by default.
-
-    Raises
-    ------
-    ModelError
-        If a part is not a kernel.
     """
     places = range(block.n_parameters) if places is None else places
     workers = max(min(cores(), len(places)), 1)

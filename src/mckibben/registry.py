@@ -18,7 +18,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     "blocks": {
         "activation-memory": "mckibben.blocks.force.activation:ActivationMemory",
         "activation-pressure": "mckibben.blocks.force.activation:ActivationPressure",
-        "adaptive": "mckibben.blocks.adaptive.adaptive:Adaptive",
+        "adaptive": "mckibben.blocks.adaptive:Adaptive",
         "affine": "mckibben.blocks.memoryless:Affine",
         "air": "mckibben.blocks.dynamics.air:Air",
         "balance": "mckibben.blocks.coupled.balance:Balance",
@@ -59,7 +59,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "play": "mckibben.blocks.hysteresis.play_operators:Play",
         "polynomial": "mckibben.blocks.memoryless:Polynomial",
         "polynomial-force": "mckibben.blocks.force.laws:PolynomialForce",
-        "predictive": "mckibben.blocks.predictive.predictive:Predictive",
+        "predictive": "mckibben.blocks.predictive:Predictive",
         "preisach": "mckibben.blocks.hysteresis.preisach:Preisach",
         "process-model": "mckibben.blocks.dynamics.process_model:ProcessModel",
         "rate-dependent-pi": "mckibben.blocks.hysteresis.pi:RateDependentPI",

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben import Block, ModelError, Series, load
-from mckibben.blocks.adaptive.adaptive import Adaptive, adaptive, alarm_limit
+from mckibben import Block, ModelError, ModelWarning, Series, load
+from mckibben.blocks.adaptive import Adaptive, adaptive, alarm_limit
 from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
@@ -189,3 +189,21 @@ def test_alarms_are_false_no_more_often_than_told() -> None:
                 beyond, looks = beyond + int(np.sum(sizes > 1.96)), looks + sizes.size
     assert beyond <= 0.05 * looks
     assert alarm_limit(60.0, 3) == pytest.approx(4.54, abs=0.01)
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("model", [*MODELS, Series.example()], ids=lambda model: model.kind)
+def test_clipped_samples_are_counted_as_by_the_inverse_that_does_not_learn(model: Block) -> None:
+    low, high = (float(end[0]) for end in model.reachable())
+    asked = low + (high - low) * (0.5 + 0.7 * np.sin(np.linspace(0.0, 9.0, 400)))
+    fixed, block = model.inverse(), adaptive(model, 60.0)
+    state = fixed.initial_state(asked[:1])
+    fixed.bind(STEP, state, asked[:, np.newaxis], np.empty((400, 1)))()
+    count = fixed.n_clipped(state)
+    assert count > 100
+    silent = np.column_stack([asked, np.full(400, np.nan)])
+    state = block.initial_state(silent[0])
+    block.bind(STEP, state, silent, np.empty((400, 1)))()
+    assert block.n_clipped(state) == count
+    with pytest.warns(ModelWarning, match=f"^{count} sample"):
+        block.report(state)

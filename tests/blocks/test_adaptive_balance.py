@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive import Adaptive
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_adapting import FRICTION, STIFFNESS
 from mckibben.blocks.coupled.balance_learning import learnt_of, ratios

@@ -14,7 +14,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.predictive.plan import (
+from mckibben.blocks.planning import (
     MOST_STEPS,
     allowed,
     limit_rows,
@@ -23,7 +23,7 @@ from mckibben.blocks.predictive.plan import (
     plan_several,
     turned,
 )
-from mckibben.blocks.predictive.predictive import Predictive
+from mckibben.blocks.predictive import Predictive
 
 STEP = 0.01
 ARM = replace(Balance.example(), pressure_range=(0.0, 6.0))
@@ -68,7 +68,7 @@ def error(block: Predictive, references: Array) -> float:
     n = len(block.outputs)
     pressures = np.asarray(block.simulate(ahead(references, block), sample_time=STEP))
     driven = np.hstack([pressures.reshape(-1, n), references[:, n:]])
-    given = block.undone.simulate(driven, sample_time=STEP)
+    given = block.forward_model.simulate(driven, sample_time=STEP)
     return float(np.sqrt(np.mean((np.asarray(given) - references[:, :n]) ** 2)))
 
 

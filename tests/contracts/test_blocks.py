@@ -21,9 +21,9 @@ from mckibben import (
     check_block,
 )
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.dynamics.air import LONGEST_DEAD_TIME, Air
+from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.dynamics.state_network import StateNetwork
-from mckibben.blocks.fields import vector
+from mckibben.blocks.fields import LONGEST_DELAY, vector
 from mckibben.blocks.hysteresis.envelopes import Exponential, Tanh
 from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.laws import examples
@@ -62,8 +62,8 @@ UNUSUAL: list[Block] = [
     replace(AIR, hysteresis=0.0, filling_time=0.04, venting_time=0.04),
     replace(AIR, filling_time=0.0, venting_time=0.0),
     replace(AIR, ambient=None, supply=None),
-    replace(AIR, dead_time=0.01 * LONGEST_DEAD_TIME),
-    replace(AIR, dead_time=0.01 * LONGEST_DEAD_TIME).inverse(),
+    replace(AIR, dead_time=0.01 * LONGEST_DELAY),
+    replace(AIR, dead_time=0.01 * LONGEST_DELAY).inverse(),
     replace(BoucWenOscillator.example(), hold="zero"),
     replace(StateNetwork.example(), hold="zero"),
     TIMELESS,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Channel, ModelError, PerChannel, Play, Series
-from mckibben.blocks.adaptive.adaptive import adaptive
+from mckibben.blocks.adaptive import adaptive
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.fields import DISPLACEMENT

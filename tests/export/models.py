@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben import Block, ModelError, ModelWarning
-from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive import Adaptive
 from mckibben.blocks.laws import examples, input_limits, wander
 from mckibben.registry import load
 from tests.export.building import SAMPLE_TIME

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mckibben import ModelError
-from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive import Adaptive
 from mckibben.export import export_c
 from mckibben.export.programs import self_test
 from mckibben.registry import load

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mckibben import PI, DataError, ModelError, Recording, review
-from mckibben.blocks.adaptive.adaptive import adaptive
-from mckibben.blocks.predictive.predictive import Predictive
+from mckibben.blocks.adaptive import adaptive
+from mckibben.blocks.predictive import Predictive
 from mckibben.control import track
 from mckibben.files.headers import channel_of, parse
 from mckibben.studying.refitting import Refit

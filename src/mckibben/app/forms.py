@@ -99,7 +99,7 @@ def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]
         case "force":
             return force_of(block)
         case "adaptive":
-            from mckibben.blocks.adaptive.adaptive import adaptive
+            from mckibben.blocks.adaptive import adaptive
 
             time = given["time"]
             if not 0 < time <= 1e6:
@@ -113,7 +113,7 @@ def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]
 
 
 def _predictive(inverse: Block, given: Mapping[str, float]) -> Block:
-    from mckibben.blocks.predictive.predictive import MOST, Predictive
+    from mckibben.blocks.predictive import MOST, Predictive
 
     horizon, rate = int(given["horizon"]), given.get("rate_limit")
     if not 1 <= horizon <= 200:

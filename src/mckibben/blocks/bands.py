@@ -11,24 +11,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Board, Kernel, Ports, Run, Start, needs_sample_time
+from mckibben.blocks.base import Block, Board, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Composition
 from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vector
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 from mckibben.numerals import numeral
-from mckibben.recording import Recording
 from mckibben.registry import load
-from mckibben.system.compiling import in_turn
 
 WIDENS = 0.05
 """Share of a range beyond its end at which a band is twice as wide."""
@@ -57,13 +56,12 @@ def look(
     Every input, scaled to the range that calibration saw, gives its level, how far it is from its last
     reversals (plays of several widths, over their widths: 1 where the play is drawn along, less where
     the input just turned), and how far it is from its own past (lags of several times). Every modelled
-    output gives its level. All is known at the sample itself, so that a stream knows it, too.
+    output gives its level.
 
     ``x`` are ``n_driving`` inputs, then modelled outputs, of the lowest, then highest ``ends``;
     ``widths`` are of plays, as shares of the range, and ``keeps`` what lags keep of themselves from
-    sample to sample. The state has plays and lags of the first input, then of the next, as shares of
-    its range. How far a sample is beyond an end is a share of that channel's range, the largest of
-    all.
+    sample to sample. The state has plays and lags of every input. How far a sample is beyond an end is
+    a share of that channel's range, the largest of all.
     """
     beyond, place, slot = 0.0, 0, 0
     for j in range(x.size):
@@ -113,20 +111,16 @@ def band_step(
     n_x = n_driving + n_given
     n_seen = n_x + n_driving * (n_widths + n_keeps)
     n_terms = 1 + n_seen + n_bells
-    at = HEAD
-    ends = c[at : at + 2 * n_x]
-    at += 2 * n_x
-    widths = c[at : at + n_widths]
-    at += n_widths
-    keeps = c[at : at + n_keeps]
-    at += n_keeps
-    mean, spread = c[at : at + n_seen], c[at + n_seen : at + 2 * n_seen]
-    at += 2 * n_seen
-    bells = c[at : at + n_bells * n_seen]
-    at += n_bells * n_seen
-    weights = c[at : at + 2 * n_given * n_terms]
-    at += 2 * n_given * n_terms
-    limits, quantile = c[at : at + 4 * n_given], c[at + 4 * n_given :]
+    at_widths = HEAD + 2 * n_x
+    at_mean = at_widths + n_widths + n_keeps
+    at_bells = at_mean + 2 * n_seen
+    at_weights = at_bells + n_bells * n_seen
+    at_limits = at_weights + 2 * n_given * n_terms
+    ends, widths = c[HEAD:at_widths], c[at_widths : at_widths + n_widths]
+    keeps = c[at_widths + n_widths : at_mean]
+    mean, spread = c[at_mean : at_mean + n_seen], c[at_mean + n_seen : at_bells]
+    bells, weights = c[at_bells:at_weights], c[at_weights:at_limits]
+    limits, quantile = c[at_limits : at_limits + 4 * n_given], c[at_limits + 4 * n_given :]
     seen, terms = scratch[:n_seen], scratch[n_seen : n_seen + n_terms]
     beyond = look(inputs, ends, widths, keeps, n_driving, state, seen)
     terms[0] = 1.0
@@ -202,7 +196,7 @@ class Band(Block):
 
     kind: ClassVar[str] = "band"
     ports: ClassVar[Ports] = ("driving", "given"), (), ("given",)
-    kernel: ClassVar[Kernel] = band_step
+    kernel: ClassVar[Step] = band_step
     start_kernel: ClassVar[Start] = band_start
     parameters: ClassVar[tuple[str, ...]] = ("shift", "log_scale")
     notation: ClassVar[Notation] = Notation(
@@ -321,11 +315,6 @@ def check_level(level: float, units: int, unit: str) -> None:
     """Refuse a level that is none, or that so few exchangeable units do not allow.
 
     A new one is as likely as each of them to be missed most, and nothing bounds by how much.
-
-    Raises
-    ------
-    ModelError
-        Naming the highest level there is, and how many units the one asked for needs.
     """
     if not 0.0 < level < 1.0:
         raise ModelError(f"the level is {level:g}. Remedy: give one above 0 and below 1, as 0.9.")
@@ -367,6 +356,14 @@ class Banded(Composition):
     forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     band: Annotated[InstanceOf[Band], BeforeValidator(nested)]
 
+    path_dependent = same_as("forward.path_dependent")
+    sample_time = same_as("forward.sample_time")
+    inputs = same_as("forward.inputs")
+    scheduling = same_as("forward.scheduling")
+    outputs = same_as("band.outputs")
+    start = same_as("forward.start")
+    start_on = same_as("forward.start_on")
+
     def __post_init__(self) -> None:
         self.check_parts()
         if self.band.inputs != (*self.forward.inputs, *self.forward.outputs):
@@ -375,13 +372,7 @@ class Banded(Composition):
             )
 
     def at(self, level: float) -> Self:
-        """Return the model with its band at another level.
-
-        Raises
-        ------
-        ModelError
-            On a level outside 0 to 1, or one that calibration had too few runs for.
-        """
+        """Return the model with its band at another level, as `check_level` allows."""
         return replace(self, band=replace(self.band, level=float(level)))
 
     @property
@@ -393,64 +384,18 @@ class Banded(Composition):
     def parts(self) -> tuple[Block, ...]:  # type: ignore[override]
         return (self.forward, self.band)
 
-    @property
-    def path_dependent(self) -> bool:  # type: ignore[override]
-        return self.forward.path_dependent
-
-    @property
-    def sample_time(self) -> float | None:  # type: ignore[override]
-        return self.forward.sample_time
-
-    @property
-    def inputs(self) -> tuple[Channel, ...]:
-        return self.forward.inputs
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        return self.forward.scheduling
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Each of the model's, then its lower and its upper end."""
-        return self.band.outputs
-
-    @property
-    def start(self) -> Initial:
-        return self.forward.start
-
-    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        return self.forward.start_on(recording, initial)
-
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the model's state, then that of a motion that begins at rest.
 
         An explicit state may be this block's own, or the model's.
         """
-        if initial is None or isinstance(initial, str) or len(initial) == self.forward.n_states:
-            own, motion = initial, None
-        else:
-            own, motion = self._shared_initial(initial)
-        states = self.forward.initial_state(first, own), self.band.initial_state(first, motion)
-        return np.concatenate(states)
+        if initial is None or isinstance(initial, str) or len(initial) != self.forward.n_states:
+            return super().initial_state(first, initial)
+        own = self.forward.initial_state(first, initial)
+        return np.concatenate([own, self.band.initial_state(first)])
 
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        n_inputs = inputs.shape[1]
-        modelled = np.empty((len(inputs), len(self.forward.outputs)))
-        both = np.empty((len(inputs), n_inputs + modelled.shape[1]))
-        own, motion = self._states(state)
-
-        def gather() -> None:
-            both[:, :n_inputs] = inputs
-            both[:, n_inputs:] = modelled
-
-        return in_turn(
-            self.forward.bind(sample_time, own, inputs, modelled),
-            gather,
-            self.band.bind(sample_time, motion, both, outputs),
-        )
-
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
-        return board.call(self.band, [*given, *self.forward.wired(board, given)])
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+        return self.band.wired(board, [*taken, *self.forward.wired(board, taken)])
 
     def joined(self, parts: Sequence[str]) -> str:
         return r"y = P[u],\quad (y^{-},\, y^{+}) = \text{band}[u, y]"

@@ -11,7 +11,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, overload
+from typing import Any, ClassVar, Protocol, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,13 +28,7 @@ from mckibben.recording import Recording
 from mckibben.system.compiling import bound
 from mckibben.system.showing import DrawsItself
 
-if TYPE_CHECKING:
-    from scipy.signal import dlti, lti
-
-    from control import StateSpace, TransferFunction
-
 Run = Callable[[], None]
-Kernel = Step
 Start = Callable[..., None]
 
 VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
@@ -67,12 +61,21 @@ class Cost:
 
 
 class Board(Protocol):
-    """Where blocks are laid out as calls in order; signals are named by text."""
+    """Where blocks are laid out as calls in order, on signals that it names as it likes.
 
-    def call(self, block: Block, given: Sequence[str]) -> list[str]:
+    Attributes
+    ----------
+    from_rest : bool
+        Whether blocks are started by what those before them give at rest, as in C, where these cannot
+        be run before the start.
+    """
+
+    from_rest: bool
+
+    def call(self, block: Block, taken: Sequence[Any]) -> list[Any]:
         """Run a block on signals, and return those that it gives."""
 
-    def add(self, terms: Sequence[str]) -> str:
+    def add(self, terms: Sequence[Any]) -> Any:
         """Return the sum of signals."""
 
     def resume(self, state: Sequence[float]) -> None:
@@ -82,14 +85,13 @@ class Board(Protocol):
 class Block(DrawsItself, Parametrised):
     """An immutable parameter set with dynamics.
 
-    Concrete blocks are frozen dataclasses, registered under `kind`. They know their inputs and
-    outputs, their state, how to run, and where it exists their exact inverse. They know nothing of
-    data or fitting.
+    Concrete blocks are frozen dataclasses, registered under `kind`. They know nothing of data or
+    fitting.
     """
 
     face: ClassVar[str] = "block"
 
-    kernel: ClassVar[Kernel]
+    kernel: ClassVar[Step]
     """Advances one sample, ``kernel(coefficients, state, inputs, outputs)``. One with a parameter
     ``scratch`` behind the state is given `n_scratch` numbers to compute in."""
 
@@ -111,7 +113,7 @@ class Block(DrawsItself, Parametrised):
     what it gives where none was shown any data."""
 
     undoing: ClassVar[bool] = False
-    """Whether blocks of this class undo another, which `undone` gives."""
+    """Whether blocks of this class undo another, which `forward_model` gives."""
 
     no_inverse: ClassVar[str] = (
         "has no exact inverse. Remedy: use an invertible model (pi, gpi, mpi)."
@@ -157,6 +159,11 @@ class Block(DrawsItself, Parametrised):
         return tuple(channel.name for channel in self._channels(*self.ports[1]))
 
     @property
+    def n_driven(self) -> int:
+        """How many inputs, the first ones, are driven through the block."""
+        return len(self.inputs) - len(self.scheduling)
+
+    @property
     def outputs(self) -> tuple[Channel, ...]:
         """Outputs."""
         return self._channels(*self.ports[2])
@@ -192,8 +199,8 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def n_states(self) -> int:
-        """Length of the state vector."""
-        return 0
+        """Length of the state vector: of all parts, one after another."""
+        return sum(part.n_states for part in getattr(self, "parts", ()))
 
     @property
     def n_fitted(self) -> int:
@@ -203,7 +210,15 @@ class Block(DrawsItself, Parametrised):
     @property
     def n_scratch(self) -> int:
         """How many numbers a step computes in beside the state, for code that cannot allocate."""
-        return 0
+        return sum(part.n_scratch for part in getattr(self, "parts", ()))
+
+    def shares(self, state: Array) -> list[tuple[Any, Array]]:
+        """Return every part with its own of a state, as a view; nothing where there are no parts."""
+        shares = []
+        for part in getattr(self, "parts", ()):
+            own, state = np.split(state, [part.n_states])
+            shares.append((part, own))
+        return shares
 
     @property
     def start(self) -> Initial:
@@ -237,29 +252,17 @@ class Block(DrawsItself, Parametrised):
         return self.coefficients(self.sample_time or 1.0)
 
     def state_at(self, first: Array, output: Array) -> Array | None:
-        """Return the state at rest at a first input where the output is known, for models of it.
-
-        None, by default, where past outputs are no part of the state.
-        """
-        del first, output
+        """Return the state at rest at a first input and output; None where outputs are no part of it."""
         return None
 
     def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
         """Return the start to use on a recording, which some rules look at; by default as given."""
-        del recording
         return initial
 
     # -- its kernel --------------------------------------------------------------------------
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the numbers that the kernel reads, one-dimensional; by default the parameters.
-
-        Raises
-        ------
-        ModelError
-            If the block has no kernel: it is composed of others, each of which has its own.
-        """
-        del sample_time
+        """Return the numbers that the kernel reads, one-dimensional; by default the parameters."""
         if getattr(self, "kernel", None) is None:
             raise ModelError(
                 f"{self.kind!r} is neither one kernel nor a composition, so it cannot be exported. "
@@ -289,27 +292,21 @@ class Block(DrawsItself, Parametrised):
         """Return what a step costs."""
         return Cost.of(self.coefficients(sample_time), self.n_states)
 
-    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+    def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Give the name and the numbers of every field that is `increasing`."""
         for name in self.increasing:
             yield name, getattr(self, name)
 
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
-        """Lay the block out on a board, and return the signals that it gives."""
-        return board.call(self, given)
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+        """Lay the block out on a board, run on signals, and return those that it gives."""
+        return board.call(self, taken)
 
     def inverse(self) -> Block:
-        """Return the block that undoes this one.
-
-        Raises
-        ------
-        ModelError
-            If this block has no inverse; the text says which condition fails and what to do.
-        """
+        """Return the block that undoes this one; a `ModelError` says why there is none."""
         raise ModelError(f"{self.kind!r} {self.no_inverse}")
 
     @property
-    def undone(self) -> Block | None:
+    def forward_model(self) -> Block | None:
         """Of a compensator, the model that it undoes; None where it undoes none, as feedback alone."""
         try:
             return self.inverse()
@@ -317,10 +314,9 @@ class Block(DrawsItself, Parametrised):
             return None
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the outputs that can be reached whatever happened before, lowest and highest.
+        """Return the lowest and highest outputs that can be reached whatever happened before.
 
-        Each has shape (n_outputs,). Bounded by the block's own input range where it has one;
-        infinite where it has none.
+        Each has shape (n_outputs,); by default they are infinite.
         """
         n = len(self.outputs)
         return np.full(n, -np.inf), np.full(n, np.inf)
@@ -340,17 +336,8 @@ class Block(DrawsItself, Parametrised):
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return a linear block as a state-space system; its state is 0 at the operating point.
 
-        Parameters
-        ----------
-        sample_time : float, optional
-            Time between samples [s]; needed by blocks that are continuous in time.
-
-        Raises
-        ------
-        ModelError
-            If it is not linear.
+        The time between samples [s] is needed by blocks that are continuous in time.
         """
-        del sample_time
         raise ModelError(
             f"{self.kind!r} is not linear, so it has no transfer function. Remedy: hand over a linear "
             "model (oe, arx, armax, bj, p1 to p3), or look at its describing function."
@@ -360,13 +347,8 @@ class Block(DrawsItself, Parametrised):
         """Return the transfer function of what is continuous in time, without dead time; else None."""
         return None
 
-    def to_scipy(self, sample_time: float | None = None) -> dlti | lti:
-        """Return a linear model as a system of SciPy; see `mckibben.blocks.linear.as_scipy`."""
-        return as_scipy(self, sample_time)
-
-    def to_control(self, sample_time: float | None = None) -> StateSpace | TransferFunction:
-        """Return a linear model as one of python-control; see `mckibben.blocks.linear.as_control`."""
-        return as_control(self, sample_time)
+    to_scipy = as_scipy
+    to_control = as_control
 
     @classmethod
     @abstractmethod
@@ -424,9 +406,8 @@ class Block(DrawsItself, Parametrised):
                     f"the output of {self.kind!r} is not finite on {data.name}. "
                     "Remedy: this model does not suit these data; identify it again."
                 )
-            names = [channel.name for channel in self.outputs]
-            modelled = dict(zip(names, outputs.T, strict=True))
             units = {channel.name: channel.unit for channel in self.outputs}
+            modelled = dict(zip(units, outputs.T, strict=True))
             kept = data.select([channel.name for channel in self.inputs])
             return kept.with_channels(units, **modelled)
         try:
@@ -439,15 +420,7 @@ class Block(DrawsItself, Parametrised):
         return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
 
     def stream(self, sample_time: float | None = None, *, initial: Initial | None = None) -> Stream:
-        """Return a stepper for use sample by sample, in the state before the first sample.
-
-        Parameters
-        ----------
-        sample_time : float, optional
-            Time between steps [s]; needed by rate-dependent blocks.
-        initial : {"first_sample", "virgin"} or sequence of float, optional
-            Memory before the first step; default is the block's own.
-        """
+        """Return a stepper for use sample by sample, before the first sample; see `Stream`."""
         return Stream(self, sample_time, initial)
 
     def simulate_many(
@@ -473,8 +446,7 @@ class Block(DrawsItself, Parametrised):
         -------
         array, shape (k, n), or (k, n, n_outputs) for several outputs
         """
-        sets = np.atleast_2d(np.asarray(parameters, dtype=np.float64))
-        blocks = [self.unpack(row) for row in sets]
+        blocks = [self.unpack(row) for row in np.atleast_2d(parameters)]
         inputs = self._inputs_from_array(np.asarray(data, dtype=np.float64))
         outputs = run_many(blocks, inputs, sample_time=sample_time, initial=initial)
         return outputs[:, :, 0] if outputs.shape[2] == 1 else outputs
@@ -502,12 +474,12 @@ class Block(DrawsItself, Parametrised):
 
     def report(self, state: Array) -> None:
         """Warn of what happened during a run that its user should know, read off the final state."""
-        del state
+        for part, own in self.shares(state):
+            part.report(own)
 
     def n_clipped(self, state: Array) -> int:
         """Return how many samples were clipped, or not solved, in a run that ended in a state."""
-        del state
-        return 0
+        return sum(part.n_clipped(own) for part, own in self.shares(state))
 
     def _inputs_from(self, recording: Recording) -> Array:
         for channel in self.inputs:

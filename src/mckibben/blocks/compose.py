@@ -1,17 +1,18 @@
 """Blocks made of blocks: in series, in parallel, and one to a channel.
 
-They run, stream, save and invert because their parts do: the inverse of a series is the reversed
-series of the inverses.
+Each says once, in `wired`, which part runs on which signals. From that they run, stream and start here,
+have derivatives, and become C; the inverse of a series is the reversed series of the inverses.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass as plain_dataclass
 from dataclasses import replace
-from functools import cached_property, reduce
-from itertools import pairwise
-from typing import Annotated, ClassVar, Self
+from functools import cached_property, partial, reduce
+from itertools import groupby, pairwise
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
@@ -28,6 +29,130 @@ from mckibben.system.compiling import in_turn
 
 DEEPEST, MOST_BLOCKS = 32, 1000
 """Compositions in compositions, and blocks in all."""
+
+AT_REST = ("first_sample", "fitted")
+"""Rules by which a block starts at rest at its first input, where no output is known."""
+
+
+@plain_dataclass
+class Call:
+    """A block that is no composition, or a sum if there is none, on signals; and those it gives."""
+
+    block: Block | None
+    taken: list[int]
+    given: list[int]
+    state: Array | None = None
+
+
+class Layout:
+    """What a composition does, in order, on signals that are numbered, the inputs first.
+
+    Parameters
+    ----------
+    block : Block
+        What is laid out.
+    from_rest : bool
+        As of `Board`.
+    """
+
+    def __init__(self, block: Block, *, from_rest: bool = False) -> None:
+        self.block, self.from_rest, self.steps = block, from_rest, list[Call]()
+        self.n_inputs = self.n_signals = len(block.inputs)
+        self.given = block.wired(self, range(self.n_inputs))
+
+    def _append(self, block: Block | None, taken: Sequence[int], count: int) -> list[int]:
+        given = [*range(self.n_signals, self.n_signals + count)]
+        self.steps.append(Call(block, [*taken], given))
+        self.n_signals += count
+        return given
+
+    def call(self, block: Block, taken: Sequence[int]) -> list[int]:
+        """Append a block, and return the signals that it gives."""
+        return self._append(block, taken, len(block.outputs))
+
+    def add(self, terms: Sequence[int]) -> int:
+        """Append a sum of signals, and return the signal that it gives."""
+        return self._append(None, terms, 1)[0]
+
+    def resume(self, state: Sequence[float]) -> None:
+        """Start the blocks called last from a state of them all."""
+        left = np.array(state, dtype=np.float64)
+        for call, block in reversed(list(self.calls())):
+            if left.size:
+                left, call.state = np.split(left, [left.size - block.n_states])
+
+    def calls(self) -> Iterator[tuple[Call, Block]]:
+        """Give the calls of blocks, in order."""
+        return ((step, step.block) for step in self.steps if step.block is not None)
+
+    def initial_state(self, first: Array, initial: Initial | None) -> Array:
+        """Return the states of all blocks, each started from the first sample that reaches it."""
+        signals = np.empty(self.n_signals)
+        signals[: self.n_inputs] = first
+        passed_on: set[int] = set()
+        for step in reversed(self.steps):
+            if step.block is not None or passed_on.issuperset(step.given):
+                passed_on.update(step.taken)
+        states, left = [np.empty(0)], None
+        if not isinstance(initial, str | None):
+            left = explicit_state(self.block, initial).tolist()
+        for step in self.steps:
+            sample, block = signals[step.taken], step.block
+            if block is None:
+                signals[step.given] = sample.sum()
+                continue
+            start = initial if step.state is None or initial is not None else step.state.tolist()
+            if left is not None:
+                start, left = left[: block.n_states], left[block.n_states :]
+            states.append(block.initial_state(sample, start))
+            if not passed_on.isdisjoint(step.given):
+                outputs = np.empty((1, len(step.given)))
+                time = block.sample_time or 1.0
+                block.bind(time, states[-1].copy(), sample[np.newaxis], outputs)()
+                signals[step.given] = outputs[0]
+        return np.concatenate(states)
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs all blocks, as `Block.bind` says."""
+        tables = {tuple(range(self.n_inputs)): inputs}
+        places = [(inputs, column) for column in range(self.n_inputs)]  # of signals
+        runs: list[Run] = []
+
+        def neighbours(numbered: tuple[int, int]) -> tuple[int, int]:
+            return id(places[numbered[1]][0]), numbered[1] - numbered[0]
+
+        def copy(signals: Sequence[int], into: Array) -> None:
+            for _, group in groupby(enumerate(signals), neighbours):
+                (first, signal), *others = group
+                (table, column), count = places[signal], 1 + len(others)
+                target, source = into[:, first : first + count], table[:, column : column + count]
+                runs.append(partial(np.copyto, target, source))
+
+        for step in self.steps:
+            into = outputs if step.given == self.given else np.empty((len(inputs), len(step.given)))
+            if step.block is None:
+                terms = [places[signal] for signal in step.taken]
+                runs.append(
+                    partial(_add, [table[:, column] for table, column in terms], into[:, 0])
+                )
+            else:
+                taken = tables.get(tuple(step.taken))
+                if taken is None:
+                    taken = np.empty((len(inputs), len(step.taken)))
+                    copy(step.taken, taken)
+                own, state = np.split(state, [step.block.n_states])
+                runs.append(step.block.bind(sample_time, own, taken, into))
+            tables[tuple(step.given)] = into
+            places += [(into, column) for column in range(len(step.given))]
+        if tuple(self.given) not in tables:
+            copy(self.given, outputs)
+        return in_turn(*runs)
+
+
+def _add(terms: Sequence[Array], total: Array) -> None:
+    total[:] = 0.0
+    for term in terms:
+        np.add(total, term, out=total)
 
 
 def _parts(value: object) -> object:
@@ -47,14 +172,14 @@ class Composition(Block):
 
     parts: tuple[Block, ...]
 
+    @abstractmethod
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return in LaTeX what the parts, of these names, make together."""
+
     def equations(self) -> tuple[str, ...]:
         """Return how the parts come together: ``y`` of them all, ``u`` going into each."""
         marks = [f"{self.letter}_{{{place + 1}}}" for place in range(len(self.parts))]
         return (self.joined(marks),)
-
-    @abstractmethod
-    def joined(self, parts: Sequence[str]) -> str:
-        """Return in LaTeX what the parts, of these names, make together."""
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
@@ -65,6 +190,16 @@ class Composition(Block):
     def of_local_rules(self) -> bool:  # type: ignore[override]
         """Whether any part is."""
         return any(part.of_local_rules for part in self.parts)
+
+    @property
+    def undoing(self) -> bool:  # type: ignore[override]
+        """Whether any part is an inverse: it reaches only what the block undone wants."""
+        return any(part.undoing for part in self.parts)
+
+    @property
+    def dead_time(self) -> float:  # type: ignore[override]
+        """That of the parts together."""
+        return type(self).together(part.dead_time for part in self.parts)
 
     @property
     def depth(self) -> int:
@@ -86,48 +221,18 @@ class Composition(Block):
                 f"Remedy: compose at most {MOST_BLOCKS} blocks, at most {DEEPEST} deep."
             )
 
-    @property
-    def n_states(self) -> int:
-        """The states of all parts."""
-        return sum(part.n_states for part in self.parts)
+    @cached_property
+    def layout(self) -> Layout:
+        """What the parts do, in order."""
+        return Layout(self)
 
-    @property
-    def n_scratch(self) -> int:
-        """The scratch of all parts."""
-        return sum(part.n_scratch for part in self.parts)
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the parts' states, each started from the first sample that reaches it."""
+        return self.layout.initial_state(first, initial)
 
-    @property
-    def dead_time(self) -> float:  # type: ignore[override]
-        """That of the parts together."""
-        return type(self).together(part.dead_time for part in self.parts)
-
-    def _states(self, state: Array) -> list[Array]:
-        return np.split(state, np.cumsum([part.n_states for part in self.parts])[:-1])
-
-    def report(self, state: Array) -> None:
-        """Pass on what the parts have to say."""
-        for part, share in zip(self.parts, self._states(state), strict=True):
-            part.report(share)
-
-    def n_clipped(self, state: Array) -> int:
-        """Return those of all parts."""
-        shares = zip(self.parts, self._states(state), strict=True)
-        return sum(part.n_clipped(share) for part, share in shares)
-
-    def _shared_initial(self, initial: Initial | None) -> Sequence[Initial | None]:
-        """Return every part's own share of an explicit initial state, or the rule for all."""
-        if initial is None or isinstance(initial, str):
-            return [initial] * len(self.parts)
-        return [share.tolist() for share in self._states(explicit_state(self, initial))]
-
-    @property
-    def undoing(self) -> bool:  # type: ignore[override]
-        """Whether any part is an inverse: it reaches only what the block undone wants."""
-        return any(part.undoing for part in self.parts)
-
-
-AT_REST = ("first_sample", "fitted")
-"""Rules by which a block starts at rest at its first input, where no output is known."""
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the parts in order."""
+        return self.layout.bind(sample_time, state, inputs, outputs)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -150,7 +255,7 @@ class Series(Composition):
     def __post_init__(self) -> None:
         self.check_parts()
         for before, after in pairwise(self.parts):
-            driven = len(after.inputs) - len(after.scheduling)
+            driven = after.n_driven
             if len(before.outputs) != driven:
                 raise ModelError(
                     f"{before.kind!r} gives {len(before.outputs)} output(s), {after.kind!r} behind it "
@@ -162,7 +267,7 @@ class Series(Composition):
         """Those of the first part, then scheduling inputs of later parts."""
         channels = {channel.name: channel for channel in self.parts[0].inputs}
         for part in self.parts[1:]:
-            for channel in part.inputs[len(part.inputs) - len(part.scheduling) :]:
+            for channel in part.inputs[part.n_driven :]:
                 channels.setdefault(channel.name, channel)
         return tuple(channels.values())
 
@@ -170,7 +275,7 @@ class Series(Composition):
     def scheduling(self) -> tuple[str, ...]:
         """Names of all scheduling inputs."""
         first = self.parts[0]
-        driven = {c.name for c in first.inputs[: len(first.inputs) - len(first.scheduling)]}
+        driven = {c.name for c in first.inputs[: first.n_driven]}
         return tuple(c.name for c in self.inputs if c.name not in driven)
 
     @property
@@ -178,77 +283,20 @@ class Series(Composition):
         """Those of the last part."""
         return self.parts[-1].outputs
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the parts' states, each started from the first sample that reaches it."""
-        states: list[Array] = []
-        driven: Array | None = None
-        for part, own in zip(self.parts, self._shared_initial(initial), strict=True):
-            sample = self._sample(part, first, driven)
-            states.append(part.initial_state(sample, own))
-            outputs = np.empty((1, len(part.outputs)))
-            part.bind(part.sample_time or 1.0, states[-1].copy(), sample[np.newaxis], outputs)()
-            driven = outputs[0]
-        return np.concatenate(states)
-
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs the parts in order."""
-        runs: list[Run] = []
-        signal: Array | None = None
-        last = len(self.parts) - 1
-        for index, (part, own) in enumerate(zip(self.parts, self._states(state), strict=True)):
-            given = inputs
-            if signal is not None or len(part.inputs) < inputs.shape[1]:
-                given, gather = self._gathered(part, inputs, signal)
-                if gather is not None:
-                    runs.append(gather)
-            into = outputs if index == last else np.empty((inputs.shape[0], len(part.outputs)))
-            runs.append(part.bind(sample_time, own, given, into))
-            signal = into
-
-        return in_turn(*runs)
-
-    def _gathered(
-        self, part: Block, inputs: Array, signal: Array | None
-    ) -> tuple[Array, Run | None]:
-        """Return the inputs of a part, and what fills them before it runs, if anything must."""
-        names = [channel.name for channel in self.inputs]
-        scheduling = [names.index(name) for name in part.scheduling]
-        if signal is not None and not scheduling:
-            return signal, None
-        driven = len(part.inputs) - len(scheduling)
-        gathered = np.empty((inputs.shape[0], len(part.inputs)))
-
-        def gather() -> None:
-            gathered[:, :driven] = inputs[:, :driven] if signal is None else signal
-            for column, source in enumerate(scheduling, start=driven):
-                gathered[:, column] = inputs[:, source]
-
-        return gathered, gather
-
-    def _sample(self, part: Block, first: Array, driven: Array | None) -> Array:
-        signal = None if driven is None else driven[np.newaxis]
-        given, gather = self._gathered(part, first[np.newaxis], signal)
-        if gather is not None:
-            gather()
-        return given[0]
-
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         """Lay out the parts one behind the other."""
-        by_name = dict(zip((channel.name for channel in self.inputs), given, strict=True))
-        signals: list[str] | None = None
+        by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
+        signals = list(taken)
         for number, part in enumerate(self.parts):
             at_rest = not part.rate_dependent or part.start in AT_REST
-            if number < len(self.parts) - 1 and not at_rest:
+            if board.from_rest and number < len(self.parts) - 1 and not at_rest:
                 raise ModelError(
                     f"{part.kind!r} starts from a memory of its own and depends on the rate, so parts "
                     "behind it would start from another sample than in Python. Remedy: start it from "
                     "'first_sample'."
                 )
-            scheduled = [by_name[name] for name in part.scheduling]
-            n_driven = len(part.inputs) - len(scheduled)
-            driven = list(given[:n_driven]) if signals is None else signals
-            signals = part.wired(board, [*driven, *scheduled])
-        assert signals is not None
+            driven = signals[: part.n_driven]
+            signals = part.wired(board, [*driven, *(by_name[name] for name in part.scheduling)])
         return signals
 
     def inverse(self) -> Series:
@@ -331,42 +379,12 @@ class Parallel(Composition):
         taken = [names.index(channel.name) for channel in part.inputs]
         return taken, [given.index(channel.name) for channel in part.outputs]
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the parts' states."""
-        shared = zip(self.parts, self._shared_initial(initial), strict=True)
-        return np.concatenate(
-            [part.initial_state(first[self._places(part)[0]], own) for part, own in shared]
-        )
-
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs every part and adds the outputs."""
-        runs = []
-        for part, share in zip(self.parts, self._states(state), strict=True):
-            taken, given = self._places(part)
-            whole = taken == [*range(inputs.shape[1])]
-            own = inputs if whole else np.empty((len(inputs), len(taken)))
-            into = np.empty((len(inputs), len(given)))
-            copies = [] if whole else [(own[:, k], inputs[:, at]) for k, at in enumerate(taken)]
-            sums = [(outputs[:, at], into[:, k]) for k, at in enumerate(given)]
-            runs.append((copies, part.bind(sample_time, share, own, into), sums))
-
-        def run() -> None:
-            outputs[:] = 0.0
-            for copies, step, sums in runs:
-                for own, given in copies:
-                    own[:] = given
-                step()
-                for total, result in sums:
-                    np.add(total, result, out=total)
-
-        return run
-
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         """Lay out the parts on the signals, and add what they give."""
-        terms: list[list[str]] = [[] for _ in self.outputs]
+        terms: list[list[Any]] = [[] for _ in self.outputs]
         for part in self.parts:
-            taken, places = self._places(part)
-            signals = part.wired(board, [given[place] for place in taken])
+            own, places = self._places(part)
+            signals = part.wired(board, [taken[place] for place in own])
             for place, signal in zip(places, signals, strict=True):
                 terms[place].append(signal)
         return [board.add(own) for own in terms]
@@ -412,12 +430,7 @@ class PerChannel(Composition):
                     f"{part.kind!r} has {len(part.inputs)} input(s) and {len(part.outputs)} "
                     "output(s). Remedy: give blocks with one of each."
                 )
-        for channels in (self.inputs, self.outputs):
-            if len({channel.name for channel in channels}) < len(channels):
-                raise ModelError(
-                    f"channel names repeat: {', '.join(c.name for c in channels)}. "
-                    "Remedy: name them pressure_1, pressure_2 and so on."
-                )
+        self.check_channels()
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
@@ -429,29 +442,9 @@ class PerChannel(Composition):
         """One of every part."""
         return tuple(part.outputs[0] for part in self.parts)
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the parts' states."""
-        shared = zip(self.parts, first, self._shared_initial(initial), strict=True)
-        return np.concatenate([part.initial_state(np.array([u]), own) for part, u, own in shared])
-
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs every part on its own channel."""
-        n = inputs.shape[0]
-        columns = [(np.empty((n, 1)), np.empty((n, 1))) for _ in self.parts]
-        shares = zip(self.parts, self._states(state), columns, strict=True)
-        runs = [part.bind(sample_time, share, *column) for part, share, column in shares]
-
-        def run() -> None:
-            for index, (step, (given, into)) in enumerate(zip(runs, columns, strict=True)):
-                given[:, 0] = inputs[:, index]
-                step()
-                outputs[:, index] = into[:, 0]
-
-        return run
-
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         """Lay out the parts, each on its own signal."""
-        pairs = zip(self.parts, given, strict=True)
+        pairs = zip(self.parts, taken, strict=True)
         return [part.wired(board, [signal])[0] for part, signal in pairs]
 
     def inverse(self) -> PerChannel:

@@ -12,6 +12,7 @@ from mckibben.blocks.inverse import Inverse, commands
 from mckibben.blocks.notation import (
     FEW,
     MANY,
+    Symbol,
     Written,
     indexed,
     lettered,
@@ -22,10 +23,10 @@ from mckibben.blocks.notation import (
     unit_tex,
     with_unit,
 )
+from mckibben.blocks.parameters import Parametrised, leaves
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
-    from mckibben.blocks.parameters import Parametrised
 
 Units = dict[str, str]
 
@@ -100,37 +101,26 @@ def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[tuple
         return
     said = meanings(type(part))
     for field in part.parameters:
-        meaning = short(said.get(field, ""))
-        for index, value in _walked(getattr(part, field)):
-            if hasattr(value, "parameter_names"):
-                named = f"{prefix}{_called(part, field, index, value)}"
-                for found in _quantities(value, f"{named} ", units):
+        meaning, symbol, whole = (
+            short(said.get(field, "")),
+            part.notation.of(field),
+            getattr(part, field),
+        )
+        for index, value in leaves(whole):
+            if isinstance(value, Parametrised):
+                called = field.replace("_", " ")
+                if index:
+                    called = f"{value.kind} {index[0] + 1}:" if len(whole) > 1 else f"{value.kind}:"
+                for found in _quantities(value, f"{prefix}{called} ", units):
                     next(names)
                     yield found
                 continue
             name = next(names)
             bracket = re.search(r" \[([^\]]*)\]$", name)
             unit = bracket[1] if bracket else unit_of(part, field, index, units) or ""
-            symbol = indexed(part.notation.symbol(field), index, part.notation.first(field))
+            letter = indexed(symbol.letter, index, symbol.first)
             name = name[: bracket.start()] if bracket else name
-            yield prefix, Quantity(name, symbol, unit, meaning)
-
-
-def _called(part: Parametrised, field: str, index: tuple[int, ...], value: Parametrised) -> str:
-    """Return what a part of a part is called: its field, or its kind where it is one of several."""
-    if not index:
-        return field.replace("_", " ")
-    alike = len(getattr(part, field)) > 1
-    return f"{value.kind}{f' {index[0] + 1}' if alike else ''}:"
-
-
-def _walked(value: Any, index: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:
-    """Give numbers and parts of a field, each with its indices."""
-    if isinstance(value, tuple):
-        for place, item in enumerate(value):
-            yield from _walked(item, (*index, place))
-    elif isinstance(value, float) or hasattr(value, "parameter_names"):
-        yield index, value
+            yield prefix, Quantity(name, letter, unit, meaning)
 
 
 def written(part: Parametrised, title: str = "", units: Units | None = None) -> Written:
@@ -147,122 +137,94 @@ def written(part: Parametrised, title: str = "", units: Units | None = None) -> 
     """
     if isinstance(part, Inverse) and not commands(part):
         law = part.forward
-        return written(law, title or _title(part, "").replace(part.title, law.title, 1))
+        return written(law, title or _title(part).replace(part.title, law.title, 1))
     units = channel_units(part) or units or {}
-    inner: list[Written] = []
-    for field in fields(part):  # type: ignore[arg-type]
-        for index, value in _walked(getattr(part, field.name)):
-            if hasattr(value, "parameter_names"):
-                called = "" if index else field.name.replace("_", " ")
-                place = f"{index[0] + 1}. " if index else ""
-                inner.append(
-                    written(
-                        value, f"{place}{_title(value, called)}" if place or called else "", units
-                    )
-                )
+    inner = [
+        written(
+            value,
+            f"{index[0] + 1}. {_title(value)}"
+            if index
+            else _title(value, field.name.replace("_", " ")),
+            units,
+        )
+        for field in fields(part)  # type: ignore[arg-type]
+        for index, value in leaves(getattr(part, field.name))
+        if isinstance(value, Parametrised)
+    ]
     numbers = (*part.worked(), *_channels(part), *_numbers(part, units))
+    remark = f"More than {MANY} numbers are not written out: the model file holds them."
     large = any(r"\mathbb{R}" in line for line in numbers)
-    return Written(
-        title or _title(part, ""),
-        part.equations(),
-        numbers,
-        f"More than {MANY} numbers are not written out: the model file holds them."
-        if large
-        else "",
-        tuple(inner),
-    )
+    equations = part.equations()
+    return Written(title or _title(part), equations, numbers, remark * large, tuple(inner))
 
 
-def _title(part: Parametrised, called: str) -> str:
+def _title(part: Parametrised, called: str = "") -> str:
     title = getattr(part, "title", part.kind)
-    if called and hasattr(part, "inputs"):
-        return f"{called}: {title}"
+    block: Any = part if hasattr(part, "inputs") else None
     if called:
-        return f"{called} ({title})"
-    if not hasattr(part, "inputs"):
+        return f"{called}: {title}" if block else f"{called} ({title})"
+    if block is None:
         return title
-    block: Any = part
-    given = ", ".join(channel.name for channel in block.inputs)
-    return f"{title}: {given} → {', '.join(channel.name for channel in block.outputs)}"
+    ends = (", ".join(c.name for c in channels) for channels in (block.inputs, block.outputs))
+    return f"{title}: {' → '.join(ends)}"
 
 
-def _channels(part: Parametrised) -> Iterator[str]:
-    """Give what the letters of channels stand for."""
-    if not hasattr(part, "inputs") or not part.notation.equations:
+def _channels(part: Any) -> Iterator[str]:
+    """Give what the letters of channels stand for, which are u, x and y where nothing is declared."""
+    if not hasattr(part, "ports") or not part.notation.equations:
         return
-    told = []
-    for field, default in (("input", "u"), ("pressure", "p"), ("force", "f"), ("output", "y"),
-                           ("driven", "u_i"), ("scheduled", "x_i"), ("given", "y_i")):  # fmt: skip
-        value = getattr(part, field, None)
-        several = value if isinstance(value, tuple) else (value,)
-        if not several or not all(hasattr(channel, "unit") for channel in several):
-            continue
-        symbol = part.notation.symbols.get(field, default)
-        for place, channel in enumerate(several):
-            letter = indexed(symbol, (place,), 1) if len(several) > 1 else symbol
-            told.append(lettered(letter, channel.name, channel.unit))
-    if told:
-        yield r",\quad ".join(told)
+    ports = zip("uxy", part.ports, strict=True)
+    letters: list[str] = []
+    for field, letter in {field: letter for letter, names in ports for field in names}.items():
+        channels: Any = getattr(part, field, ())
+        one = not isinstance(channels, tuple)
+        symbol = part.notation.symbols.get(field, Symbol(letter if one else f"{letter}_i"))
+        letters += lettered(symbol.letter, (channels,) if one else channels)
+    if letters:
+        yield r",\quad ".join(letters)
 
 
 def _numbers(part: Parametrised, units: Units) -> Iterator[str]:
-    """Give what every number is, in lines and tables."""
+    """Give what every number is: one by one, as vectors in lines, or in tables side by side."""
+
+    def unit(field: str, *index: int) -> str:
+        return unit_of(part, field, index, units) or ""
+
     scalars: list[str] = []
-    vectors: dict[int, list[str]] = {}
-    for field in part.notation.symbols:
+    vectors: dict[int, dict[str, Symbol]] = {}
+    for field, symbol in part.notation.symbols.items():
         value = getattr(part, field, None)
-        symbol = part.notation.symbol(field)
         if isinstance(value, float):
-            unit = unit_of(part, field, (), units) or ""
-            scalars.append(f"{symbol} = {with_unit(tex(value), unit)}")
+            scalars.append(f"{symbol.letter} = {with_unit(tex(value), unit(field))}")
         elif isinstance(value, tuple) and value and isinstance(value[0], float):
-            vectors.setdefault(len(value), []).append(field)
+            vectors.setdefault(len(value), {})[field] = symbol
         elif isinstance(value, tuple) and any(isinstance(row, tuple) and row for row in value):
-            yield _matrix(symbol, value)
+            n, width = len(value), max(map(len, value))
+            if n * width > MANY:
+                yield symbol.of_shape(n, width)
+                continue
+            rows = r" \\ ".join(" & ".join(map(tex, row)) for row in value)
+            yield rf"{symbol.stem} = \begin{{pmatrix}} {rows} \end{{pmatrix}}"
     for place in range(0, len(scalars), 4):
         yield r",\quad ".join(scalars[place : place + 4])
-    for size, names in vectors.items():
-        yield from _vectors(part, names, size, units)
-
-
-def _matrix(symbol: str, rows: tuple[tuple[float, ...], ...]) -> str:
-    """Return a table of numbers as a matrix, or its shape where that is large."""
-    n, width = len(rows), max(map(len, rows))
-    stem = re.sub(r"_(\{[^}]*\}|\w)$", "", symbol)
-    if n * width > MANY:
-        return rf"{stem} \in \mathbb{{R}}^{{{n} \times {width}}}"
-    body = r" \\ ".join(" & ".join(map(tex, row)) for row in rows)
-    return rf"{stem} = \begin{{pmatrix}} {body} \end{{pmatrix}}"
-
-
-def _vectors(part: Parametrised, names: list[str], size: int, units: Units) -> Iterator[str]:
-    """Give vectors of one size: short ones in a line, long ones side by side in tables."""
-    firsts = {name: part.notation.first(name) for name in names}
-    for name in names:
-        symbol = part.notation.symbol(name)
-        one = {unit_of(part, name, (place,), units) for place in range(size)}
-        unit = (one.pop() or "") if len(one) == 1 else ""
-        if size <= FEW:
-            values = r",\; ".join(map(tex, getattr(part, name)))
-            ends = [indexed(symbol, (place,), firsts[name]) for place in (0, size - 1)]
-            letters = (r",\ldots," if size > 2 else ",\\,").join(dict.fromkeys(ends))
-            yield f"{letters} = {with_unit(values, unit)}"
-        elif size > MANY:
-            stem = re.sub(r"_(\{[^}]*\}|\w)$", "", symbol)
-            yield rf"{stem} \in \mathbb{{R}}^{{{size}}}"
-    if FEW < size <= MANY:
-        heads = ["i"]
-        for name in names:
-            found = unit_of(part, name, (0,), units)
-            unit = rf"\,[{unit_tex(found)}]" if found else ""
-            heads.append(part.notation.symbol(name) + unit)
-        columns_of = [getattr(part, name) for name in names]
-        lines = [
-            " & ".join(
-                [str(place + firsts[names[0]]), *(tex(column[place]) for column in columns_of)]
-            )
-            for place in range(size)
-        ]
-        columns = "r" * (1 + len(names))
-        body = r" \\ ".join([" & ".join(heads) + r" \\ \hline " + lines[0], *lines[1:]])
-        yield rf"\begin{{array}}{{{columns}}} {body} \end{{array}}"
+    for size, symbols in vectors.items():
+        if FEW < size <= MANY:
+            first = next(iter(symbols.values())).first
+            columns = [["i", *map(str, range(first, first + size))]]
+            for field, symbol in symbols.items():
+                named = unit_tex(unit(field, 0))
+                head = rf"{symbol.letter}\,[{named}]" if named else symbol.letter
+                columns.append([head, *map(tex, getattr(part, field))])
+            heads, *lines = (" & ".join(line) for line in zip(*columns, strict=True))
+            body = rf"{heads} \\ \hline " + r" \\ ".join(lines)
+            yield rf"\begin{{array}}{{{'r' * len(columns)}}} {body} \end{{array}}"
+            continue
+        for field, symbol in symbols.items():
+            if size > MANY:
+                yield symbol.of_shape(size)
+                continue
+            alike = {unit(field, place) for place in range(size)}
+            values = r",\; ".join(map(tex, getattr(part, field)))
+            ends = [indexed(symbol.letter, (place,), symbol.first) for place in (0, size - 1)]
+            letters = (r",\ldots," if size > 2 else r",\,").join(dict.fromkeys(ends))
+            yield f"{letters} = {with_unit(values, alike.pop() if len(alike) == 1 else '')}"

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Ge
@@ -20,11 +20,12 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Board, Kernel, Ports, Run, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Board, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Composition
-from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Vector
-from mckibben.blocks.kernels import accumulate, kernel, step
+from mckibben.blocks.fields import STRICT, Channel, Channels, Vector
+from mckibben.blocks.kernels import Step, accumulate, kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -96,7 +97,7 @@ class PIDFeedback(Block):
 
     kind: ClassVar[str] = "pid"
     ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = pid_step
+    kernel: ClassVar[Step] = pid_step
     start_kernel: ClassVar[Start] = pid_start
     rate_dependent: ClassVar[bool] = True
     no_inverse: ClassVar[str] = "has no inverse. Remedy: invert the model of the muscle."
@@ -171,25 +172,23 @@ class PIDFeedback(Block):
 
         Parameters are those of the class; without kd the derivative is left out.
         """
-        kd = [0.0] * len(kp) if kd is None else kd
-        gains = (tuple(kp), tuple(ki), tuple(kd))
-        measured = _called(references, MEASURED)
-        return cls(*gains, limits, filter_time, references, measured, outputs)
+        gains = tuple(kp), tuple(ki), (0.0,) * len(kp) if kd is None else tuple(kd)
+        return cls(*gains, limits, filter_time, references, _called(references, MEASURED), outputs)
 
     def behind(self, compensator: Block) -> Self:
         """Return the same feedback on top of what a compensator gives."""
-        references = compensator.inputs[: len(compensator.inputs) - len(compensator.scheduling)]
-        outputs = compensator.outputs
+        references, outputs = compensator.inputs[: compensator.n_driven], compensator.outputs
         beside = (*_called(references, MEASURED), *_called(outputs, "_base"))
         return replace(self, driven=references, scheduled=beside, given=outputs, late=True)
 
     @classmethod
     def example(cls) -> Self:
-        driven = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
-        given = tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2))
-        beside = (*_called(driven, MEASURED), *_called(given, "_base"))
-        gains = ((0.05, 0.04), (0.2, 0.3), (0.002, 0.0))
-        return cls(*gains, (0.0, 5.0), 0.1, driven, beside, given, late=True)
+        from mckibben.blocks.coupled.balance import Balance
+
+        compensator = Balance.example()
+        gains = (0.05, 0.04), (0.2, 0.3), (0.002, 0.0)
+        ends = compensator.inputs[:2], compensator.outputs
+        return cls.of(*ends, *gains, limits=(0.0, 5.0)).behind(compensator)
 
 
 def _called(channels: Channels, ending: str) -> Channels:
@@ -218,10 +217,15 @@ class FeedforwardFeedback(Composition):
     compensator: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     feedback: Annotated[InstanceOf[PIDFeedback], BeforeValidator(nested)]
 
+    path_dependent = same_as("compensator.path_dependent")
+    forward_model = same_as("compensator.forward_model")
+    samples_ahead = same_as("compensator.samples_ahead")
+    outputs = same_as("compensator.outputs")
+
     def __post_init__(self) -> None:
         self.check_parts()
         n = len(self.compensator.outputs)
-        n_driven = len(self.compensator.inputs) - len(self.compensator.scheduling)
+        n_driven = self.compensator.n_driven
         if (len(self.feedback.driven), len(self.feedback.scheduled)) != (n_driven, n + n_driven):
             raise ModelError(
                 f"feedback of {len(self.feedback.driven)} references with "
@@ -241,18 +245,6 @@ class FeedforwardFeedback(Composition):
         return (self.compensator, self.feedback)
 
     @property
-    def path_dependent(self) -> bool:  # type: ignore[override]
-        return self.compensator.path_dependent
-
-    @property
-    def undone(self) -> Block | None:
-        return self.compensator.undone
-
-    @property
-    def samples_ahead(self) -> int:  # type: ignore[override]
-        return self.compensator.samples_ahead
-
-    @property
     def measured(self) -> tuple[Channel, ...]:
         """What is measured."""
         return self.feedback.scheduled[: len(self.feedback.driven)]
@@ -269,44 +261,10 @@ class FeedforwardFeedback(Composition):
         """All inputs but the references."""
         return tuple(channel.name for channel in self.inputs[len(self.feedback.driven) :])
 
-    @cached_property
-    def _taken(self) -> list[int]:
-        """Which inputs the compensator takes."""
-        return [self.inputs.index(channel) for channel in self.compensator.inputs]
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        return self.compensator.outputs
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        own, feedback = self._shared_initial(initial)
-        n = len(self.feedback.driven)
-        both = np.concatenate([first[: 2 * n], np.zeros(n)])
-        ahead = self.compensator.initial_state(np.asarray(first)[self._taken], own)
-        return np.concatenate([ahead, self.feedback.initial_state(both, feedback)])
-
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        n, length = len(self.feedback.driven), inputs.shape[0]
-        ahead, asked = self._states(state)
-        wanted = np.empty((length, len(self.compensator.inputs)))
-        base = np.empty((length, len(self.outputs)))
-        given = np.empty((length, len(self.feedback.inputs)))
-        compensate = self.compensator.bind(sample_time, ahead, wanted, base)
-        correct = self.feedback.bind(sample_time, asked, given, outputs)
-
-        def run() -> None:
-            wanted[:] = inputs[:, self._taken]
-            compensate()
-            given[:, : 2 * n] = inputs[:, : 2 * n]
-            given[:, 2 * n :] = base
-            correct()
-
-        return run
-
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
-        n = len(self.feedback.driven)
-        bases = self.compensator.wired(board, [given[place] for place in self._taken])
-        return self.feedback.wired(board, [*given[: 2 * n], *bases])
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+        own = [self.inputs.index(channel) for channel in self.compensator.inputs]
+        bases = self.compensator.wired(board, [taken[place] for place in own])
+        return self.feedback.wired(board, [*taken[: 2 * len(self.feedback.driven)], *bases])
 
     def joined(self, parts: Sequence[str]) -> str:
         """Return the sum of what both give, the feedback from the compensator's references."""

@@ -21,13 +21,9 @@ Initial = Rule | Sequence[float]
 """Memory before the first sample."""
 
 
-def _plain(values: Any) -> Any:
-    return tuple(values.tolist()) if isinstance(values, np.ndarray) else values
-
-
 def plain_sequence(values: Any) -> Any:
     """Return a list or an array as the tuple that a field keeps; anything else as it is."""
-    values = _plain(values)
+    values = values.tolist() if isinstance(values, np.ndarray) else values
     return tuple(values) if isinstance(values, list) else values
 
 
@@ -45,12 +41,15 @@ Coefficients = Annotated[
 
 def rows(value: Any) -> Any:
     """Return a table of numbers as a field of a block holds it."""
-    listed = value.tolist() if isinstance(value, np.ndarray) else value
-    return tuple(map(plain_sequence, listed)) if isinstance(listed, tuple | list) else listed
+    listed = plain_sequence(value)
+    return tuple(map(plain_sequence, listed)) if isinstance(listed, tuple) else listed
 
 
 Rows = Annotated[tuple[Vector, ...], BeforeValidator(rows)]
 """Rows of finite numbers."""
+
+LONGEST_DELAY = 254
+"""Samples by which an output may come late."""
 
 Positive = Annotated[FiniteFloat, Gt(0)]
 NotNegative = Annotated[FiniteFloat, Ge(0)]
@@ -120,7 +119,8 @@ ChannelField = Annotated[Channel, BeforeValidator(_channel)]
 
 
 def _channels(values: Any) -> Any:
-    return tuple(map(_channel, values)) if isinstance(values, tuple | list) else values
+    values = plain_sequence(values)
+    return tuple(map(_channel, values)) if isinstance(values, tuple) else values
 
 
 Channels = Annotated[tuple[Channel, ...], BeforeValidator(_channels)]

@@ -7,7 +7,6 @@ driven inputs. Its state begins with the forward block's, unless it is shorter.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
@@ -15,16 +14,17 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost, Kernel, Start, explicit_state
+from mckibben.blocks.base import Block, Cost, Start, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.notation import indexed, lettered
+from mckibben.blocks.kernels import Step, kernel
+from mckibben.blocks.notation import lettered
+from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.registry import load
 
 if TYPE_CHECKING:
-    from mckibben.blocks.adaptive.learning import Learnable
+    from mckibben.blocks.learning import Learnable
 
 USUAL_TRIALS, MOST_TRIALS = 12, 600
 """In a step of an inverse that is solved for: on smooth references, and at worst."""
@@ -47,7 +47,7 @@ class Invertible(Block):
     inverse remembers, and the count of samples clipped; its numbers are this block's and the limits.
     """
 
-    inverse_kernel: ClassVar[Kernel]
+    inverse_kernel: ClassVar[Step]
     """Runs the inverse, as `kernel` runs the block."""
 
     inverse_start_kernel: ClassVar[Start | None] = None
@@ -66,13 +66,7 @@ class Invertible(Block):
     """Whether the inverse is solved for by trials in every sample, having no closed form."""
 
     def inverse(self) -> Block:
-        """Return the block that undoes this one.
-
-        Raises
-        ------
-        ModelError
-            If a condition of `check_invertible` fails.
-        """
+        """Return the block that undoes this one; refused where `check_invertible` does."""
         return Inverse(self)
 
     def check_invertible(self) -> None:
@@ -140,7 +134,7 @@ class Invertible(Block):
         return Cost.of(numbers, self.n_inverse_states)
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the outputs that can be reached whatever happened before, each of shape (n_outputs,).
+        """Return the lowest and highest outputs that can be reached whatever happened before.
 
         How far the output falls at the lowest input depends on the highest peak before: the least
         favourable one counts.
@@ -186,6 +180,17 @@ class Inverse(Block):
 
     forward: Annotated[InstanceOf[Invertible], BeforeValidator(nested)]
 
+    kernel = same_as("forward.inverse_kernel")
+    start_kernel = same_as("forward.inverse_start_kernel")
+    rate_dependent = same_as("forward.rate_dependent")
+    path_dependent = same_as("forward.inverse_path_dependent")
+    scheduling = same_as("forward.scheduling")
+    n_states = same_as("forward.n_inverse_states")
+    n_scratch = same_as("forward.n_inverse_scratch")
+    start = same_as("forward.start")
+    cost = same_as("forward.inverse_cost")
+    strictly_increasing = same_as("forward.strictly_increasing")
+
     def __post_init__(self) -> None:
         self.forward.check_invertible()
 
@@ -195,55 +200,14 @@ class Inverse(Block):
         return f"{self.forward.title}-inverse"
 
     @property
-    def kernel(self) -> Kernel:  # type: ignore[override]
-        """The forward block's inverse kernel."""
-        return self.forward.inverse_kernel
-
-    @property
-    def start_kernel(self) -> Start | None:  # type: ignore[override]
-        """The forward block's."""
-        return self.forward.inverse_start_kernel
-
-    @property
-    def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether the forward block is."""
-        return self.forward.rate_dependent
-
-    @property
-    def path_dependent(self) -> bool:  # type: ignore[override]
-        """As the forward block says."""
-        return self.forward.inverse_path_dependent
-
-    @property
     def inputs(self) -> tuple[Channel, ...]:
         """The forward block's outputs, then what schedules it."""
-        return (*self.forward.outputs, *self.forward.inputs[len(self.outputs) :])
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """What schedules the forward block."""
-        return self.forward.scheduling
+        return (*self.forward.outputs, *self.forward.inputs[self.forward.n_driven :])
 
     @property
     def outputs(self) -> tuple[Channel, ...]:
         """The forward block's driven inputs."""
-        channels = self.forward.inputs
-        return channels[: len(channels) - len(self.forward.scheduling)]
-
-    @property
-    def n_states(self) -> int:
-        """As the forward block says."""
-        return self.forward.n_inverse_states
-
-    @property
-    def n_scratch(self) -> int:
-        """As the forward block says."""
-        return self.forward.n_inverse_scratch
-
-    @property
-    def start(self) -> Initial:
-        """The forward block's."""
-        return self.forward.start
+        return self.forward.inputs[: self.forward.n_driven]
 
     def start_numbers(self) -> Array:
         """Return the forward block's, as the inverse reads them."""
@@ -254,7 +218,7 @@ class Inverse(Block):
 
         An explicit state may be this block's own, or the forward block's.
         """
-        start = self.start if initial is None else initial
+        start: Initial = self.start if initial is None else initial
         if isinstance(start, str):
             return super().initial_state(first, start)
         n = self.forward.n_states
@@ -268,14 +232,6 @@ class Inverse(Block):
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the forward block's, as the inverse reads them."""
         return self.forward.inverse_numbers(self.forward.coefficients(sample_time))
-
-    def cost(self, sample_time: float | None) -> Cost:
-        """Return what the forward block says."""
-        return self.forward.inverse_cost(sample_time)
-
-    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Give the forward block's."""
-        return self.forward.kept_apart()
 
     def reachable(self) -> tuple[Array, Array]:
         """Return the lowest and highest inputs of the forward block that are given."""
@@ -303,11 +259,7 @@ class Inverse(Block):
 
     def worked(self) -> tuple[str, ...]:
         """Return which channels go in and come out; P is the block that follows."""
-        letters = []
-        for letter, channels in (("y", self.forward.outputs), (r"\hat{u}", self.outputs)):
-            for place, channel in enumerate(channels):
-                own = indexed(letter, (place,), 1) if len(channels) > 1 else letter
-                letters.append(lettered(own, channel.name, channel.unit))
+        letters = lettered("y", self.forward.outputs) + lettered(r"\hat{u}", self.outputs)
         return (r",\quad ".join([*letters, r"P\text{: the model below}"]),)
 
     @classmethod

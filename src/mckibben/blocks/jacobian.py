@@ -8,9 +8,11 @@ by complex step; see `mckibben.blocks.complex_step`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
+from functools import partial
+from itertools import pairwise, starmap
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.base import VIRGIN, Block
 from mckibben.blocks.complex_step import STEP, twin
+from mckibben.blocks.compose import Layout
 from mckibben.blocks.fields import Initial
 from mckibben.blocks.kernels import in_scratch
 from mckibben.blocks.parameters import Parametrised
@@ -37,59 +40,16 @@ WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 """Of such a difference of eighth order, from the nearest places on."""
 
 
-@dataclass
-class _Call:
-    """A block that is one kernel, run on some signals; the next ones are its outputs."""
-
-    block: Block
-    given: list[int]
-    first: int
-    state: Array | None = None
-
-
-@dataclass
-class _Layout:
-    """What a block does, in order; signals are numbered, the inputs first."""
-
-    n: int
-    steps: list[_Call | tuple[list[int], int]] = field(default_factory=list)
-
-    def call(self, block: Block, given: Sequence[str]) -> list[str]:
-        """Append a block, and return the signals that it gives."""
-        self.steps.append(_Call(block, [int(place) for place in given], self.n))
-        self.n += len(block.outputs)
-        return [str(place) for place in range(self.n - len(block.outputs), self.n)]
-
-    def add(self, terms: Sequence[str]) -> str:
-        """Append a sum of signals."""
-        self.steps.append(([int(place) for place in terms], self.n))
-        self.n += 1
-        return str(self.n - 1)
-
-    def resume(self, state: Sequence[float]) -> None:
-        """Start the blocks called last from a state of them all."""
-        left = np.array(state, dtype=np.float64)
-        for call in reversed(self.calls):
-            if left.size:
-                left, call.state = np.split(left, [left.size - call.block.n_states])
-
-    @property
-    def calls(self) -> list[_Call]:
-        """The blocks, in order."""
-        return [step for step in self.steps if isinstance(step, _Call)]
-
-
-def _laid_out(block: Block) -> tuple[_Layout, list[int]]:
-    """Return what a block does, and which signals it gives."""
-    layout = _Layout(len(block.inputs))
-    given = block.wired(layout, [str(place) for place in range(layout.n)])
-    for call in layout.calls:
-        if not call.block.c_kernels:
+def _laid_out(block: Block) -> Layout:
+    """Return what a block does, of blocks that all have derivatives."""
+    layout = Layout(block, from_rest=True)
+    for _, each in layout.calls():
+        if not each.c_kernels:
             raise ModelError(
-                f"{call.block.title!r} has no derivatives: it is not one kernel with a start kernel. "
+                f"{each.title!r} has no derivatives: it is not one kernel with a start kernel. "
                 "Remedy: declare a start_kernel beside its kernel, or compose it of such blocks."
             )
-    return layout, [int(place) for place in given]
+    return layout
 
 
 def _moved(value: Any, numbers: Iterator[float]) -> Any:
@@ -109,11 +69,6 @@ def _moved(value: Any, numbers: Iterator[float]) -> Any:
     return other
 
 
-def _numbers(block: Block, sample_time: float | None) -> list[Array]:
-    """Return the coefficients of all kernels."""
-    return [call.block.coefficients(sample_time) for call in _laid_out(block)[0].calls]
-
-
 class Tangents:
     """Free runs of a block with their derivatives by its parameters, stretch by stretch.
 
@@ -124,11 +79,6 @@ class Tangents:
         [s].
     places : sequence of int, optional
         Of k parameters in `pack`; all by default.
-
-    Raises
-    ------
-    ModelError
-        If a part is not a kernel.
     """
 
     def __init__(
@@ -136,8 +86,8 @@ class Tangents:
     ) -> None:
         self.block = block
         values = block.pack()
-        self._layout, self._gives = _laid_out(block)
-        own = _numbers(block, sample_time)
+        self._layout = _laid_out(block)
+        own = [each.coefficients(sample_time) for _, each in self._layout.calls()]
         places = range(values.size) if places is None else places
         self.n_places = len(places)
         self._numbers: list[list[Complex]] = []
@@ -145,19 +95,16 @@ class Tangents:
             slopes = _coefficient_slopes(block, values, place, sample_time)
             self._numbers.append([_complex(*pair) for pair in zip(own, slopes, strict=True)])
         if not places:
-            self._numbers.append([numbers.astype(np.complex128) for numbers in own])
-        ends = np.cumsum([0, *(call.block.n_states for call in self._layout.calls)])
-        self._states = [slice(*ends[i : i + 2]) for i in range(ends.size - 1)]
-        self._scratch = [np.zeros(c.block.n_scratch, np.complex128) for c in self._layout.calls]
+            self._numbers.append([_complex(numbers, np.zeros(numbers.size)) for numbers in own])
+        blocks = [each for _, each in self._layout.calls()]
+        ends = np.cumsum([0, *(each.n_states for each in blocks)]).tolist()
+        self._states = list(starmap(slice, pairwise(ends)))
+        self._scratch = [np.zeros(each.n_scratch, np.complex128) for each in blocks]
 
     def start(self, first: Array, initial: Initial | None = None) -> Complex:
         """Return the states before a first input, with derivatives, shape (k or 1, n_states).
 
-        Parameters
-        ----------
-        first : array, shape (n_inputs,)
-        initial : {"first_sample", "virgin"} or sequence of float, optional
-            As of `Block.initial_state`.
+        Parameters are those of `Block.initial_state`.
         """
         rule = initial if initial is None or isinstance(initial, str) else None
         given = None if initial is rule else self.block.initial_state(first, initial)
@@ -174,17 +121,20 @@ class Tangents:
     ) -> None:
         """Start blocks from the first samples that reach them."""
 
-        def begin(call: _Call, index: int, inputs: Complex) -> Complex:
-            own, start = state[self._states[index]], rule or call.block.start
+        def begin(index: int, inputs: Complex) -> Complex:
+            call, block = calls[index]
+            own, start = state[self._states[index]], rule or block.start
             if call.state is not None:
                 own[:] = call.state
             elif not isinstance(start, str):
-                own[:] = call.block.initial_state(inputs[0].real, start)
+                own[:] = block.initial_state(inputs[0].real, start)
             elif own.size:
-                kernel = call.block.c_kernels[1]
+                kernel = block.c_kernels[1]
                 room = [self._scratch[index]] if in_scratch(kernel) else []
                 twin(kernel)(numbers[index], own, *room, inputs[0], VIRGIN[start])
             return own.copy()
+
+        calls = list(self._layout.calls())
 
         self._follow(numbers, begin, first[np.newaxis])
 
@@ -199,32 +149,34 @@ class Tangents:
         """
         slopes = np.empty((len(inputs), len(self.block.outputs), self.n_places))
         for row, (numbers, state) in enumerate(zip(self._numbers, states, strict=True)):
-            found = self._follow(numbers, self._resumed(state), inputs)
+            found = self._follow(numbers, partial(self._resumed, state), inputs)
             if self.n_places:
                 np.divide(found.imag, STEP, out=slopes[:, :, row])
         return found.real.copy(), slopes
 
-    def _resumed(self, state: Complex) -> Any:
-        return lambda _, index, __: state[self._states[index]]
+    def _resumed(self, state: Complex, index: int, taken: Complex) -> Complex:
+        del taken
+        return state[self._states[index]]
 
-    def _follow(self, numbers: list[Complex], memory: Any, inputs: Array) -> Complex:
-        """Run all blocks over inputs, each from its memory, ``memory(call, number, its inputs)``."""
-        signals = np.zeros((len(inputs), self._layout.n), np.complex128)
+    def _follow(
+        self, numbers: list[Complex], memory: Callable[[int, Complex], Complex], inputs: Array
+    ) -> Complex:
+        """Run all blocks over inputs, each from its memory, ``memory(number, its inputs)``."""
+        signals = np.zeros((len(inputs), self._layout.n_signals), np.complex128)
         signals[:, : inputs.shape[1]] = inputs
         index = 0
         for step in self._layout.steps:
-            if not isinstance(step, _Call):
-                signals[:, step[1]] = signals[:, step[0]].sum(axis=1)
+            taken = np.ascontiguousarray(signals[:, step.taken])
+            if step.block is None:
+                signals[:, step.given] = taken.sum(axis=1, keepdims=True)
                 continue
-            given = np.ascontiguousarray(signals[:, step.given])
-            found = np.empty((len(inputs), len(step.block.outputs)), np.complex128)
+            found = np.empty((len(inputs), len(step.given)), np.complex128)
             kernel: Any = step.block.c_kernels[0]
             room = [self._scratch[index]] if in_scratch(kernel) else []
-            own = memory(step, index, given)
-            twin(kernel.batch)(numbers[index], own, *room, given, found)
-            signals[:, step.first : step.first + found.shape[1]] = found
+            twin(kernel.batch)(numbers[index], memory(index, taken), *room, taken, found)
+            signals[:, step.given] = found
             index += 1
-        return signals[:, self._gives]
+        return signals[:, self._layout.given]
 
 
 def _complex(real: Array, slopes: Array) -> Complex:
@@ -240,20 +192,21 @@ def _coefficient_slopes(
 
     Of ever shorter differences, those that agree best: a gain may have a pole nearby.
     """
-    sizes = [numbers.size for numbers in _numbers(block, sample_time)]
 
-    def moved(change: float) -> Array:
+    def moved(change: float) -> list[Array]:
         other = values.copy()
         other[place] += change
-        return np.concatenate(_numbers(_moved(block, iter(other.tolist())), sample_time))
+        calls = _laid_out(_moved(block, iter(other.tolist()))).calls()
+        return [each.coefficients(sample_time) for _, each in calls]
 
     tried: list[Array] = []
-    found, apart = np.zeros(sum(sizes)), np.full(sum(sizes), np.inf)
+    ends = np.cumsum([numbers.size for numbers in moved(0.0)])
+    found, apart = np.zeros(ends[-1]), np.full(ends[-1], np.inf)
     for share in CHANGES:
         change = share * (abs(values[place]) or 1.0)
         slopes = np.zeros(found.size)
         for times, weight in enumerate(WEIGHTS, 1):
-            above, below = moved(times * change), moved(-times * change)
+            above, below = (np.concatenate(moved(way * change)) for way in (times, -times))
             moves = above != below  # infinite ones do not
             slopes[moves] += weight * (above[moves] - below[moves]) / change
         if tried:
@@ -263,7 +216,7 @@ def _coefficient_slopes(
             if (apart <= AGREEING * np.abs(found)).all():
                 break
         tried.append(slopes)
-    return np.split(found, np.cumsum(sizes)[:-1])
+    return np.split(found, ends[:-1])
 
 
 def jacobian(
@@ -287,11 +240,6 @@ def jacobian(
         the block's own.
     places : sequence of int, optional
         Of the k parameters, in `pack`; all by default.
-
-    Raises
-    ------
-    ModelError
-        If a part is not a kernel.
     """
     places = range(block.n_parameters) if places is None else places
     workers = max(min(cores(), len(places)), 1)

@@ -96,13 +96,7 @@ class LinearSystem:
         return np.asarray(self.output_offset + held @ (inputs - self.input_offset))
 
     def response(self, frequencies: Array) -> NDArray[np.complex128]:
-        """Return the frequency response, shape (frequencies, m, k).
-
-        Parameters
-        ----------
-        frequencies : array, shape (f,)
-            [Hz].
-        """
+        """Return the response at frequencies [Hz], shape (f,), as an array of shape (f, m, k)."""
         if not len(self.a):
             return np.broadcast_to(self.d.astype(complex), (len(frequencies), *self.d.shape))
         z = np.exp(2j * np.pi * frequencies * (self.sample_time or 1.0))
@@ -113,19 +107,9 @@ class LinearSystem:
 def as_scipy(block: Block, sample_time: float | None = None) -> dlti | lti:
     """Return a linear model as a system of SciPy, of deviations from its operating point.
 
-    Simulated there, u - u_0 gives y - y_0; noise models stay behind. Without a sample time, what
+    Simulated there, u - u_0 gives y - y_0; noise models stay behind. Without a sample time [s], what
     is continuous in time comes as ``lti``; all else as ``dlti``, which holds the dead time too,
     and what the input does between samples.
-
-    Parameters
-    ----------
-    sample_time : float, optional
-        Time between samples [s].
-
-    Raises
-    ------
-    ModelError
-        If it is not linear, or has a dead time and no sample time is given.
     """
     from scipy import signal
 
@@ -137,15 +121,7 @@ def as_scipy(block: Block, sample_time: float | None = None) -> dlti | lti:
 
 
 def as_control(block: Block, sample_time: float | None = None) -> StateSpace | TransferFunction:
-    """Return a linear model as a system of python-control, as `as_scipy` does.
-
-    Raises
-    ------
-    ModelError
-        As of `as_scipy`.
-    DataError
-        Without python-control.
-    """
+    """Return a linear model as a system of python-control, as `as_scipy` does of SciPy."""
     demand("control", "control", "transfer functions of python-control")
     import control
 

@@ -15,7 +15,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -26,7 +26,7 @@ from mckibben.blocks.fields import (
     Vector,
 )
 from mckibben.blocks.inverse import Invertible, nothing_clipped
-from mckibben.blocks.kernels import DERIVED, SLACK, improved, inlined, kernel, step
+from mckibben.blocks.kernels import DERIVED, SLACK, Step, improved, inlined, kernel, step
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation, summed
 from mckibben.blocks.solving import newton
@@ -59,7 +59,7 @@ class Affine(Block):
     """
 
     kind: ClassVar[str] = "affine"
-    kernel: ClassVar[Kernel] = affine_step
+    kernel: ClassVar[Step] = affine_step
     parameters: ClassVar[tuple[str, ...]] = ("gain", "offset")
     notation: ClassVar[Notation] = Notation("y = K u + y_0", gain="K [{y}/{u}]", offset="y_0 [{y}]")
 
@@ -103,7 +103,7 @@ class Negative(Block):
     """
 
     kind: ClassVar[str] = "negative"
-    kernel: ClassVar[Kernel] = negative_step
+    kernel: ClassVar[Step] = negative_step
     notation: ClassVar[Notation] = Notation("y = -u")
 
     input: ChannelField = DISPLACEMENT
@@ -179,7 +179,7 @@ class PiecewiseLinear(Block):
     """
 
     kind: ClassVar[str] = "piecewise-linear"
-    kernel: ClassVar[Kernel] = piecewise_linear_step
+    kernel: ClassVar[Step] = piecewise_linear_step
     increasing = ("knots", "values")
     parameters: ClassVar[tuple[str, ...]] = ("values",)
     notation: ClassVar[Notation] = Notation(
@@ -301,8 +301,8 @@ class Polynomial(Invertible):
     """
 
     kind: ClassVar[str] = "polynomial"
-    kernel: ClassVar[Kernel] = polynomial_step
-    inverse_kernel: ClassVar[Kernel] = polynomial_inverse_step
+    kernel: ClassVar[Step] = polynomial_step
+    inverse_kernel: ClassVar[Step] = polynomial_inverse_step
     inverse_start_kernel: ClassVar[Start] = nothing_clipped
     parameters: ClassVar[tuple[str, ...]] = ("polynomial",)
     notation: ClassVar[Notation] = Notation(
@@ -398,7 +398,7 @@ class Logarithm(Block):
     """
 
     kind: ClassVar[str] = "logarithm"
-    kernel: ClassVar[Kernel] = logarithm_step
+    kernel: ClassVar[Step] = logarithm_step
     parameters: ClassVar[tuple[str, ...]] = ("offset",)
     notation: ClassVar[Notation] = Notation(r"y = \ln(u + c)", offset="c [{u}]")
 
@@ -427,7 +427,7 @@ class Exponential(Block):
     """
 
     kind: ClassVar[str] = "exponential"
-    kernel: ClassVar[Kernel] = exponential_step
+    kernel: ClassVar[Step] = exponential_step
     parameters: ClassVar[tuple[str, ...]] = ("offset",)
     notation: ClassVar[Notation] = Notation("y = e^{u} - c", offset="c [{y}]")
 
@@ -497,8 +497,8 @@ class Contact(Invertible):
     """
 
     kind: ClassVar[str] = "contact"
-    kernel: ClassVar[Kernel] = contact_step
-    inverse_kernel: ClassVar[Kernel] = contact_inverse_step
+    kernel: ClassVar[Step] = contact_step
+    inverse_kernel: ClassVar[Step] = contact_inverse_step
     counts_clipped: ClassVar[bool] = False
     parameters: ClassVar[tuple[str, ...]] = ("pressure",)
     notation: ClassVar[Notation] = Notation(

@@ -10,12 +10,34 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from mckibben.blocks.fields import Channel
 
 FEW = 8
 """Numbers of a vector that are written in one line; more stand in a table."""
 
 MANY = 30
 """Numbers above which only their shape is written."""
+
+
+class Symbol(NamedTuple):
+    """How a field is written: in LaTeX, the first index, and the unit, None where none is declared."""
+
+    letter: str
+    first: int = 1
+    unit: str | None = None
+
+    @property
+    def stem(self) -> str:
+        """The letter without what is below it."""
+        return re.sub(r"_(\{[^}]*\}|\w)$", "", self.letter)
+
+    def of_shape(self, *sizes: int) -> str:
+        """Return how many numbers there are, in LaTeX, instead of them."""
+        shape = r" \times ".join(map(str, sizes))
+        return rf"{self.stem} \in \mathbb{{R}}^{{{shape}}}"
 
 
 class Notation:
@@ -34,25 +56,17 @@ class Notation:
     """
 
     def __init__(self, *equations: str, **symbols: str) -> None:
-        self.equations, self.symbols = equations, symbols
+        self.equations, self.symbols = equations, dict[str, Symbol]()
+        for field, text in symbols.items():
+            found = re.fullmatch(r"(.*?)(?: from (\d))?(?: \[(.*)\])?", text)
+            assert found is not None
+            letter, first, unit = found.groups()
+            self.symbols[field] = Symbol(letter, int(first or 1), unit or "")
 
-    def symbol(self, field: str) -> str:
-        """Return the symbol of a field; its name where none is declared."""
-        declared = self.symbols.get(field)
-        if declared is None:
-            return rf"\mathrm{{{field.replace('_', chr(92) + ' ')}}}"
-        return re.sub(r"( from \d)?( \[.*\])?$", "", declared)
-
-    def first(self, field: str) -> int:
-        """Return the index of the first of a field's numbers."""
-        found = re.search(r" from (\d)", self.symbols.get(field, ""))
-        return int(found[1]) if found else 1
-
-    def unit(self, field: str) -> str | None:
-        """Return the unit declared, with its placeholders; None where there is none."""
-        declared = self.symbols.get(field)
-        found = None if declared is None else re.search(r" \[(.*)\]$", declared)
-        return ("" if declared is not None else None) if found is None else found[1]
+    def of(self, field: str) -> Symbol:
+        """Return how a field is written: as declared, or by its name."""
+        named = rf"\mathrm{{{field.replace('_', chr(92) + ' ')}}}"
+        return self.symbols.get(field, Symbol(named))
 
 
 @dataclass(frozen=True)
@@ -181,14 +195,20 @@ def unit_tex(unit: str) -> str:
     return rf"\mathrm{{{text}}}" if unit else ""
 
 
-def lettered(letter: str, name: str, unit: str) -> str:
-    r"""Return what the letter of a channel stands for.
+def lettered(symbol: str, channels: Sequence[Channel]) -> list[str]:
+    r"""Return what the letters of channels stand for.
 
-    >>> lettered("u", "pressure_1", "bar")
-    'u\\text{: pressure\\_1}\\,[\\mathrm{bar}]'
+    >>> from mckibben.blocks.fields import PRESSURE
+    >>> lettered("u", [PRESSURE])
+    ['u\\text{: pressure}\\,[\\mathrm{bar}]']
     """
-    name = re.sub(r"[\\{}$&#^~%]", " ", name).replace("_", r"\_")
-    return rf"{letter}\text{{: {name}}}" + (rf"\,[{unit_tex(unit)}]" if unit else "")
+    found = []
+    for place, channel in enumerate(channels):
+        letter = indexed(symbol, (place,), 1) if len(channels) > 1 else symbol
+        name = re.sub(r"[\\{}$&#^~%]", " ", channel.name).replace("_", r"\_")
+        unit = rf"\,[{unit_tex(channel.unit)}]" if channel.unit else ""
+        found.append(rf"{letter}\text{{: {name}}}{unit}")
+    return found
 
 
 def with_unit(text: str, unit: str) -> str:

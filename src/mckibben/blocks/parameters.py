@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from functools import wraps
 from inspect import isfunction
 from itertools import islice
+from operator import attrgetter
 from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -105,7 +106,7 @@ class Parametrised(metaclass=Checked):
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a number of a field, as `Notation` writes it; None if none is declared."""
         del index
-        return self.notation.unit(field)
+        return self.notation.of(field).unit
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return what a number of a field is called, for people: the field's name, and its places."""
@@ -114,16 +115,16 @@ class Parametrised(metaclass=Checked):
     @property
     def n_parameters(self) -> int:
         """Length of the parameter vector, `pack`."""
-        return sum(_size(getattr(self, name)) for name in self.parameters)
+        return self.pack().size
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """What each number of `pack` is called, for people; see `name_of`."""
-        names = [
-            text
-            for field in self.parameters
-            for text in _names(self, field, getattr(self, field), ())
-        ]
+        names: list[str] = []
+        for field in self.parameters:
+            for index, leaf in leaves(getattr(self, field)):
+                part = isinstance(leaf, Parametrised)
+                names += leaf.parameter_names if part else [self.name_of(field, index)]
         return tuple(names or (f"{self.kind} {place + 1}" for place in range(self.n_parameters)))
 
     def pack(self) -> Array:
@@ -146,6 +147,11 @@ class Parametrised(metaclass=Checked):
         return replace(self, **fields)  # type: ignore[type-var]
 
 
+def same_as(path: str) -> Any:
+    """Return a property that is an attribute of a part: ``"part.attribute"``."""
+    return property(attrgetter(path), doc=f"``{path}``")
+
+
 def parameter_vector(part: Parametrised, parameters: ArrayLike) -> Array:
     """Return a parameter vector after checking its length."""
     vector = np.asarray(parameters, dtype=np.float64)
@@ -155,14 +161,6 @@ def parameter_vector(part: Parametrised, parameters: ArrayLike) -> Array:
             f"{vector.shape}. Remedy: give a vector as pack() returns it."
         )
     return vector
-
-
-def _size(value: Any) -> int:
-    if type(value) is float:
-        return 1
-    if type(value) is not tuple:
-        return 0 if value is None else value.n_parameters
-    return len(value) if _is_flat(value) else sum(map(_size, value))
 
 
 def _gather(value: Any, numbers: list[float]) -> None:
@@ -191,10 +189,10 @@ def _is_flat(values: tuple[Any, ...]) -> bool:
     return not values or type(values[0]) is float
 
 
-def _names(part: Parametrised, field: str, value: Any, index: tuple[int, ...]) -> list[str]:
-    if isinstance(value, Parametrised):
-        return list(value.parameter_names)
+def leaves(value: Any, index: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:
+    """Give the numbers and the parts of a field, each with its places."""
     if isinstance(value, tuple):
-        items = enumerate(value)
-        return [n for k, item in items for n in _names(part, field, item, (*index, k))]
-    return [] if value is None else [part.name_of(field, index)]
+        for place, item in enumerate(value):
+            yield from leaves(item, (*index, place))
+    elif isinstance(value, float | Parametrised):
+        yield index, value

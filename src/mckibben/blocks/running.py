@@ -72,11 +72,6 @@ class Stream:
         """Take one sample of every input and return the outputs, shape (n_outputs,).
 
         The array returned is reused by the next step: copy what you keep.
-
-        Raises
-        ------
-        DataError
-            If the inputs are not as many numbers as the block has inputs.
         """
         given, gives = self._given, self._gives
         # a sum is finite only if all terms are; it may overflow, and infinity less itself is NaN
@@ -120,13 +115,7 @@ class Stream:
 
 
 def refuse_time(sample_time: float | None) -> None:
-    """Refuse what cannot be the time between two samples.
-
-    Raises
-    ------
-    ModelError
-        If it is given, and is no finite number of seconds above 0.
-    """
+    """Refuse what cannot be the time between two samples: no finite number of seconds above 0."""
     if sample_time is not None and not (isfinite(sample_time) and sample_time > 0):
         raise ModelError(
             f"the time between samples cannot be {sample_time:g} s. Remedy: give seconds, above 0."
@@ -144,12 +133,7 @@ def run_many(
     sample_time: float | None = None,
     initial: Initial | None = None,
 ) -> Array:
-    """Run several blocks with the same channels over the same inputs, on all cores.
-
-    Returns
-    -------
-    array, shape (len(blocks), n, n_outputs)
-    """
+    """Return what blocks of the same channels give, shape (blocks, n, n_outputs), on all cores."""
     refuse_time(sample_time)
     outputs = np.empty((len(blocks), inputs.shape[0], len(blocks[0].outputs)))
 

@@ -8,10 +8,8 @@ are refused.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from contextvars import ContextVar
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from itertools import count, repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,10 +26,6 @@ FORMAT = "mckibben-model"
 VERSION = 1
 LARGEST_FILE = 64 * 2**20
 """Bytes; a longer file is refused before it is parsed."""
-MOST_PARTS = 5000
-"""Blocks and what is in them that a model may describe, so that reading a large file ends soon."""
-
-_described: ContextVar[Iterator[int]] = ContextVar("described")
 
 
 def to_dict(block: Block) -> dict[str, Any]:
@@ -40,13 +34,7 @@ def to_dict(block: Block) -> dict[str, Any]:
 
 
 def from_dict(content: Mapping[str, Any]) -> Block:
-    """Return the block that `to_dict` described.
-
-    Raises
-    ------
-    ModelError
-        If the dict is of another format or version, or anything in it is not as it should be.
-    """
+    """Return the block that `to_dict` described; refuse anything that is not as it should be."""
     if not isinstance(content, Mapping) or content.get("format") != FORMAT:
         raise ModelError(
             f'this is not a saved model (no "format": "{FORMAT}"). '
@@ -59,13 +47,10 @@ def from_dict(content: Mapping[str, Any]) -> Block:
             "Remedy: save it again with a matching release of mckibben."
         )
     described = {key: value for key, value in content.items() if key not in ("format", "version")}
-    counted = _described.set(count(1))
     try:
         block: Block = part_from_dict(described)
     except RecursionError:
         raise ModelError("nested too deeply. Remedy: compose fewer blocks in each other.") from None
-    finally:
-        _described.reset(counted)
     return block
 
 
@@ -83,24 +68,17 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     """Return the block (or other plug-in of ``group``) that `part_to_dict` described."""
     if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
         raise ModelError('a block without a "kind". Remedy: save the model again.')
-    if next(_described.get(repeat(1))) > MOST_PARTS:
-        raise ModelError(f"more than {MOST_PARTS} parts. Remedy: compose fewer blocks.")
-    kind = _present(content["kind"], group)
+    kind = content["kind"]
+    if group == "blocks" and kind not in names(group):  # of older files: every inverse had its own
+        older = {"adaptive-series": "adaptive"}
+        undone = kind.removesuffix("-inverse") in names(group)
+        kind = older.get(kind, "inverse" if undone else kind)
     cls = load_plugin(group, kind)
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
     unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
     if unknown:
         raise ModelError(f"{kind!r} has no field {unknown[0]!r}. Remedy: save the model again.")
     return cls(**values)
-
-
-def _present(kind: str, group: str) -> str:
-    """Return what a kind of an older file is called now: every inverse had a kind of its own."""
-    if (group, kind) == ("blocks", "adaptive-series"):
-        return "adaptive"
-    known = names(group)
-    undone = kind.removesuffix("-inverse")
-    return "inverse" if group == "blocks" and kind not in known and undone in known else kind
 
 
 def nested(content: Any) -> Any:

@@ -4,8 +4,7 @@ An inverse without a closed form is solved for in every sample, for a block whos
 input. The block gives two compiled functions: ``trial(u, memory)``, the output that an input would
 give, and ``advance(u, coefficients, state)``, which takes that step. The inverse takes the block's
 coefficients, then its lowest and highest input; and its state, then the last input and the count of
-samples clipped. What is solved for is exact to rounding: the bracket is closed until nothing lies
-between its ends.
+samples clipped.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from mckibben.blocks.kernels import (
 )
 
 MOST_STEPS = 200
-"""Of closing the bracket, and of the walk each way: far more than either takes."""
+"""Of bisection, of closing the bracket, and of the walk each way: far more than they take."""
 
 
 @inlined
@@ -105,10 +104,6 @@ def solve_near(
     return near if abs(error_near) < abs(error_far) else far, False
 
 
-MOST_HALVED = 200
-"""Steps of bisection, far more than it takes."""
-
-
 @inlined
 def solve_input(trial: Any, coefficients: Array, state: Array, inputs: Array) -> float:
     """Return the input for which the forward block follows the reference, and remember it."""
@@ -181,7 +176,7 @@ def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> 
         start(forward, own, u, virgin)
         if trial(u[0], (forward, own)) >= inputs[0]:
             low, high = coefficients[-2], coefficients[-2]
-        for _ in range(MOST_HALVED):
+        for _ in range(MOST_STEPS):
             middle = 0.5 * (low + high)
             if middle in (low, high):
                 break

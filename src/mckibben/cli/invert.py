@@ -84,7 +84,7 @@ def invert(
     """
     import numpy as np
 
-    from mckibben.blocks.adaptive.adaptive import adaptive as learning
+    from mckibben.blocks.adaptive import adaptive as learning
     from mckibben.blocks.coupled.load_estimate import load_of
     from mckibben.blocks.force.feedforward import ForceFeedforward
     from mckibben.blocks.saving import load

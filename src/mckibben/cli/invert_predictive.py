@@ -24,7 +24,7 @@ def write_predictive(
     as_json: bool,
 ) -> None:
     """Write a predictive compensator around an inverse, and say what it needs."""
-    from mckibben.blocks.predictive.predictive import MOST, Predictive
+    from mckibben.blocks.predictive import MOST, Predictive
 
     for name, value in (("rate-limit", rate), ("total-limit", total), ("flow-limit", flow)):
         if value is not None and not 0 < value <= MOST:

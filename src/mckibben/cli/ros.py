@@ -55,7 +55,7 @@ def ros(
     import time
     from contextlib import suppress
 
-    from mckibben.blocks.adaptive.adaptive import Adaptive
+    from mckibben.blocks.adaptive import Adaptive
     from mckibben.blocks.saving import load
     from mckibben.outputs import claim, claim_model, never
     from mckibben.ros.dds import Topics

@@ -42,7 +42,7 @@ class Controller(ABC):
         return 0.0
 
     @property
-    def undone(self) -> Block | None:
+    def forward_model(self) -> Block | None:
         """The model that its compensator undoes, if it has one."""
         return None
 
@@ -91,9 +91,9 @@ class BlockController(Controller):
         return dead_time_undone(self.block)
 
     @property
-    def undone(self) -> Block | None:
+    def forward_model(self) -> Block | None:
         """What the block undoes."""
-        return self.block.undone
+        return self.block.forward_model
 
     @property
     def samples_ahead(self) -> int:

@@ -216,7 +216,7 @@ def track(
     # what was asked for at a step is due at the next
     due = np.concatenate([path[:1], path[:-1]])
     errors = seen[:, at_y] - due
-    reached = ends(controller.undone, followed)
+    reached = ends(controller.forward_model, followed)
     out = {name: outside(due[:, followed.index(name)], *reached[name]) for name in reached}
     clipped |= np.any([*out.values(), np.diff(own, prepend=0)[:-1] > 0], axis=0)
     part, at_limit = errors[scored], clipped[scored]

@@ -46,7 +46,7 @@ class DisturbanceObserver(Controller):
         return self._model.dead_time
 
     @property
-    def undone(self) -> Block | None:
+    def forward_model(self) -> Block | None:
         """The model."""
         return self._model
 

@@ -29,7 +29,7 @@ def dead_time_undone(compensator: Block) -> float:
     >>> dead_time_undone(Air.example().inverse())
     0.02
     """
-    model = compensator.undone
+    model = compensator.forward_model
     return 0.0 if model is None else model.dead_time
 
 

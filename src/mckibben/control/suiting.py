@@ -52,7 +52,7 @@ def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
     list of str
         A sentence each, with its remedy.
     """
-    model = compensator.undone
+    model = compensator.forward_model
     if model is None:
         return []
     if of_itself(model, plant):

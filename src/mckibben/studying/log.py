@@ -11,7 +11,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
-from mckibben.blocks.predictive.predictive import Predictive
+from mckibben.blocks.predictive import Predictive
 from mckibben.control.twin import COMMAND
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
@@ -79,7 +79,7 @@ def loop_of(model: Block | None, compensator: Block | None, logs: Sequence[Recor
     own, undone = model is None, None
     if compensator is not None:
         compensator = inside(compensator)
-        undone = compensator.undone
+        undone = compensator.forward_model
     model = undone if model is None else inside(model)
     if model is None:
         raise ModelError(

@@ -26,8 +26,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import Learnable
-from mckibben.blocks.base import SEVERAL, Cost, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Cost, Ports, Start, needs_sample_time
 from mckibben.blocks.coupled.balance_equations import balance_of_forces
 from mckibben.blocks.coupled.balance_fields import check_fields, number_name, tell_clipped
 from mckibben.blocks.coupled.balance_law import (
@@ -43,7 +42,8 @@ from mckibben.blocks.coupled.balance_learning import learnable_balance
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.learning import Learnable
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton_cost
 
@@ -158,9 +158,9 @@ class Balance(Invertible):
 
     kind: ClassVar[str] = "balance"
     ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = balance_step
+    kernel: ClassVar[Step] = balance_step
     start_kernel: ClassVar[Start] = start_balance
-    inverse_kernel: ClassVar[Kernel] = balance_inverse_step
+    inverse_kernel: ClassVar[Step] = balance_inverse_step
     inverse_start_kernel: ClassVar[Start] = balance_inverse_start
     inverse_path_dependent: ClassVar[bool] = True
     increasing = ("limits",)

@@ -17,14 +17,6 @@ from __future__ import annotations
 import math
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import (
-    SENSES,
-    family_at,
-    learn,
-    root_size,
-    start_learning,
-    trusted,
-)
 from mckibben.blocks.coupled.balance_law import press, start_balance
 from mckibben.blocks.coupled.balance_terms import (
     OWN,
@@ -35,6 +27,14 @@ from mckibben.blocks.coupled.balance_terms import (
     sprung,
 )
 from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.learning import (
+    SENSES,
+    family_at,
+    learn,
+    root_size,
+    start_learning,
+    trusted,
+)
 from mckibben.blocks.solving import eliminate
 
 KINDS = 5

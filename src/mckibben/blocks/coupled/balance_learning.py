@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import Group, Learnable
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance_adapting import (
     AREA,
@@ -27,6 +26,7 @@ from mckibben.blocks.coupled.balance_adapting import (
 )
 from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.inverse import Inverse
+from mckibben.blocks.learning import Group, Learnable
 
 if TYPE_CHECKING:
     from mckibben.blocks.coupled.balance import Balance

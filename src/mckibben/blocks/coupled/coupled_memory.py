@@ -20,9 +20,9 @@ from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Ports, Start, needs_sample_time
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -113,7 +113,7 @@ class CoupledMemory(Block):
 
     kind: ClassVar[str] = "coupled-memory"
     ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = coupled_memory_step
+    kernel: ClassVar[Step] = coupled_memory_step
     start_kernel: ClassVar[Start] = coupled_memory_start
     parameters: ClassVar[tuple[str, ...]] = ("readout",)
     notation: ClassVar[Notation] = Notation(

@@ -14,9 +14,9 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Ports
+from mckibben.blocks.base import Block, Ports
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, rows
-from mckibben.blocks.kernels import step
+from mckibben.blocks.kernels import Step, step
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -51,7 +51,7 @@ class Coupling(Block):
 
     kind: ClassVar[str] = "coupling"
     ports: ClassVar[Ports] = ("driven",), (), ("given",)
-    kernel: ClassVar[Kernel] = coupling_step
+    kernel: ClassVar[Step] = coupling_step
     parameters: ClassVar[tuple[str, ...]] = ("gains",)
     notation: ClassVar[Notation] = Notation(
         r"h_j = \sum_i G_{ij} v_i",

@@ -24,11 +24,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Cost, Kernel, Ports, Start
+from mckibben.blocks.base import SEVERAL, Cost, Ports, Start
 from mckibben.blocks.coupled.balance_fields import tell_clipped
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector, rows, vector
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import parameter_vector
 from mckibben.blocks.solving import eliminate, newton_cost
@@ -260,9 +260,9 @@ class ForceBalance(Invertible):
 
     kind: ClassVar[str] = "force-balance"
     ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = force_balance_step
+    kernel: ClassVar[Step] = force_balance_step
     start_kernel: ClassVar[Start] = force_balance_start
-    inverse_kernel: ClassVar[Kernel] = force_balance_inverse_step
+    inverse_kernel: ClassVar[Step] = force_balance_inverse_step
     inverse_start_kernel: ClassVar[Start] = force_balance_inverse_start
     inverse_path_dependent: ClassVar[bool] = True
     increasing = ("thresholds",)

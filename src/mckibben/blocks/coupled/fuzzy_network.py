@@ -26,10 +26,10 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Cost, Kernel, Ports, Start
+from mckibben.blocks.base import SEVERAL, Cost, Ports, Start
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, kernel, step
+from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import eliminate, newton_cost
 from mckibben.errors import ModelError
@@ -333,8 +333,8 @@ class FuzzyNetwork(Invertible):
 
     kind: ClassVar[str] = "fuzzy-network"
     ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = fuzzy_network_step
-    inverse_kernel: ClassVar[Kernel] = fuzzy_network_inverse_step
+    kernel: ClassVar[Step] = fuzzy_network_step
+    inverse_kernel: ClassVar[Step] = fuzzy_network_inverse_step
     inverse_start_kernel: ClassVar[Start] = fuzzy_network_inverse_start
     inverse_path_dependent: ClassVar[bool] = True
     of_local_rules: ClassVar[bool] = True

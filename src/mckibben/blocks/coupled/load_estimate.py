@@ -19,14 +19,14 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.blocks.coupled.balance_law import begin, keep, unbalanced
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.blocks.fields import STRICT, Channel
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.saving import nested
@@ -109,7 +109,7 @@ class LoadEstimate(Block):
     """
 
     kind: ClassVar[str] = "load-estimate"
-    kernel: ClassVar[Kernel] = load_estimate_step
+    kernel: ClassVar[Step] = load_estimate_step
     start_kernel: ClassVar[Start] = load_estimate_start
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
     notation: ClassVar[Notation] = Notation(
@@ -173,9 +173,9 @@ class LoadEstimate(Block):
         """The balance's, and what schedules."""
         return self.forward.n_scratch + len(self.forward.scheduled)
 
-    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+    def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Give the balance's."""
-        return self.forward.kept_apart()
+        return self.forward.strictly_increasing()
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the balance's, and the pseudo-inverse of its shares of loads."""

@@ -26,9 +26,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Cost, Kernel, Ports, Start, own_sample_time
+from mckibben.blocks.base import SEVERAL, Block, Cost, Ports, Start, own_sample_time
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -140,7 +140,7 @@ class RecurrentFuzzyNetwork(Block):
 
     kind: ClassVar[str] = "recurrent-fuzzy-network"
     ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = recurrent_fuzzy_network_step
+    kernel: ClassVar[Step] = recurrent_fuzzy_network_step
     start_kernel: ClassVar[Start] = recurrent_fuzzy_network_start
     rate_dependent: ClassVar[bool] = True
     of_local_rules: ClassVar[bool] = True

@@ -27,8 +27,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.base import Start, needs_sample_time
 from mckibben.blocks.fields import (
+    LONGEST_DELAY,
     PRESSURE,
     STRICT,
     Channel,
@@ -37,12 +38,9 @@ from mckibben.blocks.fields import (
     StoredInitial,
 )
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
+from mckibben.blocks.kernels import ROUNDING, SLACK, Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError, ModelWarning
-
-LONGEST_DEAD_TIME = 254
-"""Samples."""
 
 LONGEST_LAG = 1e6
 """Seconds."""
@@ -167,9 +165,9 @@ class Air(Invertible):
     """
 
     kind: ClassVar[str] = "air"
-    kernel: ClassVar[Kernel] = air_step
+    kernel: ClassVar[Step] = air_step
     start_kernel: ClassVar[Start] = air_start
-    inverse_kernel: ClassVar[Kernel] = air_inverse_step
+    inverse_kernel: ClassVar[Step] = air_inverse_step
     inverse_start_kernel: ClassVar[Start] = air_inverse_start
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = (
@@ -225,7 +223,7 @@ class Air(Invertible):
     @property
     def n_states(self) -> int:
         """The pressure and, with a dead time, past ones."""
-        return 1 + (LONGEST_DEAD_TIME if self.dead_time > 0 else 0)
+        return 1 + (LONGEST_DELAY if self.dead_time > 0 else 0)
 
     def goal(self, command: float, way: Literal[-1, 1]) -> float:
         """Return the pressure where a held command leads: in filling, 1, or in venting, -1."""
@@ -255,10 +253,10 @@ class Air(Invertible):
         """
         step = needs_sample_time(self.kind, sample_time)
         late = self.dead_time / step
-        if not late <= LONGEST_DEAD_TIME + 0.5:
+        if not late <= LONGEST_DELAY + 0.5:
             raise ModelError(
                 f"a dead time of {self.dead_time:g} s is {late:.0f} samples. Remedy: a dead time "
-                f"of at most {LONGEST_DEAD_TIME} samples, or a longer sample time."
+                f"of at most {LONGEST_DELAY} samples, or a longer sample time."
             )
         times = (self.filling_time, self.venting_time)
         shares = [-math.expm1(-step / time) if time > 0 else 1.0 for time in times]

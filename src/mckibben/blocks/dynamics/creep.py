@@ -14,10 +14,10 @@ import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.base import Start, needs_sample_time
 from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Vector
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -84,9 +84,9 @@ class Creep(Invertible):
     """
 
     kind: ClassVar[str] = "creep"
-    kernel: ClassVar[Kernel] = creep_step
+    kernel: ClassVar[Step] = creep_step
     start_kernel: ClassVar[Start] = creep_start
-    inverse_kernel: ClassVar[Kernel] = creep_inverse_step
+    inverse_kernel: ClassVar[Step] = creep_inverse_step
     inverse_start_kernel: ClassVar[Start] = creep_inverse_start
     rate_dependent: ClassVar[bool] = True
     counts_clipped: ClassVar[bool] = False

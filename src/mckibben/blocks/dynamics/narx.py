@@ -22,7 +22,7 @@ from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start, own_sample_time
+from mckibben.blocks.base import Block, Start, own_sample_time
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -33,7 +33,7 @@ from mckibben.blocks.fields import (
     rows,
 )
 from mckibben.blocks.hysteresis.play_operators import start_operators
-from mckibben.blocks.kernels import inlined, kernel, step
+from mckibben.blocks.kernels import Step, inlined, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -307,7 +307,7 @@ class NarxPolynomial(Narx):
     """
 
     kind: ClassVar[str] = "narx-polynomial"
-    kernel: ClassVar[Kernel] = narx_polynomial_step
+    kernel: ClassVar[Step] = narx_polynomial_step
     start_kernel: ClassVar[Start] = narx_polynomial_start
     parameters: ClassVar[tuple[str, ...]] = ("weights",)
     notation: ClassVar[Notation] = Notation(
@@ -391,7 +391,7 @@ class NarxNetwork(Narx):
     """
 
     kind: ClassVar[str] = "narx-network"
-    kernel: ClassVar[Kernel] = narx_network_step
+    kernel: ClassVar[Step] = narx_network_step
     start_kernel: ClassVar[Start] = narx_network_start
     parameters: ClassVar[tuple[str, ...]] = ("bias", "linear", "hidden")
     notation: ClassVar[Notation] = Notation(

@@ -21,10 +21,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start, needs_sample_time
+from mckibben.blocks.base import Block, Start, needs_sample_time
 from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.fields import (
     DISPLACEMENT,
+    LONGEST_DELAY,
     PRESSURE,
     STRICT,
     ChannelField,
@@ -32,14 +33,11 @@ from mckibben.blocks.fields import (
     Initial,
     Vector,
 )
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import Notation, tex
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
-
-LONGEST_DELAY = 254
-"""Samples."""
 
 
 @step
@@ -109,7 +107,7 @@ class ProcessModel(Block):
     """
 
     kind: ClassVar[str] = "process-model"
-    kernel: ClassVar[Kernel] = process_model_step
+    kernel: ClassVar[Step] = process_model_step
     start_kernel: ClassVar[Start] = process_model_start
     rate_dependent: ClassVar[bool] = True
     filters: ClassVar[bool] = True

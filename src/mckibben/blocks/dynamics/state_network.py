@@ -21,7 +21,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost, Kernel, Start, needs_sample_time
+from mckibben.blocks.base import Block, Cost, Start, needs_sample_time
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.fields import (
     DISPLACEMENT,
@@ -32,7 +32,7 @@ from mckibben.blocks.fields import (
     Rows,
     StoredInitial,
 )
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -151,7 +151,7 @@ class StateNetwork(Block):
     """
 
     kind: ClassVar[str] = "state-network"
-    kernel: ClassVar[Kernel] = state_network_step
+    kernel: ClassVar[Step] = state_network_step
     start_kernel: ClassVar[Start] = state_network_start
     rate_dependent: ClassVar[bool] = True
     steady_state = steady_state

@@ -19,7 +19,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start, own_sample_time
+from mckibben.blocks.base import Block, Start, own_sample_time
 from mckibben.blocks.dynamics.starts import free_responses, start_on
 from mckibben.blocks.fields import (
     DISPLACEMENT,
@@ -30,7 +30,7 @@ from mckibben.blocks.fields import (
     FittedInitial,
     Initial,
 )
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import FEW, Notation, summed
 from mckibben.errors import ModelError
@@ -95,7 +95,7 @@ class TransferFunction(Block):
     """
 
     kind: ClassVar[str] = "transfer-function"
-    kernel: ClassVar[Kernel] = transfer_function_step
+    kernel: ClassVar[Step] = transfer_function_step
     start_kernel: ClassVar[Start] = transfer_function_start
     rate_dependent: ClassVar[bool] = True
     filters: ClassVar[bool] = True

@@ -17,7 +17,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.base import Block, Ports, Start, needs_sample_time
 from mckibben.blocks.fields import (
     CONTRACTION,
     FORCE,
@@ -27,7 +27,7 @@ from mckibben.blocks.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -123,7 +123,7 @@ class ActivationPressure(Block):
 
     kind: ClassVar[str] = "activation-pressure"
     ports: ClassVar[Ports] = PORTS
-    kernel: ClassVar[Kernel] = activation_pressure_step
+    kernel: ClassVar[Step] = activation_pressure_step
     start_kernel: ClassVar[Start] = activation_pressure_start
     rate_dependent: ClassVar[bool] = True
     no_inverse: ClassVar[str] = UNDOES_A_MUSCLE
@@ -283,7 +283,7 @@ class ActivationMemory(Block):
 
     kind: ClassVar[str] = "activation-memory"
     ports: ClassVar[Ports] = PORTS
-    kernel: ClassVar[Kernel] = activation_memory_step
+    kernel: ClassVar[Step] = activation_memory_step
     start_kernel: ClassVar[Start] = activation_memory_start
     rate_dependent: ClassVar[bool] = True
     no_inverse: ClassVar[str] = UNDOES_A_MUSCLE

@@ -19,11 +19,11 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start
+from mckibben.blocks.base import Start
 from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField
 from mckibben.blocks.force.laws import braid
 from mckibben.blocks.inverse import Invertible, nothing_clipped
-from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
+from mckibben.blocks.kernels import DERIVED, SLACK, Step, improved, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 
@@ -114,8 +114,8 @@ class BraidEquilibrium(Invertible):
     """
 
     kind: ClassVar[str] = "braid-equilibrium"
-    kernel: ClassVar[Kernel] = braid_equilibrium_step
-    inverse_kernel: ClassVar[Kernel] = braid_equilibrium_inverse_step
+    kernel: ClassVar[Step] = braid_equilibrium_step
+    inverse_kernel: ClassVar[Step] = braid_equilibrium_inverse_step
     inverse_start_kernel: ClassVar[Start] = nothing_clipped
     parameters: ClassVar[tuple[str, ...]] = (
         "load",

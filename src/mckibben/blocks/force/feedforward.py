@@ -16,7 +16,7 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.base import Block, Start
 from mckibben.blocks.compose import Parallel
 from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.force.laws import ForceLaw, PolynomialForce
@@ -37,7 +37,7 @@ SINGLE = {"LEAST_PULL": 1e-9}
 
 
 @cache
-def kernels_of(law: type[ForceLaw]) -> tuple[Step, Start]:
+def law_kernels(law: type[ForceLaw]) -> tuple[Step, Start]:
     """Return the kernels of a feedforward by a kind of law, its step and its start.
 
     Coefficients are [size of the law's, the law's, the friction's if there is some]; the state is the
@@ -127,7 +127,7 @@ class ForceFeedforward(Block):
         return None
 
     @property
-    def undone(self) -> Block:
+    def forward_model(self) -> Block:
         """The force, of the law alone or with friction."""
         return self.law if self.friction is None else Parallel((self.law, self.friction))
 
@@ -150,12 +150,12 @@ class ForceFeedforward(Block):
         return (self.law.pressure,)
 
     @property
-    def kernel(self) -> Kernel:  # type: ignore[override]
-        return kernels_of(type(self.law))[0]
+    def kernel(self) -> Step:  # type: ignore[override]
+        return law_kernels(type(self.law))[0]
 
     @property
     def start_kernel(self) -> Start | None:  # type: ignore[override]
-        return None if self.friction is None else kernels_of(type(self.law))[1]
+        return None if self.friction is None else law_kernels(type(self.law))[1]
 
     @property
     def n_states(self) -> int:

@@ -12,9 +12,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Ports
+from mckibben.blocks.base import Block, Ports
 from mckibben.blocks.fields import FORCE, LENGTH, PRESSURE, STRICT, Channel, ChannelField, Vector
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.memoryless import polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -106,7 +106,7 @@ class PolynomialForce(ForceLaw):
     """
 
     kind: ClassVar[str] = "polynomial-force"
-    kernel: ClassVar[Kernel] = polynomial_force_step
+    kernel: ClassVar[Step] = polynomial_force_step
     terms_kernel = polynomial_force_terms
     parameters: ClassVar[tuple[str, ...]] = ("per_bar", "elastic")
     notation: ClassVar[Notation] = Notation(
@@ -179,7 +179,7 @@ class ChouHannaford(ForceLaw):
     """
 
     kind: ClassVar[str] = "chou-hannaford"
-    kernel: ClassVar[Kernel] = chou_hannaford_step
+    kernel: ClassVar[Step] = chou_hannaford_step
     terms_kernel = chou_hannaford_terms
     parameters: ClassVar[tuple[str, ...]] = ("thread_length", "turns", "constant")
     notation: ClassVar[Notation] = Notation(
@@ -259,7 +259,7 @@ class TonduLopez(ForceLaw):
     """
 
     kind: ClassVar[str] = "tondu-lopez"
-    kernel: ClassVar[Kernel] = tondu_lopez_step
+    kernel: ClassVar[Step] = tondu_lopez_step
     terms_kernel = tondu_lopez_terms
     parameters: ClassVar[tuple[str, ...]] = ("braid_angle", "mu", "kappa", "constant")
     notation: ClassVar[Notation] = Notation(

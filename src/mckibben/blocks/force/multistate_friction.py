@@ -29,7 +29,7 @@ from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.base import Block, Ports, Start, needs_sample_time
 from mckibben.blocks.fields import (
     FORCE,
     LENGTH,
@@ -40,7 +40,7 @@ from mckibben.blocks.fields import (
     Vector,
     plain_sequence,
 )
-from mckibben.blocks.kernels import accumulate, kernel, step
+from mckibben.blocks.kernels import Step, accumulate, kernel, step
 from mckibben.blocks.notation import Notation, tex, with_unit
 from mckibben.errors import ModelError
 
@@ -169,7 +169,7 @@ class MultistateFriction(Block):
 
     kind: ClassVar[str] = "multistate-friction"
     ports: ClassVar[Ports] = ("input",), ("pressure",), ("output",)
-    kernel: ClassVar[Kernel] = multistate_friction_step
+    kernel: ClassVar[Step] = multistate_friction_step
     start_kernel: ClassVar[Start] = multistate_friction_start
     rate_dependent: ClassVar[bool] = True
     no_inverse: ClassVar[str] = (

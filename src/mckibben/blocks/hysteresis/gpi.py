@@ -29,8 +29,6 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import Learnable, start_learning
-from mckibben.blocks.adaptive.operators import follow_learning, inverse_at, learnable_operators
 from mckibben.blocks.base import Block, Start
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import (
@@ -53,6 +51,13 @@ from mckibben.blocks.hysteresis.play_operators import (
 )
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import Step, kernel, step, summing_step
+from mckibben.blocks.learning import (
+    Learnable,
+    follow_learning,
+    inverse_at,
+    learnable_operators,
+    start_learning,
+)
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -72,7 +77,7 @@ class Kernels(NamedTuple):
 
 
 @cache
-def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
+def gpi_kernels(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
     """Return the kernels of models with these kinds of envelopes.
 
     Coefficients are [kind and size of rising, of falling, thresholds, weights, rising, falling], and of
@@ -213,7 +218,7 @@ def of_envelopes(name: str) -> Any:
 
     def kernel_of(model: GPI) -> Any:
         kinds: Any = (type(model.rising), type(model.falling))
-        return getattr(kernels_of(*kinds), name)
+        return getattr(gpi_kernels(*kinds), name)
 
     return property(kernel_of)
 
@@ -278,9 +283,9 @@ class GPI(Invertible):
         head = [self.rising.number, up.size, self.falling.number, down.size]
         return np.array([*head, *self.thresholds, *self.weights, *up, *down])
 
-    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+    def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Give the thresholds, and the knots of the envelopes that have some."""
-        yield from super().kept_apart()
+        yield from super().strictly_increasing()
         for envelope in (self.rising, self.falling):
             yield from ((name, getattr(envelope, name)) for name in envelope.increasing)
 
@@ -314,7 +319,7 @@ class GPI(Invertible):
         """Weights, and an offset that the model itself has not."""
         low, high = self.input_range
         limits = float(self.falling(low)), float(self.rising(high))
-        kernels = kernels_of(type(self.rising), type(self.falling))
+        kernels = gpi_kernels(type(self.rising), type(self.falling))
 
         def with_parameters(theta: Array) -> Block:
             changed, offset = replace(self, weights=vector(theta[:-1])), float(theta[-1])

@@ -29,8 +29,6 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import Learnable, start_learning
-from mckibben.blocks.adaptive.operators import follow_learning, inverse_at, learnable_operators
 from mckibben.blocks.base import needs_sample_time
 from mckibben.blocks.fields import (
     DISPLACEMENT,
@@ -51,6 +49,13 @@ from mckibben.blocks.hysteresis.play_operators import (
 )
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import DERIVED, improved, kernel, step, summing_step
+from mckibben.blocks.learning import (
+    Learnable,
+    follow_learning,
+    inverse_at,
+    learnable_operators,
+    start_learning,
+)
 from mckibben.blocks.notation import FEW, Notation, summed, tex
 from mckibben.blocks.solving import solve_near
 

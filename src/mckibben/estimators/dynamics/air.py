@@ -11,7 +11,8 @@ from annotated_types import Ge
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.dynamics.air import LONGEST_DEAD_TIME, Air
+from mckibben.blocks.dynamics.air import Air
+from mckibben.blocks.fields import LONGEST_DELAY
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.separable import SEARCH_SAMPLES, SeparableEstimator
@@ -106,7 +107,7 @@ class AirEstimator(SeparableEstimator):
                 "begin at rest."
             )
         shortest = min(run.u.size for run in data.runs)
-        most = min(int(self.longest_dead_time / step + 1e-9), LONGEST_DEAD_TIME, shortest // 4)
+        most = min(int(self.longest_dead_time / step + 1e-9), LONGEST_DELAY, shortest // 4)
         tried: dict[int, tuple[float, Air]] = {}
         best = self._correlated(data, most)
         asked = [best]

@@ -11,8 +11,9 @@ from annotated_types import Ge
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.dynamics.process_model import LONGEST_DELAY, ProcessModel
+from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.starts import free_responses
+from mckibben.blocks.fields import LONGEST_DELAY
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Initial
 from mckibben.estimators.core.separable import SeparableEstimator

@@ -239,7 +239,7 @@ def check_single(block: Block, sample_time: float | None) -> None:
         raise ModelError(
             f"{block.title!r} {block.needs_double}. Remedy: export in double precision."
         )
-    for name, places in block.kept_apart():
+    for name, places in block.strictly_increasing():
         if np.any(np.diff(np.array(places, dtype=np.float32)) <= 0) and np.all(np.diff(places) > 0):
             raise ModelError(
                 f"{name} of {block.title!r} are too close for single precision. "

@@ -56,10 +56,13 @@ class Wiring:
         The model.
     sample_time : float or None
         Time between steps [s].
+    from_rest : bool
+        As of `mckibben.blocks.base.Board`.
     """
 
     block: Block
     sample_time: float | None
+    from_rest: bool = True
     steps: list[Call | Sum] = field(default_factory=list)
     n_signals: int = 0
     n_numbers: int = 0
@@ -79,7 +82,7 @@ class Wiring:
         costs = (call.block.cost(self.sample_time) for call in self.calls)
         return sum(costs, start=Cost(0, 0))
 
-    def call(self, block: Block, given: Sequence[str]) -> list[str]:
+    def call(self, block: Block, taken: Sequence[str]) -> list[str]:
         """Append a block, and return the signals that it gives.
 
         Raises
@@ -95,7 +98,7 @@ class Wiring:
         zeros = np.zeros(len(block.inputs))
         state = None if isinstance(block.start, str) else block.initial_state(zeros)
         numbers, places = block.coefficients(self.sample_time), (self.n_signals, self.n_numbers)
-        self.steps.append(Call(block, numbers, state, tuple(given), *places))
+        self.steps.append(Call(block, numbers, state, tuple(taken), *places))
         self.n_numbers += block.n_states + block.n_scratch
         return self._new_signals(len(block.outputs))
 

@@ -157,9 +157,7 @@ def plan_scratch(length: int, n: int, rows: int) -> int:
 def invert_small(n: int, matrix: Array, result: Array) -> None:
     """Invert a positive definite matrix, n by n in a row, by Gauss and Jordan; destroys it."""
     for i in range(n * n):
-        result[i] = 0.0
-    for i in range(n):
-        result[i * n + i] = 1.0
+        result[i] = 1.0 if i % (n + 1) == 0 else 0.0
     for i in range(n):
         pivot = 1.0 / matrix[i * n + i]
         for j in range(n):
@@ -239,10 +237,8 @@ def moved(
     goal, room_step = duals[3 * count : 4 * count], duals[4 * count : 5 * count]
     price_step, forward = duals[5 * count :], work[:n]
     off, factors = system[: length * block], system[length * block :]
-    for k in range(n):
-        step[k] = 0.0
-    for i in range(right.size):
-        step[n + i] = right[i]
+    step[:n] = 0.0
+    step[n:] = right
     for t in range(length):
         for i in range(m):
             row, at = rows[i * width : (i + 1) * width], t * m + i
@@ -253,16 +249,13 @@ def moved(
                     step[t * n + k] += pull * row[2 + k]
     for t in range(length):
         now = step[(t + 1) * n : (t + 2) * n]
-        for k in range(n):
-            forward[k] = now[k]
+        forward[:] = now
         if t > 0:
             applied(n, off[t * block : (t + 1) * block], step[t * n : (t + 1) * n], -1.0, forward)
-        for k in range(n):
-            now[k] = 0.0
+        now[:] = 0.0
         applied(n, factors[t * block : (t + 1) * block], forward, 1.0, now)
     for t in range(length - 2, -1, -1):
-        for k in range(n):
-            forward[k] = 0.0
+        forward[:] = 0.0
         after, here = step[(t + 2) * n : (t + 3) * n], step[(t + 1) * n : (t + 2) * n]
         applied(n, off[(t + 1) * block : (t + 2) * block], after, 1.0, forward)
         applied(n, factors[t * block : (t + 1) * block], forward, -1.0, here)
@@ -294,14 +287,15 @@ def plan_several(
     width, block, length = n + 2, n * n, nominal.size // n
     m = rows.size // width
     count, size_of = length * m, length * block
-    hessian, system = scratch[:size_of], scratch[size_of : 3 * size_of]
-    wished, right = (
-        scratch[3 * size_of : 3 * size_of + length * n],
-        scratch[3 * size_of + length * n : 3 * size_of + 2 * length * n],
+    hessian, system, rest = (
+        scratch[:size_of],
+        scratch[size_of : 3 * size_of],
+        scratch[3 * size_of :],
     )
-    rest = scratch[3 * size_of + 2 * length * n :]
-    step, duals = rest[: (length + 1) * n], rest[(length + 1) * n : (length + 1) * n + 6 * count]
-    work = rest[(length + 1) * n + 6 * count :]
+    wished, right = rest[: length * n], rest[length * n : 2 * length * n]
+    rest = rest[2 * length * n :]
+    step, rest = rest[: (length + 1) * n], rest[(length + 1) * n :]
+    duals, work = rest[: 6 * count], rest[6 * count :]
     room, price, short = duals[:count], duals[count : 2 * count], duals[2 * count : 3 * count]
     goal, room_step = duals[3 * count : 4 * count], duals[4 * count : 5 * count]
     price_step, p = duals[5 * count :], path[n:]
@@ -323,18 +317,16 @@ def plan_several(
             for k in range(n):
                 wished[t * n + i] += slope[k * n + i] * errors[t * n + k] / size
                 wished[t * n + i] += own[i * n + k] * nominal[t * n + k]
+    p[:] = nominal
     for t in range(length):
-        for k in range(n):
-            p[t * n + k] = nominal[t * n + k]
         for i in range(m):
             row = rows[i * width : (i + 1) * width]
             room[t * m + i] = max(row[1] - weighed(row, path, t), ROOM)
             price[t * m + i] = ROOM
     for taken in range(MOST_STEPS):
         gap, amiss = 0.0, 0.0
+        right[:] = wished
         for t in range(length):
-            for k in range(n):
-                right[t * n + k] = wished[t * n + k]
             curved = hessian[t * block : (t + 1) * block]
             applied(n, curved, p[t * n : (t + 1) * n], -1.0, right[t * n : (t + 1) * n])
         for t in range(length):
@@ -351,8 +343,7 @@ def plan_several(
         if gap <= CLOSED and amiss * amiss <= CLOSED:
             return taken
         factored(n, rows, hessian, duals, system, work)
-        for i in range(count):
-            goal[i] = 0.0
+        goal[:] = 0.0
         moved(n, rows, system, right, step, duals, work)
         share, dear = furthest(room, room_step), furthest(price, price_step)
         then = 0.0
@@ -392,22 +383,18 @@ def plan_one(
     length, m = nominal.size, rows.size // 3
     most = 4 * length + 2
     x, d, best = scratch[:most], scratch[most : 2 * most], scratch[2 * most :]
-    low, high = -1e30, 1e30
+    low, high, fall, rise = -1e30, 1e30, np.inf, np.inf
     for i in range(m):
         end = rows[3 * i + 1] / rows[3 * i + 2]
-        if not rows[3 * i] > 0.0:
-            if rows[3 * i + 2] > 0.0:
-                high = min(high, end)
-            else:
-                low = max(low, end)
-    fall = high - low
-    rise = fall
-    for i in range(m):
-        if rows[3 * i] > 0.0:
-            if rows[3 * i + 2] > 0.0:
-                rise = min(rise, rows[3 * i + 1] / rows[3 * i + 2])
-            else:
-                fall = min(fall, -rows[3 * i + 1] / rows[3 * i + 2])
+        if rows[3 * i] > 0.0 and rows[3 * i + 2] > 0.0:
+            rise = min(rise, end)
+        elif rows[3 * i] > 0.0:
+            fall = min(fall, -end)
+        elif rows[3 * i + 2] > 0.0:
+            high = min(high, end)
+        else:
+            low = max(low, end)
+    fall, rise = min(fall, high - low), min(rise, high - low)
     size = 0.0
     for t in range(length):
         size += slopes[t] * slopes[t]

@@ -1,7 +1,7 @@
 """An inverse that learns from what is measured, and stays exact.
 
 Inputs are those of the inverse, then what is measured of the references; outputs are the inverse's. With
-every measured sample the parameters of the model follow, see `mckibben.blocks.adaptive.learning`; the
+every measured sample the parameters of the model follow, see `mckibben.blocks.learning`; the
 inverse runs with them as they are, so that model and inverse match at every step.
 
 A measurement answers the reference of the step before, as behind a compensator: since the model gives
@@ -17,7 +17,7 @@ from dataclasses import dataclass as plain_dataclass
 from dataclasses import replace
 from functools import cached_property
 from statistics import NormalDist
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt
@@ -25,7 +25,21 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import (
+from mckibben.blocks.base import (
+    Block,
+    Board,
+    Cost,
+    Run,
+    Start,
+    explicit_state,
+    needs_sample_time,
+)
+from mckibben.blocks.compose import Layout, Series
+from mckibben.blocks.feedback import MEASURED
+from mckibben.blocks.fields import STRICT, Channel, Initial, Vector, vector
+from mckibben.blocks.inverse import Inverse, Invertible
+from mckibben.blocks.kernels import Step
+from mckibben.blocks.learning import (
     LARGEST,
     READY,
     SENSES,
@@ -37,20 +51,7 @@ from mckibben.blocks.adaptive.learning import (
     covariance_of,
     start_root,
 )
-from mckibben.blocks.base import (
-    Block,
-    Board,
-    Cost,
-    Kernel,
-    Run,
-    Start,
-    explicit_state,
-    needs_sample_time,
-)
-from mckibben.blocks.compose import Series
-from mckibben.blocks.feedback import MEASURED
-from mckibben.blocks.fields import STRICT, Channel, Initial, Vector, vector
-from mckibben.blocks.inverse import Inverse, Invertible
+from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -77,19 +78,15 @@ FIT_ERROR = 0.01
 class Drift:
     """What has changed since the fit, by groups of parameters.
 
-    A standard error is that of the learner's covariance, and what a fit itself is wrong by: a little of
-    every group, and whatever moves the output no further than its usual error. What the form of a model
-    leaves goes with the motion: other motion makes it look like other parameters.
-
     Parameters
     ----------
     groups : tuple of Group
         Which changes are reported.
     changes, errors : tuple of float
-        Relative change of every group, and its standard error.
+        Relative change of every group, and its standard error: that of the learner's covariance, a
+        little of every group, and whatever moves the output no further than its usual error.
     limit : float
-        Standard errors at which an alarm is given: at `FALSE_ALARMS` an hour by chance, where one look
-        is independent of the next after the time to learn in.
+        Standard errors at which an alarm is given, see `alarm_limit`.
     measured : bool
         Whether anything was, by now.
     """
@@ -132,7 +129,10 @@ class Drift:
 
 
 def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float:
-    """Return the standard errors at which alarms are false at a rate [1/h]; ``time`` in s."""
+    """Return the standard errors at which alarms are false at a rate [1/h].
+
+    Looks are independent of each other after the ``time`` to learn in [s].
+    """
     looks = n_groups * 3600.0 / time
     return -NormalDist().inv_cdf(min(rate / looks, 0.5) / 2.0)
 
@@ -179,6 +179,11 @@ class Adaptive(Block):
     noise: Annotated[FiniteFloat, Gt(0)]
     memory: Vector | None = None
 
+    path_dependent = same_as("fixed.path_dependent")
+    outputs = same_as("fixed.outputs")
+    reachable = same_as("fixed.reachable")
+    forward_model = same_as("forward")
+
     def __post_init__(self) -> None:
         if isinstance(self.forward, Series):
             parts = self.forward.parts
@@ -190,14 +195,13 @@ class Adaptive(Block):
                 )
         self.forward.inverse()  # which refuses what has none
         self._check_settings()
-        if self.memory is None:
-            return
-        if len(self.memory) not in (self.n_states, self.n_learnt):
-            raise ModelError(
-                f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
-                f"{self.n_states}. Remedy: resume what was saved with the same model."
-            )
-        self._check_memory(np.array(self.memory))
+        if self.memory is not None:
+            if len(self.memory) not in (self.n_states, self.n_learnt):
+                raise ModelError(
+                    f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
+                    f"{self.n_states}. Remedy: resume what was saved with the same model."
+                )
+            self._check_memory(np.array(self.memory))
 
     def _check_settings(self) -> None:
         """Refuse a time and a noise that nothing is measured with."""
@@ -217,7 +221,7 @@ class Adaptive(Block):
     def _check_memory(self, state: Array) -> None:
         """Refuse a state, or what is learnt of one, that learning never comes to."""
         if self.parts and len(state) == self.n_states:
-            for part, share in zip(self.parts, self._states(state), strict=True):
+            for part, share in self.shares(state):
                 if part is self.core:
                     self.core._check_memory(share)  # of this class
                 else:
@@ -254,20 +258,21 @@ class Adaptive(Block):
     # -- what it is made of ------------------------------------------------------------------
 
     @cached_property
-    def _place(self) -> int:
-        """Of the part of a series that learns."""
+    def _apart(self) -> tuple[tuple[Block, ...], Block, tuple[Block, ...]]:
+        """What of a series is before the part that learns, that part, and what is behind it."""
         parts = self.forward.parts if isinstance(self.forward, Series) else (self.forward,)
-        return next(k for k, part in enumerate(parts) if learnable_of(part) is not None)
+        place = [learnable_of(part) is not None for part in parts].index(True)
+        return parts[:place], parts[place], parts[place + 1 :]
 
     @cached_property
     def core(self) -> Adaptive:
         """What learns: this itself, or a part of a series, its noise by the mean slope behind it."""
         if not isinstance(self.forward, Series):
             return self
-        part = self.forward.parts[self._place]
+        _, part, behind_it = self._apart
         low, high = (float(end[0]) for end in part.reachable())
         ends = np.array([low]), np.array([high])
-        for behind in self.forward.parts[self._place + 1 :]:
+        for behind in behind_it:
             ends = behind.passes(*ends)
         slope = float(np.abs(ends[1] - ends[0])[0]) / (high - low)
         core = Adaptive(part, self.time, self.noise / (slope if 0 < slope < np.inf else 1.0))
@@ -277,12 +282,9 @@ class Adaptive(Block):
     @cached_property
     def _around(self) -> tuple[Block | None, Block | None]:
         """What undoes the parts behind the one that learns, and those before it, where there are any."""
-        if not isinstance(self.forward, Series):
-            return None, None
-        undone = tuple(part.inverse() for part in reversed(self.forward.parts))
-        n_behind = len(undone) - 1 - self._place
-        behind, before = undone[:n_behind], undone[n_behind + 1 :]
-        return Series(behind) if behind else None, Series(before) if before else None
+        before, _, behind = self._apart
+        undo_behind = Series(behind).inverse() if behind else None
+        return undo_behind, Series(before).inverse() if before else None
 
     @cached_property
     def parts(self) -> tuple[Block, ...]:
@@ -309,7 +311,7 @@ class Adaptive(Block):
             )
         return found
 
-    @property
+    @cached_property
     def fixed(self) -> Block:
         """The inverse that does not learn."""
         return self.forward.inverse()
@@ -319,11 +321,6 @@ class Adaptive(Block):
         """That of the block undone, and that it learns."""
         block = self.forward
         return f"{block.forward.title if isinstance(block, Inverse) else block.title}-adaptive"
-
-    @property
-    def path_dependent(self) -> bool:  # type: ignore[override]
-        """As the inverse that does not learn says."""
-        return self.fixed.path_dependent
 
     @property
     def measured(self) -> tuple[Channel, ...]:
@@ -346,20 +343,6 @@ class Adaptive(Block):
         behind = self._around[0]
         return len(self.measured) if behind is None or behind.n_states == 0 else 0
 
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """The forward block's driven inputs."""
-        return self.fixed.outputs
-
-    def reachable(self) -> tuple[Array, Array]:
-        """Return what the inverse gives."""
-        return self.fixed.reachable()
-
-    @property
-    def undone(self) -> Block:
-        """The forward block, as fitted."""
-        return self.forward
-
     # -- memory ------------------------------------------------------------------------------
 
     @cached_property
@@ -372,14 +355,14 @@ class Adaptive(Block):
     def n_states(self) -> int:
         """The inverse's, what more learning wants of the last sample, and what is learnt."""
         if self.parts:
-            return sum(part.n_states for part in self.parts)
+            return super().n_states
         return self.fixed.n_states + self.learnable.n_more_states + self.n_learnt
 
     @property
     def n_scratch(self) -> int:
         """Three numbers a parameter, what more the family wants, and those of the inverse."""
         if self.parts:
-            return sum(part.n_scratch for part in self.parts)
+            return super().n_scratch
         more = self.learnable.n_more_scratch + self.fixed.n_scratch
         return 3 * self.learnable.fitted.size + more
 
@@ -399,7 +382,7 @@ class Adaptive(Block):
         start = self.start if initial is None else initial
         if self.parts:
             named = initial is None and isinstance(start, str)  # each starts by a rule of its own
-            return self._initial_states(first, None if named else start)
+            return Layout(self).initial_state(first, None if named else start)
         if isinstance(start, str):
             return super().initial_state(first, start)
         asked = first[: len(first) - len(self.measured)]
@@ -414,35 +397,8 @@ class Adaptive(Block):
         state[: self.fixed.n_states] = self.fixed.initial_state(asked, start)
         return state
 
-    def _initial_states(self, first: Array, start: Initial | None) -> Array:
-        """Return the states of all parts, each started from the first sample that reaches it."""
-        own: Sequence[Initial | None] = [start] * len(self.parts)
-        if start is not None and not isinstance(start, str):
-            own = [share.tolist() for share in self._states(explicit_state(self, start))]
-        left, states = iter(zip(self.parts, own, strict=True)), []
-
-        def given(sample: Array) -> Array:
-            part, initial = next(left)
-            states.append(part.initial_state(sample, initial))
-            outputs = np.empty((1, len(part.outputs)))
-            part.bind(1.0, states[-1].copy(), sample[np.newaxis], outputs)()
-            return outputs[0]
-
-        behind, before = self._around
-        asked = np.array(first, dtype=np.float64)
-        if behind:
-            asked = np.concatenate([given(asked[k : k + 1].copy()) for k in range(2)])
-        found = given(asked)
-        if before:
-            given(found)
-        return np.concatenate(states)
-
-    def _states(self, state: Array) -> list[Array]:
-        """Return the states of the parts of a series, as views."""
-        return np.split(state, np.cumsum([part.n_states for part in self.parts])[:-1])
-
     def _core_state(self, state: Array) -> Array:
-        return self._states(state)[self.parts.index(self.core)] if self.parts else state
+        return next((own for part, own in self.shares(state) if part is self.core), state)
 
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return what is not learnt of a state of the core, theta, used, root and senses, as views."""
@@ -464,7 +420,7 @@ class Adaptive(Block):
     # -- running -----------------------------------------------------------------------------
 
     @property
-    def kernel(self) -> Kernel | None:  # type: ignore[override]
+    def kernel(self) -> Step | None:  # type: ignore[override]
         """That of the family that learns; None of a series."""
         return None if self.parts else self.learnable.step
 
@@ -474,7 +430,7 @@ class Adaptive(Block):
         return None if self.parts else self.learnable.start
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what `mckibben.blocks.adaptive.learning.family_at` names."""
+        """Return what `mckibben.blocks.learning.family_at` names."""
         if self.parts:
             return super().coefficients(sample_time)
         step, learnable = needs_sample_time(self.kind, sample_time), self.learnable
@@ -497,38 +453,16 @@ class Adaptive(Block):
         return self.fixed.cost(sample_time) + Cost(learnt, learnt)
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that undoes the parts in order."""
-        if not self.parts:
-            return super().bind(sample_time, state, inputs, outputs)
-        n = inputs.shape[0]
-        behind, before = self._around
-        columns, undone = np.empty((2, n, 1)), np.empty((2, n, 1))
-        asked, given = np.empty((n, 2)), np.empty((n, 1)) if before else outputs
-        states = iter(self._states(state))
-        runs: list[Run] = []
-        if behind:
-            runs = [behind.bind(sample_time, next(states), columns[k], undone[k]) for k in range(2)]
-        learn = self.core.bind(sample_time, next(states), asked, given)
-        last = before.bind(sample_time, next(states), given, outputs) if before else None
+        """Return a function that runs what learns; of a series, all parts."""
+        run = Layout(self).bind if self.parts else super().bind
+        return run(sample_time, state, inputs, outputs)
 
-        def run() -> None:
-            asked[:] = inputs
-            for k, undo in enumerate(runs):
-                columns[k, :, 0] = inputs[:, k]
-                undo()
-                asked[:, k] = undone[k, :, 0]
-            learn()
-            if last is not None:
-                last()
-
-        return run
-
-    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
         """Lay out the parts; those behind the core twice."""
         if not self.parts:
-            return super().wired(board, given)
+            return super().wired(board, taken)
         behind, before = self._around
-        signals = [behind.wired(board, [signal])[0] for signal in given] if behind else given
+        signals = [behind.wired(board, [signal])[0] for signal in taken] if behind else taken
         found = self.core.wired(board, signals)
         found = before.wired(board, found) if before else found
         if not isinstance(self.start, str):
@@ -536,27 +470,25 @@ class Adaptive(Block):
         return found
 
     def report(self, state: Array) -> None:
-        """Pass on what the parts of a series have to say."""
+        """Warn as the inverse that does not learn would; of a series, as all parts do."""
         if self.parts:
-            for part, share in zip(self.parts, self._states(state), strict=True):
-                part.report(share)
+            super().report(state)
+        else:
+            self.fixed.report(state[: self.fixed.n_states])
 
     def n_clipped(self, state: Array) -> int:
-        """Return the samples that parts of a series clipped."""
-        if not self.parts:
-            return 0
-        shares = zip(self.parts, self._states(state), strict=True)
-        return sum(part.n_clipped(share) for part, share in shares)
+        """Return what the inverse that does not learn would count; of a series, all parts."""
+        if self.parts:
+            return super().n_clipped(state)
+        return self.fixed.n_clipped(state[: self.fixed.n_states])
 
     # -- what is learnt ----------------------------------------------------------------------
 
     def present(self, state: Array) -> Block:
         """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
         found = self.learnable.with_parameters(self._split(self._core_state(state))[2])
-        if not isinstance(self.forward, Series):
-            return found
-        parts = self.forward.parts
-        return Series((*parts[: self._place], found, *parts[self._place + 1 :]))
+        before, _, behind = self._apart
+        return Series((*before, found, *behind)) if isinstance(self.forward, Series) else found
 
     def drift(self, state: Array) -> Drift:
         """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""

@@ -19,6 +19,11 @@ moves.
 
 What is learnt is used as far as it helps: the inverse runs with parameters between the fitted and the
 learnt ones, where late errors would have been least.
+
+Of weighted sums of play operators the slopes are the operators and 1, so nothing is linearised. They
+play in the space of the input, and stay as they are where weights move. There, what is learnt is taken
+over as far as the input then goes on in the direction of the reference, unless it differs by more than
+the usual error: a change of weights is never mistaken for a reversal, and noise does not chatter.
 """
 
 from __future__ import annotations
@@ -31,10 +36,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.hysteresis.play_operators import follow
 from mckibben.blocks.kernels import Step, kernel
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block, Start
+    from mckibben.blocks.hysteresis.gpi import GPI
+    from mckibben.blocks.hysteresis.pi import PI
 
 
 @dataclass(frozen=True)
@@ -366,3 +374,143 @@ def start_learning(c: Array, learnt: Array) -> None:
         senses[first + SQUARED], senses[first + RELATED] = 1.0, ALIKE
         senses[first + STOOD] = (3.0 * noise) ** 2 * (1.0 + ALIKE) / (1.0 - ALIKE)
         senses[first + APART] = noise**2
+
+
+# -- of weighted sums of play operators ---------------------------------------------------------------
+
+LEAST = 0.1
+"""Share of a fitted partial sum of weights that is left, whatever is measured."""
+
+GROUPS = (
+    Group("gain", "higher (softer springs, or more area)", "lower (stiffer springs, or less area)"),
+    Group("friction"),
+    Group("offset", "up", "down"),
+)
+
+
+@kernel
+def inverse_at(c: Array) -> int:
+    """Return where the inverse's numbers begin among the coefficients, behind [limits, least]."""
+    return family_at(c) + 2 * int(c[0])
+
+
+@kernel
+def follow_learning(
+    c: Array,
+    r: Array,
+    s: Array,
+    last: Array,
+    learnt: Array,
+    scratch: Array,
+    y: float,
+    measured: float,
+) -> float:
+    """Learn, and find the operators' common input for a reference; return the direction it takes.
+
+    Parameters and weights in use are [weights, offset]; ``s`` are the operators; ``last`` is [previous
+    reference, samples clipped, direction of travel].
+    """
+    n, p, family = r.size, r.size + 1, family_at(c)
+    limits, least = c[family : family + 2], c[family + 2 : inverse_at(c)]
+    fitted = c[4 + 2 * p : 4 + 3 * p]
+    theta, used = learnt[:p], learnt[p : 2 * p]
+    sense = learnt[family - 4 - p :]
+    work, slopes = scratch[: 2 * p], scratch[2 * p : 3 * p]
+    believed, asked, expected = theta[n], used[n], fitted[n]
+    for i in range(n):
+        slopes[i] = s[i]
+        believed += theta[i] * s[i]
+        asked += used[i] * s[i]
+        expected += fitted[i] * s[i]
+    slopes[n] = 1.0
+    if learn(c, learnt, 0, slopes, work, measured, believed, asked, expected):
+        keep_rising(theta, least)
+    if y > last[0]:
+        last[2] = 1.0
+    elif y < last[0]:
+        last[2] = -1.0
+    share = trusted(sense)
+    for i in range(p):
+        slopes[i] = fitted[i] + share * (theta[i] - fitted[i])
+    take_over(slopes, used, s, y, last[2], GATE * sense[USUAL])
+    total = 0.0
+    for i in range(n):
+        total += used[i] * s[i]
+    way, clipped = follow(y - used[n], total, limits[0], limits[1], r, used[:n], s)
+    if clipped:
+        last[1] += 1.0
+    last[0] = y
+    return way
+
+
+@kernel
+def keep_rising(theta: Array, least: Array) -> None:
+    """Raise weights that are too low for a sum that rises right after every reversal."""
+    n = theta.size - 1
+    total = 0.0
+    for i in range(n):
+        theta[i] = max(theta[i], least[i], least[n + i] - total)
+        total += theta[i]
+
+
+@kernel
+def take_over(aim: Array, used: Array, s: Array, y: float, travel: float, band: float) -> None:
+    """Move what is used to what is aimed at, as far as the input need not turn before the reference."""
+    n = s.size
+    total, change = used[n], aim[n] - used[n]
+    for i in range(n):
+        total += used[i] * s[i]
+        change += (aim[i] - used[i]) * s[i]
+    room = y - total
+    share = 1.0
+    left = room - change
+    if travel * left < 0.0 and abs(left) <= band and change != 0.0:
+        share = min(max(room / change, 0.0), 1.0)
+    for i in range(n + 1):
+        used[i] = aim[i] if share == 1.0 else used[i] + share * (aim[i] - used[i])
+
+
+def learnable_operators(
+    model: PI | GPI,
+    limits: tuple[float, float],
+    offset: float,
+    step: Step,
+    start: Start,
+    with_parameters: Callable[[Array], Block],
+) -> Learnable:
+    """Return what is learnt of a weighted sum of play operators: its weights, and an offset.
+
+    Gain and friction are expected to change by 30 %, each weight by itself by 10 %, the offset by 30 %
+    of the span; ``limits`` are the lowest and highest input of the operators.
+    """
+    r, w = np.array(model.thresholds), np.array(model.weights)
+    n, size, width = len(w), np.abs(w), limits[1] - limits[0]
+    span = float(np.sum(w) * (width if np.isfinite(width) else r.max() or 1.0))
+    weights, sliding = np.append(np.ones(n), 0.0), np.array([0.0, *np.ones(n - 1), 0.0])
+    together = 0.3**2 * np.outer(weights, weights) + 0.3**2 * np.outer(sliding, sliding)
+    lowest = np.where(w >= 0, 0.0, -np.inf)
+    least = np.concatenate([lowest, LEAST * np.cumsum(w)])  # of weights, then of partial sums
+
+    def numbers(sample_time: float | None) -> Array:
+        own = model.inverse_numbers(model.coefficients(sample_time))
+        return np.concatenate([limits, least, own])
+
+    def group_changes(theta: Array) -> Array:
+        """Return the changes of sum w, of sum w r over sum w, and of the offset over the span."""
+        new = theta[:-1]
+        width_new, width_old = new @ r / new.sum(), w @ r / w.sum()
+        friction = width_new / width_old - 1 if width_old > 0 else 0.0
+        return np.array([new.sum() / w.sum() - 1, friction, (theta[-1] - offset) / span])
+
+    return Learnable(
+        step,
+        start,
+        fitted=np.append(w, offset),
+        scales=np.append(np.maximum(size, 0.01 * size.mean()), span),
+        spread=together + np.diag([*np.full(n, 0.1**2), 0.3**2]),
+        with_parameters=with_parameters,
+        numbers=numbers,
+        groups=GROUPS,
+        group_changes=group_changes,
+        whole_changes=np.array([span, 2 * np.dot(w, r), span]),
+    )

@@ -2,7 +2,7 @@
 
 In every sample the exact inverse runs over the references of a horizon from the memory that the muscles
 really have. What it gives is used where limits let it: then this is the exact inverse. Where they do
-not, all pressures of the horizon are planned together (`mckibben.blocks.predictive.plan`), along the
+not, all pressures of the horizon are planned together (`mckibben.blocks.planning`), along the
 model's own prediction, hysteresis and all; the first is given, and the model takes that step. So a
 reversal that the supply is too slow for begins early, and errors are shared before and after.
 
@@ -21,16 +21,17 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost, Kernel, Run, Start, explicit_state, needs_sample_time
+from mckibben.blocks.base import Block, Cost, Run, Start, explicit_state, needs_sample_time
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.fields import STRICT, Initial, Vector
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.inverse import Inverse, drives
 from mckibben.blocks.kernels import Step, in_scratch, kernel, step
 from mckibben.blocks.notation import Notation
-from mckibben.blocks.predictive.plan import (
+from mckibben.blocks.parameters import same_as
+from mckibben.blocks.planning import (
     MOST_STEPS,
     allowed,
     kept_to,
@@ -178,7 +179,7 @@ def _start_in_room(function: Any) -> Any:
 
 
 @cache
-def kernels_of(
+def predictive_kernels(
     model_step: Step, undo_step: Step, undo_start: Start, resume: Resume, *, one: bool
 ) -> tuple[Step, Start]:
     """Return the step and the start of a compensator that looks ahead, of one muscle or several.
@@ -210,7 +211,7 @@ def kernels_of(
 def step_of(
     answers: Any, undoes: Any, resume: Any, *, one: bool, decorate: Callable[[Any], Any]
 ) -> Callable[..., None]:
-    """Return the step of `kernels_of`, uncompiled; what it calls is compiled, or decorated.
+    """Return the step of `predictive_kernels`, uncompiled; what it calls is compiled, or decorated.
 
     Where a model is of several kernels, ``answers``, ``undoes`` and ``resume`` are not compiled either.
     """
@@ -371,6 +372,10 @@ class Predictive(Block):
     flow_limit: Limit | None = None
     volumes: Vector = ()
 
+    inputs = same_as("compensator.inputs")
+    scheduling = same_as("compensator.scheduling")
+    outputs = same_as("compensator.outputs")
+
     def __post_init__(self) -> None:
         model_state(self.compensator, np.zeros(self.compensator.n_states))
         n = len(self.outputs)
@@ -396,19 +401,17 @@ class Predictive(Block):
             )
 
     @cached_property
-    def undone(self) -> Block:
+    def forward_model(self) -> Block:
         """What the compensator undoes: from pressures to displacements."""
         return self.compensator.inverse()
 
     @cached_property
     def pressures(self) -> tuple[Array, Array]:
         """Lowest and highest pressure of every muscle [bar], shape (n,) each."""
-        n = len(self.outputs)
-        own = getattr(self.compensator, "pressure_range", None)
-        ends = self.pressure_range or own
-        if ends is not None:
-            return np.full(n, ends[0]), np.full(n, ends[1])
-        return self.compensator.reachable()
+        ends = self.pressure_range or getattr(self.compensator, "pressure_range", None)
+        if ends is None:
+            return self.compensator.reachable()
+        return np.full(len(self.outputs), ends[0]), np.full(len(self.outputs), ends[1])
 
     @property
     def samples_ahead(self) -> int:  # type: ignore[override]
@@ -416,28 +419,13 @@ class Predictive(Block):
         return self.horizon - 1
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """References, so many samples ahead; then what schedules the compensator, now."""
-        return self.compensator.inputs
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """What schedules the compensator."""
-        return self.compensator.scheduling
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Pressures."""
-        return self.compensator.outputs
-
-    @property
     def n_states(self) -> int:
         """The model's memory; references to come; last pressures, whether there are; plans made."""
         n = len(self.outputs)
-        return self.undone.n_states + self.horizon * n + n + 2
+        return self.forward_model.n_states + self.horizon * n + n + 2
 
     def rows(self, sample_time: float) -> Array:
-        """Return all limits, as `mckibben.blocks.predictive.plan` says."""
+        """Return all limits, as `mckibben.blocks.planning` says."""
         low, high = self.pressures
         most = [self.rate_limit, self.total_limit, self.flow_limit]
         rate, total, flow = (np.inf if limit is None else limit for limit in most)
@@ -460,7 +448,7 @@ class Predictive(Block):
     @property
     def n_scratch(self) -> int:
         """States to try, pressures, slopes, and what a plan computes in."""
-        n, model, undo = len(self.outputs), self.undone, self.compensator
+        n, model, undo = len(self.outputs), self.forward_model, self.compensator
         planned = plan_scratch(self.horizon, n, len(self.rows(1.0)))
         own = 3 * model.n_states + undo.n_states + len(undo.inputs) + 2 * n + 3 * n
         room = max(planned, model.n_scratch, undo.n_scratch)
@@ -472,41 +460,42 @@ class Predictive(Block):
         resume = resume_of(self.compensator)
         if resume is None or not isinstance(self.compensator.start, str):
             return None
-        (undo_step, undo_start), (model_step, _) = self.compensator.c_kernels, self.undone.c_kernels
+        (undo_step, undo_start), (model_step, _) = (
+            self.compensator.c_kernels,
+            self.forward_model.c_kernels,
+        )
         one = len(self.outputs) == 1
-        return kernels_of(model_step, undo_step, undo_start, resume, one=one)
+        return predictive_kernels(model_step, undo_step, undo_start, resume, one=one)
 
     @property
-    def kernel(self) -> Kernel | None:  # type: ignore[override]
-        """That which looks ahead with the compensator's; None where that is of several."""
-        return self._kernels[0] if self._kernels else None
+    def kernel(self) -> Step | None:  # type: ignore[override]
+        return self._kernels and self._kernels[0]
 
     @property
     def start_kernel(self) -> Start | None:  # type: ignore[override]
-        """As `kernel`."""
-        return self._kernels[1] if self._kernels else None
+        return self._kernels and self._kernels[1]
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the coefficients that `kernels_of` names.
-
-        Raises
-        ------
-        ModelError
-            If the compensator is of several kernels, which C does not run ahead.
-        """
+        """Return the coefficients that `predictive_kernels` names."""
         if self._kernels is None:
             raise ModelError(
                 f"{self.compensator.title!r} cannot be run ahead in C. Remedy: export pi, gpi or "
                 "balance that starts at its first sample, or stream this one from Python."
             )
-        blocks = (self.undone, self.compensator)
+        blocks = (self.forward_model, self.compensator)
         return self._numbers(sample_time, [block.coefficients(sample_time) for block in blocks])
 
     def _numbers(self, sample_time: float | None, own: list[Array]) -> Array:
         """Return the coefficients, of these of the model and the inverse."""
         rows = self.rows(needs_sample_time(self.kind, sample_time))
         low, high = self.pressures
-        head = [len(low), self.horizon, len(rows), self.undone.n_states, self.compensator.n_states]
+        head = [
+            len(low),
+            self.horizon,
+            len(rows),
+            self.forward_model.n_states,
+            self.compensator.n_states,
+        ]
         sizes = [len(numbers) for numbers in own]
         return np.concatenate([[*head, *sizes], NUDGE * (high - low), low, rows.ravel(), *own])
 
@@ -521,7 +510,7 @@ class Predictive(Block):
         """Return that of the inverse over the horizon; at worst, of all plans too."""
         n, length = len(self.outputs), self.horizon
         inverse = self.compensator.cost(sample_time).usual
-        answers = PASSES * (n + 1) * self.undone.cost(sample_time).usual
+        answers = PASSES * (n + 1) * self.forward_model.cost(sample_time).usual
         step = 2 * n**3 + len(self.rows(1.0)) * (4 * n * n + 12 * n + 20)
         planned = PASSES * (4 * length if n == 1 else MOST_STEPS * step)
         return Cost(length * inverse, length * (inverse + answers + planned))
@@ -533,7 +522,7 @@ class Predictive(Block):
         numbers = self._numbers(sample_time, [np.empty(0), np.empty(0)])
         scratch, undoing = np.empty(self.n_scratch), undoing_state(self.compensator)
         own_time = needs_sample_time(self.kind, sample_time)
-        answers, undoes = (one_step_of(b, own_time) for b in (self.undone, self.compensator))
+        answers, undoes = (one_step_of(b, own_time) for b in (self.forward_model, self.compensator))
 
         def resume(model: Array, memory: Array, own: Array) -> None:
             del model

@@ -1,1 +1,0 @@
-"""Compensators that learn from what is measured while they run."""

@@ -1,1 +1,0 @@
-"""Compensators that look ahead, so that limits of pressure, rate and supply cost less."""

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Self
+from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge, Gt, MinLen
+from annotated_types import MinLen
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.base import Block
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -23,6 +23,8 @@ from mckibben.blocks.fields import (
     ChannelField,
     Coefficients,
     InputRange,
+    NotNegative,
+    Positive,
     Vector,
 )
 from mckibben.blocks.inverse import Invertible, nothing_clipped
@@ -58,10 +60,11 @@ class Affine(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "affine"
-    kernel: ClassVar[Kernel] = affine_step
-    parameters: ClassVar[tuple[str, ...]] = ("gain", "offset")
-    notation: ClassVar[Notation] = Notation("y = K u + y_0", gain="K [{y}/{u}]", offset="y_0 [{y}]")
+    kind = "affine"
+    kernel = affine_step
+    parameters = ("gain", "offset")
+    typical = (6.8, -1.5)
+    notation = Notation("y = K u + y_0", gain="K [{y}/{u}]", offset="y_0 [{y}]")
 
     gain: FiniteFloat
     offset: FiniteFloat = 0.0
@@ -81,10 +84,6 @@ class Affine(Block):
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         return LinearSystem.gain(self.gain, self.offset)
 
-    @classmethod
-    def example(cls) -> Self:
-        return cls(6.8, -1.5)
-
 
 @step
 def negative_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
@@ -102,9 +101,10 @@ class Negative(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "negative"
-    kernel: ClassVar[Kernel] = negative_step
-    notation: ClassVar[Notation] = Notation("y = -u")
+    kind = "negative"
+    kernel = negative_step
+    typical = ()
+    notation = Notation("y = -u")
 
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT
@@ -114,10 +114,6 @@ class Negative(Block):
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         return LinearSystem.gain(-1.0)
-
-    @classmethod
-    def example(cls) -> Self:
-        return cls()
 
 
 # -- straight pieces -------------------------------------------------------------------------
@@ -178,11 +174,13 @@ class PiecewiseLinear(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "piecewise-linear"
-    kernel: ClassVar[Kernel] = piecewise_linear_step
+    kind = "piecewise-linear"
+    kernel = piecewise_linear_step
     increasing = ("knots", "values")
-    parameters: ClassVar[tuple[str, ...]] = ("values",)
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("values",)
+    layout = ("knots", "values")
+    typical = ((0.0, 5.0, 15.0, 25.0), (0.0, 8.0, 20.0, 24.0))
+    notation = Notation(
         r"y = v_k + (v_{k+1} - v_k) \frac{u - \xi_k}{\xi_{k+1} - \xi_k},\quad \xi_k \le u "
         r"\le \xi_{k+1}",
         knots=r"\xi_k [{u}]",
@@ -197,15 +195,8 @@ class PiecewiseLinear(Block):
     def __post_init__(self) -> None:
         check_increasing(f"{self.kind} block", self.knots, self.values)
 
-    def coefficients(self, sample_time: float | None) -> Array:
-        return np.array([*self.knots, *self.values])
-
     def inverse(self) -> PiecewiseLinear:
         return PiecewiseLinear(self.values, self.knots, self.output, self.input)
-
-    @classmethod
-    def example(cls) -> Self:
-        return cls((0.0, 5.0, 15.0, 25.0), (0.0, 8.0, 20.0, 24.0))
 
 
 # -- polynomials -----------------------------------------------------------------------------
@@ -257,9 +248,7 @@ def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: A
 
 
 @step
-def polynomial_inverse_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def undo_polynomial(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Invert an increasing polynomial; the state is the count of samples clipped.
 
     Coefficients are [centre, scale, lowest, highest argument, ascending coefficients].
@@ -300,12 +289,14 @@ class Polynomial(Invertible):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "polynomial"
-    kernel: ClassVar[Kernel] = polynomial_step
-    inverse_kernel: ClassVar[Kernel] = polynomial_inverse_step
-    inverse_start_kernel: ClassVar[Start] = nothing_clipped
-    parameters: ClassVar[tuple[str, ...]] = ("polynomial",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "polynomial"
+    kernel = polynomial_step
+    inverse_kernel = undo_polynomial
+    inverse_start_kernel = nothing_clipped
+    parameters = ("polynomial",)
+    layout = ("centre", "scale", "polynomial")
+    typical = ((12.0, 20.0, 3.0, -4.0), 5.0, 5.0, (0.0, 10.0))
+    notation = Notation(
         r"y = \sum_{k} c_k x^k,\quad x = \frac{u - m}{s}",
         polynomial="c_k from 0 [{y}]",
         centre="m [{u}]",
@@ -314,7 +305,7 @@ class Polynomial(Invertible):
 
     polynomial: Coefficients
     centre: FiniteFloat = 0.0
-    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
+    scale: Positive = 1.0
     input_range: InputRange | None = None
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT
@@ -322,9 +313,6 @@ class Polynomial(Invertible):
     def __post_init__(self) -> None:
         if not self.polynomial:
             raise ModelError("a polynomial without coefficients. Remedy: give at least one.")
-
-    def coefficients(self, sample_time: float | None) -> Array:
-        return np.array([self.centre, self.scale, *self.polynomial])
 
     def check_invertible(self) -> None:
         if self.input_range is None:
@@ -352,11 +340,6 @@ class Polynomial(Invertible):
     def worked(self) -> tuple[str, ...]:
         powers = ["", "x", *(f"x^{{{k}}}" for k in range(2, len(self.polynomial)))]
         return (f"y = {summed(list(zip(self.polynomial, powers, strict=False)))}",)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a cubic that increases over 0 to 10."""
-        return cls((12.0, 20.0, 3.0, -4.0), 5.0, 5.0, (0.0, 10.0))
 
 
 # -- logarithm and exponential ---------------------------------------------------------------
@@ -397,21 +380,18 @@ class Logarithm(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "logarithm"
-    kernel: ClassVar[Kernel] = logarithm_step
-    parameters: ClassVar[tuple[str, ...]] = ("offset",)
-    notation: ClassVar[Notation] = Notation(r"y = \ln(u + c)", offset="c [{u}]")
+    kind = "logarithm"
+    kernel = logarithm_step
+    parameters = ("offset",)
+    typical = (0.5,)
+    notation = Notation(r"y = \ln(u + c)", offset="c [{u}]")
 
-    offset: Annotated[FiniteFloat, Ge(0)] = 0.0
+    offset: NotNegative = 0.0
     input: ChannelField = PRESSURE
     output: ChannelField = PRESSURE
 
     def inverse(self) -> Block:
         return Exponential(self.offset, self.output, self.input)
-
-    @classmethod
-    def example(cls) -> Self:
-        return cls(0.5)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -426,21 +406,18 @@ class Exponential(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "exponential"
-    kernel: ClassVar[Kernel] = exponential_step
-    parameters: ClassVar[tuple[str, ...]] = ("offset",)
-    notation: ClassVar[Notation] = Notation("y = e^{u} - c", offset="c [{y}]")
+    kind = "exponential"
+    kernel = exponential_step
+    parameters = ("offset",)
+    typical = (0.5,)
+    notation = Notation("y = e^{u} - c", offset="c [{y}]")
 
-    offset: Annotated[FiniteFloat, Ge(0)] = 0.0
+    offset: NotNegative = 0.0
     input: ChannelField = PRESSURE
     output: ChannelField = PRESSURE
 
     def inverse(self) -> Block:
         return Logarithm(self.offset, self.output, self.input)
-
-    @classmethod
-    def example(cls) -> Self:
-        return cls(0.5)
 
 
 # -- contact ---------------------------------------------------------------------------------
@@ -496,22 +473,19 @@ class Contact(Invertible):
         Channel driven, and what of it acts.
     """
 
-    kind: ClassVar[str] = "contact"
-    kernel: ClassVar[Kernel] = contact_step
-    inverse_kernel: ClassVar[Kernel] = contact_inverse_step
-    counts_clipped: ClassVar[bool] = False
-    parameters: ClassVar[tuple[str, ...]] = ("pressure",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "contact"
+    kernel = contact_step
+    inverse_kernel = contact_inverse_step
+    counts_clipped = False
+    parameters = ("pressure",)
+    typical = (0.125,)
+    notation = Notation(
         r"y = u - \frac{19}{20}\, c \left(1 - e^{-|u| / c}\right) \operatorname{sgn} u",
         pressure="c [{u}]",
         output="y",
         input="u",
     )
 
-    pressure: Annotated[FiniteFloat, Gt(0)]
+    pressure: Positive
     input: ChannelField = PRESSURE
     output: ChannelField = PRESSURE
-
-    @classmethod
-    def example(cls) -> Self:
-        return cls(0.125)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABCMeta
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, replace
 from functools import wraps
 from inspect import isfunction
@@ -128,10 +128,7 @@ class Parametrised(metaclass=Checked):
 
     def pack(self) -> Array:
         """Return the parameters as a vector, shape (n_parameters,); structure stays outside."""
-        numbers: list[float] = []
-        for name in self.parameters:
-            _gather(getattr(self, name), numbers)
-        return np.array(numbers, dtype=np.float64)
+        return gathered(self, self.parameters)
 
     def unpack(self, parameters: ArrayLike) -> Self:
         """Return the same structure with other parameters, shape (n_parameters,).
@@ -144,6 +141,14 @@ class Parametrised(metaclass=Checked):
         values = iter(parameter_vector(self, parameters).tolist())
         fields = {name: _refilled(getattr(self, name), values) for name in self.parameters}
         return replace(self, **fields)  # type: ignore[type-var]
+
+
+def gathered(part: Parametrised, names: Iterable[str]) -> Array:
+    """Return the numbers of attributes in one vector."""
+    numbers: list[float] = []
+    for name in names:
+        _gather(getattr(part, name), numbers)
+    return np.array(numbers, dtype=np.float64)
 
 
 def parameter_vector(part: Parametrised, parameters: ArrayLike) -> Array:
@@ -166,7 +171,7 @@ def _size(value: Any) -> int:
 
 
 def _gather(value: Any, numbers: list[float]) -> None:
-    if type(value) is float:
+    if isinstance(value, float | int):
         numbers.append(value)
     elif type(value) is not tuple:
         numbers.extend(() if value is None else value.pack().tolist())

@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import math
 from itertools import combinations_with_replacement
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
 from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.base import SEVERAL, Block, needs_sample_time
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
@@ -111,12 +111,16 @@ class CoupledMemory(Block):
         Whether there are products of inputs with other lags and plays.
     """
 
-    kind: ClassVar[str] = "coupled-memory"
-    ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = coupled_memory_step
-    start_kernel: ClassVar[Start] = coupled_memory_start
-    parameters: ClassVar[tuple[str, ...]] = ("readout",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "coupled-memory"
+    ports = SEVERAL
+    kernel = coupled_memory_step
+    start_kernel = coupled_memory_start
+    parameters = ("readout",)
+    no_inverse = (
+        "has no inverse: its lags cannot be undone within a sample. "
+        "Remedy: invert balance or sdchm, or close a loop."
+    )
+    notation = Notation(
         r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
         r"y_j = R_j \cdot \left(1,\; x,\; z,\; x_{1i} x_{1k},\; x_{1i} x_{1k} x_{1q},\; "
         r"x_{1i} x_{lk},\; x_{1i} z_{lkm}\right)",
@@ -174,19 +178,6 @@ class CoupledMemory(Block):
         decays = [math.exp(-step / tau) if tau else 0.0 for tau in self.lags]
         radii = np.array(self.thresholds).ravel()
         return np.concatenate([head, decays, radii, self.pack()])
-
-    def inverse(self) -> Block:
-        """Refuse: lags cannot be undone at once, and outputs need not be as many as inputs.
-
-        Raises
-        ------
-        ModelError
-            Always.
-        """
-        raise ModelError(
-            f"{self.kind!r} has no inverse: its lags cannot be undone within a sample. "
-            "Remedy: invert balance or sdchm, or close a loop."
-        )
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a number: a readout is the output per inputs multiplied."""

@@ -8,13 +8,13 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (8) and (14).
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Ports
+from mckibben.blocks.base import Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, rows
 from mckibben.blocks.kernels import step
 from mckibben.blocks.linear import LinearSystem
@@ -49,11 +49,11 @@ class Coupling(Block):
         Channels driven and channels given.
     """
 
-    kind: ClassVar[str] = "coupling"
-    ports: ClassVar[Ports] = ("driven",), (), ("given",)
-    kernel: ClassVar[Kernel] = coupling_step
-    parameters: ClassVar[tuple[str, ...]] = ("gains",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "coupling"
+    ports = ("driven",), (), ("given",)
+    kernel = coupling_step
+    parameters = ("gains",)
+    notation = Notation(
         r"h_j = \sum_i G_{ij} v_i",
         gains="G_{ij} [{out1}/{in0}]",
         driven="v_i",

@@ -20,13 +20,13 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Cost, Kernel, Ports, Start
+from mckibben.blocks.base import SEVERAL, Cost
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, kernel, step
@@ -331,15 +331,15 @@ class FuzzyNetwork(Invertible):
         Lowest and highest value of every driven input; needed for an inverse.
     """
 
-    kind: ClassVar[str] = "fuzzy-network"
-    ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = fuzzy_network_step
-    inverse_kernel: ClassVar[Kernel] = fuzzy_network_inverse_step
-    inverse_start_kernel: ClassVar[Start] = fuzzy_network_inverse_start
-    inverse_path_dependent: ClassVar[bool] = True
-    of_local_rules: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "consequents")
-    notation: ClassVar[Notation] = Notation(
+    kind = "fuzzy-network"
+    ports = SEVERAL
+    kernel = fuzzy_network_step
+    inverse_kernel = fuzzy_network_inverse_step
+    inverse_start_kernel = fuzzy_network_inverse_start
+    inverse_path_dependent = True
+    of_local_rules = True
+    parameters = ("centres", "widths", "consequents")
+    notation = Notation(
         r"y_k = \frac{\sum_r \omega_r\, (P_{rk} \cdot x + c_{rk})}{\sum_r \omega_r},\quad "
         r"\omega_r = \prod_i \exp\left(-\frac{(x_i - m_{ir})^2}{2 \sigma_{ir}^2}\right)",
         centres="m_{ij} [{in0}]",
@@ -445,7 +445,7 @@ class FuzzyNetwork(Invertible):
         """Return the limits, lowest then highest, and the network's."""
         return np.concatenate([*np.array(self.limits).T, own])
 
-    solved: ClassVar[bool] = True
+    solved = True
 
     def inverse_complaint(self, state: Array) -> str:
         """Tell of references that the network cannot give."""

@@ -12,14 +12,14 @@ must be measured, not those that a compensator asks for.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar, Self
+from typing import Annotated
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_in import balance_in
@@ -108,11 +108,12 @@ class LoadEstimate(Block):
         The muscles.
     """
 
-    kind: ClassVar[str] = "load-estimate"
-    kernel: ClassVar[Kernel] = load_estimate_step
-    start_kernel: ClassVar[Start] = load_estimate_start
-    parameters: ClassVar[tuple[str, ...]] = ("forward",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "load-estimate"
+    kernel = load_estimate_step
+    start_kernel = load_estimate_start
+    parameters = ("forward",)
+    typical = (Balance.example(),)
+    notation = Notation(
         r"F = C^{+} \left(p A(y) - \text{springs} - \text{elasticity} - \text{friction} - "
         r"\text{relaxation} - \text{damping} - \text{inertia}\right)",
     )
@@ -181,11 +182,6 @@ class LoadEstimate(Block):
         """Return the balance's, and the pseudo-inverse of its shares of loads."""
         solving = np.linalg.pinv(np.array(self.forward.loads))
         return np.concatenate([self.forward.coefficients(sample_time), solving.ravel()])
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return the load of the example of a balance."""
-        return cls(Balance.example())
 
 
 def parts_of(model: Block) -> tuple[Balance, Block | None, Block | None]:

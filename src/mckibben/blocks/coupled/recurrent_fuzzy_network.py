@@ -18,16 +18,15 @@ PI-NARMAX Model", Section 3.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
-from annotated_types import Gt, Interval
-from pydantic import FiniteFloat
+from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Cost, Kernel, Ports, Start, own_sample_time
-from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.base import SEVERAL, Block, Cost, own_sample_time
+from mckibben.blocks.fields import STRICT, Channel, Channels, Positive, Rows, Vector
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -105,9 +104,7 @@ def recurrent_fuzzy_network_step(
 
 
 @kernel
-def recurrent_fuzzy_network_start(
-    coefficients: Array, state: Array, inputs: Array, virgin: bool
-) -> None:
+def recurrent_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start where inputs always were the first ones, and outputs at the driven one."""
     n_a, n_b, n_c = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
     state[:] = 0.0
@@ -138,14 +135,18 @@ class RecurrentFuzzyNetwork(Block):
         One driven input, those that schedule, one output.
     """
 
-    kind: ClassVar[str] = "recurrent-fuzzy-network"
-    ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Kernel] = recurrent_fuzzy_network_step
-    start_kernel: ClassVar[Start] = recurrent_fuzzy_network_start
-    rate_dependent: ClassVar[bool] = True
-    of_local_rules: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "feedbacks", "consequents")
-    notation: ClassVar[Notation] = Notation(
+    kind = "recurrent-fuzzy-network"
+    ports = SEVERAL
+    kernel = recurrent_fuzzy_network_step
+    start_kernel = recurrent_start
+    rate_dependent = True
+    of_local_rules = True
+    no_inverse = (
+        "has no inverse: a sample of its input moves its output by next to nothing. "
+        "Remedy: invert balance, or close a loop."
+    )
+    parameters = ("centres", "widths", "feedbacks", "consequents")
+    notation = Notation(
         r"y_t = \frac{\sum_r \omega_r\, (P_r \cdot x_t + c_r)}{\sum_r \omega_r},\quad "
         r"\omega_r = \prod_i O_{ir,t}",
         r"O_{ij,t} = \exp\left(-\frac{(x_{i,t} - m_{ij} + \theta_{ij} O_{ij,t-1})^2}{2 "
@@ -165,7 +166,7 @@ class RecurrentFuzzyNetwork(Block):
     widths: Rows
     feedbacks: Rows
     consequents: Vector
-    own_time: Annotated[FiniteFloat, Gt(0)]
+    own_time: Positive
     driven: Channels
     scheduled: Channels
     given: Channels
@@ -241,19 +242,6 @@ class RecurrentFuzzyNetwork(Block):
         n, sets = self.n_regressors, self.n_sets
         operations = sets**n * (3 * n + 3) + 10 * n * sets
         return Cost(operations, operations)
-
-    def inverse(self) -> Block:
-        """Refuse: what the output is now depends mostly on what it was.
-
-        Raises
-        ------
-        ModelError
-            Always.
-        """
-        raise ModelError(
-            f"{self.kind!r} has no inverse: a sample of its input moves its output by next to nothing. "
-            "Remedy: invert balance, or close a loop."
-        )
 
     @property
     def _regressor_units(self) -> list[str]:

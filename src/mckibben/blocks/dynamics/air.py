@@ -19,21 +19,23 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Le
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Kernel, Start, needs_sample_time
+from mckibben.blocks.base import needs_sample_time
 from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     Channel,
     ChannelField,
     InputRange,
+    NotNegative,
+    Positive,
     StoredInitial,
 )
 from mckibben.blocks.inverse import Invertible
@@ -166,16 +168,15 @@ class Air(Invertible):
         Command, and pressure.
     """
 
-    kind: ClassVar[str] = "air"
-    kernel: ClassVar[Kernel] = air_step
-    start_kernel: ClassVar[Start] = air_start
-    inverse_kernel: ClassVar[Kernel] = air_inverse_step
-    inverse_start_kernel: ClassVar[Start] = air_inverse_start
-    rate_dependent: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = (
-        *("gain", "offset", "hysteresis", "filling_time", "venting_time"),
-    )
-    notation: ClassVar[Notation] = Notation(
+    kind = "air"
+    kernel = air_step
+    start_kernel = air_start
+    inverse_kernel = air_inverse_step
+    inverse_start_kernel = air_inverse_start
+    rate_dependent = True
+    parameters = (*("gain", "offset", "hysteresis", "filling_time", "venting_time"),)
+    typical = (0.6, 0.1, 0.06, 0.03, 0.05, 0.02, 0.0, 6.0, (0.0, 10.0))
+    notation = Notation(
         r"\begin{cases} T_f \dot{x} = g_f - x & \text{filling, } g_f = K (u - u_0 - h/2) "
         r"> x \\ T_v \dot{x} = g_v - x & \text{venting, } g_v = K (u - u_0 + h/2) < x "
         r"\end{cases}",
@@ -190,12 +191,12 @@ class Air(Invertible):
         supply=r"p_{\max} [{y}]",
     )
 
-    gain: Annotated[FiniteFloat, Gt(0)]
+    gain: Positive
     offset: FiniteFloat
-    hysteresis: Annotated[FiniteFloat, Ge(0)]
+    hysteresis: NotNegative
     filling_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
     venting_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
-    dead_time: Annotated[FiniteFloat, Ge(0)] = 0.0
+    dead_time: NotNegative = 0.0
     ambient: FiniteFloat | None = 0.0
     supply: FiniteFloat | None = None
     input_range: InputRange | None = None
@@ -246,13 +247,7 @@ class Air(Invertible):
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [gain, offsets, shares of the way, pressures, dead time], for a sample time.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or where the dead time is more than 254 samples.
-        """
+        """Return [gain, offsets, shares of the way, pressures, dead time], for a sample time."""
         step = needs_sample_time(self.kind, sample_time)
         late = self.dead_time / step
         if not late <= LONGEST_DEAD_TIME + 0.5:
@@ -298,8 +293,3 @@ class Air(Invertible):
             f"beyond supply or surroundings, or change faster than {self.input.name} within its limits "
             f"makes the air flow. Reachable in time is {low[0]:.6g} to {high[0]:.6g} {self.output.unit}"
         )
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a regulator of 0.6 bar/V that vents more slowly than it fills."""
-        return cls(0.6, 0.1, 0.06, 0.03, 0.05, 0.02, 0.0, 6.0, (0.0, 10.0))

@@ -14,25 +14,26 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from annotated_types import Gt, Interval, MaxLen
+from annotated_types import Interval, MaxLen
 from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start, own_sample_time
+from mckibben.blocks.base import Block, own_sample_time
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
+    Positive,
     StoredInitial,
     Vector,
     rows,
 )
-from mckibben.blocks.hysteresis.play_operators import start_operators
+from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
 from mckibben.blocks.kernels import inlined, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -220,7 +221,11 @@ class Narx(Block):
         Channel driven and channel given.
     """
 
-    rate_dependent: ClassVar[bool] = True
+    rate_dependent = True
+    no_inverse = (
+        "has no exact inverse: nothing keeps its output rising with its input. "
+        "Remedy: invert a hysteresis model (cpi, gpi, mpi)."
+    )
 
     output_lags: Lags
     input_lags: Lags
@@ -228,7 +233,7 @@ class Narx(Block):
     thresholds: Vector = ()
     input_scale: tuple[FiniteFloat, FiniteFloat]
     output_scale: tuple[FiniteFloat, FiniteFloat]
-    sample_time: Annotated[FiniteFloat, Gt(0)]
+    sample_time: Positive
     initial: StoredInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
@@ -238,12 +243,7 @@ class Narx(Block):
             raise ModelError(
                 f"{self.kind!r} has a scale that is not positive. Remedy: give (centre, half range)."
             )
-        r = np.array(self.thresholds)
-        if r.size and (r[0] < 0 or np.any(np.diff(r) <= 0)):
-            raise ModelError(
-                f"the thresholds of {self.kind!r} are not 0 <= r_0 < r_1 < ... "
-                "Remedy: sort them and drop repeated ones."
-            )
+        check_order(self.kind, self.thresholds)
         if not self.places:
             raise ModelError(f"{self.kind!r} has no regressors. Remedy: give a lag or an operator.")
 
@@ -283,13 +283,6 @@ class Narx(Block):
         state[: self.output_lags] = (float(output[0]) - centre) / half
         return state
 
-    def inverse(self) -> Block:
-        """Refuse: nothing keeps the output of a NARX model rising with its input."""
-        raise ModelError(
-            f"{self.kind!r} has no exact inverse: nothing keeps its output rising with its input. "
-            "Remedy: invert a hysteresis model (cpi, gpi, mpi)."
-        )
-
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
 class NarxPolynomial(Narx):
@@ -306,11 +299,11 @@ class NarxPolynomial(Narx):
         As of `Narx`.
     """
 
-    kind: ClassVar[str] = "narx-polynomial"
-    kernel: ClassVar[Kernel] = narx_polynomial_step
-    start_kernel: ClassVar[Start] = narx_polynomial_start
-    parameters: ClassVar[tuple[str, ...]] = ("weights",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "narx-polynomial"
+    kernel = narx_polynomial_step
+    start_kernel = narx_polynomial_start
+    parameters = ("weights",)
+    notation = Notation(
         r"\bar{y}_t = \sum_i w_i \prod_{j \in P_i} x_{j,t}", *REGRESSORS, weights="w_i", **SYMBOLS
     )
 
@@ -329,7 +322,6 @@ class NarxPolynomial(Narx):
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads."""
         degree = max((len(term) for term in self.terms), default=0)
         places = self.places
         padded = [
@@ -390,11 +382,11 @@ class NarxNetwork(Narx):
         As of `Narx`.
     """
 
-    kind: ClassVar[str] = "narx-network"
-    kernel: ClassVar[Kernel] = narx_network_step
-    start_kernel: ClassVar[Start] = narx_network_start
-    parameters: ClassVar[tuple[str, ...]] = ("bias", "linear", "hidden")
-    notation: ClassVar[Notation] = Notation(
+    kind = "narx-network"
+    kernel = narx_network_step
+    start_kernel = narx_network_start
+    parameters = ("bias", "linear", "hidden")
+    notation = Notation(
         r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)",
         *REGRESSORS,
         bias="b",
@@ -418,7 +410,6 @@ class NarxNetwork(Narx):
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads."""
         units = len(self.hidden) // (len(self.linear) + 2)
         shape = [len(self.linear), units, float(self.activation == "wavelet")]
         return np.array([*self.head(sample_time), *shape, *self.places, *self.pack()])

@@ -13,15 +13,14 @@ corner of the delayed input by matrix exponentials.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Literal
 
 import numpy as np
-from annotated_types import Ge, Gt
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start, needs_sample_time
+from mckibben.blocks.base import Block, needs_sample_time
 from mckibben.blocks.dynamics.starts import start_on
 from mckibben.blocks.fields import (
     DISPLACEMENT,
@@ -30,6 +29,8 @@ from mckibben.blocks.fields import (
     ChannelField,
     FittedInitial,
     Initial,
+    NotNegative,
+    Positive,
     Vector,
 )
 from mckibben.blocks.kernels import kernel, step
@@ -108,12 +109,18 @@ class ProcessModel(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "process-model"
-    kernel: ClassVar[Kernel] = process_model_step
-    start_kernel: ClassVar[Start] = process_model_start
-    rate_dependent: ClassVar[bool] = True
-    filters: ClassVar[bool] = True
-    notation: ClassVar[Notation] = Notation(
+    kind = "process-model"
+    kernel = process_model_step
+    start_kernel = process_model_start
+    rate_dependent = True
+    filters = True
+    no_inverse = (
+        "has no exact inverse: its output lags its input, so following a reference would take "
+        "derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, mpi), or a transfer-function "
+        "identified with delay=0."
+    )
+    typical = (6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
+    notation = Notation(
         gain="K [{y}/{u}]",
         time_constants="T_{p,i} [s]",
         damping=r"\zeta",
@@ -125,9 +132,9 @@ class ProcessModel(Block):
 
     gain: FiniteFloat
     time_constants: Vector
-    damping: Annotated[FiniteFloat, Gt(0)] | None = None
+    damping: Positive | None = None
     zero_time: FiniteFloat | None = None
-    delay: Annotated[FiniteFloat, Ge(0)] = 0.0
+    delay: NotNegative = 0.0
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
     hold: Literal["first", "zero"] = "first"
@@ -190,26 +197,12 @@ class ProcessModel(Block):
         return found
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads, for a sample time.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or where the delay is more than 254 samples.
-        """
+        """Return what the kernel reads; refuse delays of more than 254 samples."""
         return _discretised(self, sample_time).copy()
 
     def start_numbers(self) -> Array:
         """Return [n, 0, u_0], which is what the start reads."""
         return np.array([self.order, 0.0, self.input_offset])
-
-    def inverse(self) -> Block:
-        """Refuse: the output lags the input, and the inverse would have to differentiate."""
-        raise ModelError(
-            f"{self.kind!r} ({self.name}) has no exact inverse: its output lags its input, so following "
-            "a reference would take derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, "
-            "mpi), or a transfer-function identified with delay=0."
-        )
 
     def equations(self) -> tuple[str, ...]:
         """Return the transfer function of this structure."""
@@ -242,9 +235,8 @@ class ProcessModel(Block):
         # [x, u of the last m + 2 samples, latest first]
         size = n + m + 2
         driven = np.zeros((n, m + 3))  # by the input now, a sample ago and so on
-        driven[:, m], driven[:, m + 1], driven[:, m + 2] = first, second, third
-        at_once = np.zeros(m + 3)
-        at_once[m], at_once[m + 1] = now, before
+        driven[:, m:] = np.transpose([first, second, third])
+        at_once = np.array([*np.zeros(m), now, before, 0.0])
         a, b = np.zeros((size, size)), np.zeros((size, 1))
         a[:n, :n], a[:n, n:], b[:n, 0] = lags, driven[:, 1:], driven[:, 0]
         a[n + 1 :, n:-1], b[n, 0] = np.eye(m + 1), 1.0
@@ -268,11 +260,6 @@ class ProcessModel(Block):
             )
         zero = [] if self.zero_time is None else [self.gain * self.zero_time]
         return Polynomials((*zero, self.gain), tuple(self.denominator().tolist()))
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return the P2UZ model that the paper prints."""
-        return cls(6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
 
 
 @lru_cache(maxsize=8)  # once for many runs of one model

@@ -14,14 +14,14 @@ models", 1995; in continuous time, as neural ordinary differential equations.
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost, Kernel, Start, needs_sample_time
+from mckibben.blocks.base import Block, Cost, needs_sample_time, one_per
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
 from mckibben.blocks.fields import (
     DISPLACEMENT,
@@ -150,13 +150,14 @@ class StateNetwork(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "state-network"
-    kernel: ClassVar[Kernel] = state_network_step
-    start_kernel: ClassVar[Start] = state_network_start
-    rate_dependent: ClassVar[bool] = True
+    kind = "state-network"
+    kernel = state_network_step
+    start_kernel = state_network_start
+    rate_dependent = True
     steady_state = steady_state
-    parameters: ClassVar[tuple[str, ...]] = ("linear", "hidden", "readout")
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("linear", "hidden", "readout")
+    n_states = one_per("linear", 1)  # states, and the last input
+    notation = Notation(
         r"\dot{x} = \lambda \left(L v + R \tanh(H v)\right),\quad v = \left(x,\, \frac{u "
         r"- u_0}{u_s},\, 1\right)",
         "y = y_0 + y_s x_1",
@@ -196,23 +197,12 @@ class StateNetwork(Block):
             )
 
     @property
-    def n_states(self) -> int:
-        """States, and the last input."""
-        return len(self.linear) + 1
-
-    @property
     def n_scratch(self) -> int:
         """A place, slopes there, and their sum."""
         return 3 * len(self.linear)
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads, for a sample time.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or where substeps are too few for it.
-        """
+        """Return what the kernel reads, for a sample time."""
         step = self.rate * needs_sample_time(self.kind, sample_time) / self.substeps
         if not step <= FASTEST:
             raise ModelError(

@@ -10,16 +10,14 @@ output answers at once (b_0 is not zero) and all zeros of B lie within the unit 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Start, own_sample_time
+from mckibben.blocks.base import Block, one_per, own_sample_time
 from mckibben.blocks.dynamics.starts import free_responses, start_on
 from mckibben.blocks.fields import (
     DISPLACEMENT,
@@ -29,6 +27,8 @@ from mckibben.blocks.fields import (
     Coefficients,
     FittedInitial,
     Initial,
+    NotNegative,
+    Positive,
 )
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
@@ -38,9 +38,7 @@ from mckibben.recording import Recording
 
 
 @step
-def transfer_function_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def filter_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the filter in transposed direct form; coefficients are [u_0, y_0, b, f, gain]."""
     n = state.size
     b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
@@ -56,7 +54,7 @@ def transfer_function_step(
 
 
 @kernel
-def transfer_function_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+def filter_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start the filter at rest: at the first input, or at the operating point."""
     n = state.size
     b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
@@ -94,18 +92,20 @@ class TransferFunction(Block):
         Standard deviation of the white noise that drives it; None where it is not known.
     """
 
-    kind: ClassVar[str] = "transfer-function"
-    kernel: ClassVar[Kernel] = transfer_function_step
-    start_kernel: ClassVar[Start] = transfer_function_start
-    rate_dependent: ClassVar[bool] = True
-    filters: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = (
+    kind = "transfer-function"
+    kernel = filter_step
+    start_kernel = filter_start
+    rate_dependent = True
+    filters = True
+    parameters = (
         "numerator",
         "denominator",
         "input_offset",
         "output_offset",
     )
-    notation: ClassVar[Notation] = Notation(
+    n_fitted = one_per("denominator")  # as many states as there are poles
+    typical = ((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)
+    notation = Notation(
         r"y_t - y_0 = \frac{B(q)}{F(q)} (u_t - u_0) + \frac{C(q)}{D(q)} e_t",
         r"B(q) = \sum_k b_k q^{-k},\quad F(q) = 1 + \sum_k f_k q^{-k}",
         numerator="b_k from 0 [{y}/{u}]",
@@ -120,7 +120,7 @@ class TransferFunction(Block):
 
     numerator: Coefficients
     denominator: Coefficients
-    sample_time: Annotated[FiniteFloat, Gt(0)]
+    sample_time: Positive
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
     initial: FittedInitial = "first_sample"
@@ -128,7 +128,7 @@ class TransferFunction(Block):
     output: ChannelField = DISPLACEMENT
     noise_numerator: Coefficients = ()
     noise_denominator: Coefficients = ()
-    noise_deviation: Annotated[FiniteFloat, Ge(0)] | None = None
+    noise_deviation: NotNegative | None = None
 
     def __post_init__(self) -> None:
         if not self.numerator:
@@ -140,11 +140,6 @@ class TransferFunction(Block):
     def n_states(self) -> int:
         """The order."""
         return max(len(self.numerator) - 1, len(self.denominator))
-
-    @property
-    def n_fitted(self) -> int:
-        """As many states as there are poles."""
-        return len(self.denominator)
 
     @property
     def poles(self) -> NDArray[np.complex128]:
@@ -173,13 +168,7 @@ class TransferFunction(Block):
         return start_on(self, recording, initial)
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [u_0, y_0, b, f, gain], with no gain where that is infinite.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or at another than the model's own.
-        """
+        """Return [u_0, y_0, b, f, gain], with no gain where that is infinite."""
         own_sample_time(self.kind, self.sample_time, sample_time)
         gain = self.gain if np.isfinite(self.gain) else 0.0
         b, f = self._padded()
@@ -293,11 +282,6 @@ class TransferFunction(Block):
         if max(map(len, noise)) > 1:
             text += rf" + \frac{{{_powers(noise[0])}}}{{{_powers(noise[1])}}}\,e_t"
         return (text,)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a second-order lag with a gain of 6.8 mm/bar, sampled at 100 Hz."""
-        return cls((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)
 
 
 def _powers(coefficients: Sequence[float]) -> str:

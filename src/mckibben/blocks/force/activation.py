@@ -8,22 +8,22 @@ none.
 
 from __future__ import annotations
 
-import math
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
-from annotated_types import Ge, Interval
+from annotated_types import Interval
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.base import Block, Ports, needs_sample_time, rate_filter
 from mckibben.blocks.fields import (
     CONTRACTION,
     FORCE,
     PRESSURE,
     STRICT,
     ChannelField,
+    NotNegative,
     StoredInitial,
     Vector,
 )
@@ -37,12 +37,6 @@ UNDOES_A_MUSCLE = (
     "has no inverse here: it already gives the pressure for a contraction. Remedy: use it as the "
     "compensator, or fit pressure to contraction by another model."
 )
-
-
-def rate_filter(time_constant: float, step: float) -> tuple[float, float]:
-    """Return what the filter of the rate keeps over a step, and its gain of the input's change."""
-    smoothing = math.exp(-step / time_constant) if time_constant > 0 else 0.0
-    return smoothing, (1 - smoothing) / step
 
 
 # -- the published model ---------------------------------------------------------------------
@@ -65,9 +59,7 @@ def lagrange(e: float, own: float, one: float, two: float, three: float) -> floa
 
 
 @step
-def activation_pressure_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def published_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; the state is [previous contraction, filtered rate].
 
     Coefficients are [smoothing, gain of the rate, gamma, phi (4), contractions (16), pressures
@@ -86,9 +78,7 @@ def activation_pressure_step(
 
 
 @kernel
-def activation_pressure_start(
-    coefficients: Array, state: Array, inputs: Array, virgin: bool
-) -> None:
+def published_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start at rest at the first contraction."""
     state[0], state[1] = inputs[0], 0.0
 
@@ -121,14 +111,15 @@ class ActivationPressure(Block):
         Contraction, force and pressure.
     """
 
-    kind: ClassVar[str] = "activation-pressure"
-    ports: ClassVar[Ports] = PORTS
-    kernel: ClassVar[Kernel] = activation_pressure_step
-    start_kernel: ClassVar[Start] = activation_pressure_start
-    rate_dependent: ClassVar[bool] = True
-    no_inverse: ClassVar[str] = UNDOES_A_MUSCLE
-    parameters: ClassVar[tuple[str, ...]] = ("contractions", "pressures", "phi", "gamma")
-    notation: ClassVar[Notation] = Notation(
+    kind = "activation-pressure"
+    ports = PORTS
+    kernel = published_step
+    start_kernel = published_start
+    rate_dependent = True
+    no_inverse = UNDOES_A_MUSCLE
+    parameters = ("contractions", "pressures", "phi", "gamma")
+    n_states = 2  # previous contraction and filtered rate
+    notation = Notation(
         r"p = \sum_{k=0}^{3} b_k(F)\, \epsilon^k + \gamma\, \phi(F)\, \dot{\epsilon}",
         r"\text{the cubic goes through } (\epsilon_j(F),\, y_j(F)),\; j = 1, \ldots, 4,\; "
         r"\text{each coordinate a cubic of } F",
@@ -149,8 +140,8 @@ class ActivationPressure(Block):
     pressures: Vector
     phi: Vector
     gamma: tuple[FiniteFloat, FiniteFloat]
-    frequency: Annotated[FiniteFloat, Ge(0)]
-    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
+    frequency: NotNegative
+    rate_time_constant: NotNegative = 0.0
     initial: StoredInitial = "first_sample"
     input: ChannelField = CONTRACTION
     force: ChannelField = FORCE
@@ -163,11 +154,6 @@ class ActivationPressure(Block):
                 f"{self.kind!r} has {sizes} coefficients of contractions, pressures and phi. Remedy: "
                 f"give {4 * POINTS}, {4 * POINTS} and 4."
             )
-
-    @property
-    def n_states(self) -> int:
-        """Previous contraction and filtered rate."""
-        return 2
 
     def coefficients(self, sample_time: float | None) -> Array:
         step = needs_sample_time(self.kind, sample_time)
@@ -196,9 +182,7 @@ class ActivationPressure(Block):
 
 
 @step
-def activation_memory_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def remembering_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; the state is [play operators, previous contraction, filtered rate, x_m].
 
     Coefficients are [smoothing, gain of the rate, contraction's centre and scale, force's centre
@@ -236,7 +220,7 @@ def activation_memory_step(
 
 
 @kernel
-def activation_memory_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+def remembering_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start where the contraction has only risen to the first one, or has never moved."""
     m = int(coefficients[8])
     n = state.size - 2 - m
@@ -281,14 +265,14 @@ class ActivationMemory(Block):
         Contraction, force and pressure.
     """
 
-    kind: ClassVar[str] = "activation-memory"
-    ports: ClassVar[Ports] = PORTS
-    kernel: ClassVar[Kernel] = activation_memory_step
-    start_kernel: ClassVar[Start] = activation_memory_start
-    rate_dependent: ClassVar[bool] = True
-    no_inverse: ClassVar[str] = UNDOES_A_MUSCLE
-    parameters: ClassVar[tuple[str, ...]] = ("surface", "friction", "viscosity", "relaxation")
-    notation: ClassVar[Notation] = Notation(
+    kind = "activation-memory"
+    ports = PORTS
+    kernel = remembering_step
+    start_kernel = remembering_start
+    rate_dependent = True
+    no_inverse = UNDOES_A_MUSCLE
+    parameters = ("surface", "friction", "viscosity", "relaxation")
+    notation = Notation(
         r"p = \sum_{ij} c_{ij} x^i f^j + \sum_k (a_k + b_k f) S_k[\epsilon] + (d_0 + d_1 "
         r"f) \dot{\epsilon} + \sum_m (g_m + h_m f)(x_m - x)",
         r"x = (\epsilon - \epsilon_1) / \epsilon_2,\quad f = (F - F_1) / F_2,\quad "
@@ -317,7 +301,7 @@ class ActivationMemory(Block):
     force_degree: Annotated[int, Interval(ge=0, le=9)]
     input_scale: tuple[FiniteFloat, FiniteFloat]
     force_scale: tuple[FiniteFloat, FiniteFloat]
-    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
+    rate_time_constant: NotNegative = 0.0
     initial: StoredInitial = "first_sample"
     input: ChannelField = CONTRACTION
     force: ChannelField = FORCE

@@ -9,7 +9,7 @@ of Pneumatic Artificial Muscles", Section 4.
 from __future__ import annotations
 
 from functools import cache
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
@@ -87,9 +87,10 @@ class ForceFeedforward(Block):
         What hysteresis adds.
     """
 
-    kind: ClassVar[str] = "force-feedforward"
-    parameters: ClassVar[tuple[str, ...]] = ("law", "friction")
-    notation: ClassVar[Notation] = Notation(
+    kind = "force-feedforward"
+    parameters = ("law", "friction")
+    typical = (PolynomialForce((50.0, 5.0), (-10.0, 5.0)), MultistateFriction.example())
+    notation = Notation(
         r"p = \frac{f - h(l) - f_h (1 - g_p p_r)}{g(l) + g_p f_h}",
         r"f = p\, g(l) + h(l) + \left(1 + g_p (p - p_r)\right) f_h[l]",
     )
@@ -176,11 +177,6 @@ class ForceFeedforward(Block):
         if self.friction is None:
             return own
         return np.append(own, self.friction.coefficients(sample_time))
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a feedforward with a law that pulls at all lengths of 0 to 5 mm."""
-        return cls(PolynomialForce((50.0, 5.0), (-10.0, 5.0)), MultistateFriction.example())
 
 
 def compensator(model: Block) -> Block:

@@ -22,14 +22,14 @@ pressure_gain 0 is the paper's model.
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Kernel, Ports, Start, needs_sample_time
+from mckibben.blocks.base import Block, needs_sample_time, one_per
 from mckibben.blocks.fields import (
     FORCE,
     LENGTH,
@@ -167,16 +167,18 @@ class MultistateFriction(Block):
         Length, pressure and force.
     """
 
-    kind: ClassVar[str] = "multistate-friction"
-    ports: ClassVar[Ports] = ("input",), ("pressure",), ("output",)
-    kernel: ClassVar[Kernel] = multistate_friction_step
-    start_kernel: ClassVar[Start] = multistate_friction_start
-    rate_dependent: ClassVar[bool] = True
-    no_inverse: ClassVar[str] = (
+    kind = "multistate-friction"
+    ports = ("input",), ("pressure",), ("output",)
+    kernel = multistate_friction_step
+    start_kernel = multistate_friction_start
+    rate_dependent = True
+    no_inverse = (
         "has no inverse: while it slips, one force belongs to many lengths. Remedy: compensate it by "
         "ForceFeedforward(law, friction), in closed form."
     )
-    notation: ClassVar[Notation] = Notation(
+    n_states = one_per("elements", 1)  # deflections, and the previous length
+    n_scratch = one_per("elements")  # what single precision loses of the deflections
+    notation = Notation(
         r"f = \left(1 + g_p (p - p_r)\right) \sum_i \operatorname{sat}(F_{c,i},\, k_i x_i "
         r"+ \sigma_i \dot{l})",
         r"\dot{x}_i = \frac{\operatorname{sat}(F_{c,i},\, k_i x_i + \sigma_i \dot{l}) - "
@@ -222,11 +224,6 @@ class MultistateFriction(Block):
                 names.append(f"element {number}{way}: {QUANTITIES[place % 3]}")
         return (*names, "pressure gain [1/bar]") if self.pressure_gain != 0 else tuple(names)
 
-    @property
-    def n_states(self) -> int:
-        """Deflections, and the previous length."""
-        return len(self.elements) + 1
-
     def table(self) -> Array:
         """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where inactive."""
         table, values = np.full((len(self.elements), 6), np.nan), iter(self.values)
@@ -236,11 +233,6 @@ class MultistateFriction(Block):
         other = np.roll(table, 3, axis=1)
         other[:, [2, 5]] = 0.0
         return np.where(np.isnan(table), other, table)
-
-    @property
-    def n_scratch(self) -> int:
-        """What single precision loses of the deflections."""
-        return len(self.elements)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [sample time, pressure gain, reference pressure, table]."""

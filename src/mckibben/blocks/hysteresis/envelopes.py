@@ -13,16 +13,15 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Protocol, Self, cast
+from typing import Any, ClassVar, Protocol, Self, cast
 
 import numpy as np
-from annotated_types import Gt
 from numpy.typing import ArrayLike
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.fields import STRICT, Vector
+from mckibben.blocks.fields import STRICT, Positive, Vector
 from mckibben.blocks.kernels import inlined, kernel
 from mckibben.blocks.memoryless import check_increasing, interpolate
 from mckibben.blocks.notation import Notation
@@ -138,7 +137,7 @@ class Tanh(Envelope):
     parameters = ("slope", "shift", "offset")
     notation = Notation(r"\gamma(u) = \tanh(a u + b) + c", slope="a [1/{u}]", shift="b", offset="c")
 
-    slope: Annotated[FiniteFloat, Gt(0)]
+    slope: Positive
     shift: FiniteFloat
     offset: FiniteFloat = 0.0
 

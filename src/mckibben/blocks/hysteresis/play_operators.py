@@ -10,7 +10,6 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Eq. (3) with both envelope
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Self
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -26,13 +25,17 @@ from mckibben.errors import ModelError
 
 def check_thresholds(kind: str, thresholds: Sequence[float], weights: Sequence[float]) -> None:
     """Refuse thresholds that are negative or not increasing, or not one to a weight."""
-    r = np.asarray(thresholds)
-    if r.size == 0 or r.size != len(weights):
+    if not thresholds or len(thresholds) != len(weights):
         raise ModelError(
-            f"{kind!r} has {r.size} thresholds and {len(weights)} weights. "
+            f"{kind!r} has {len(thresholds)} thresholds and {len(weights)} weights. "
             "Remedy: give one weight to every threshold, and at least one."
         )
-    if r[0] < 0 or np.any(np.diff(r) <= 0):
+    check_order(kind, thresholds)
+
+
+def check_order(kind: str, thresholds: Sequence[float]) -> None:
+    """Refuse thresholds that are negative or not increasing."""
+    if any(r < 0 for r in thresholds[:1]) or np.any(np.diff(thresholds) <= 0):
         raise ModelError(
             f"the thresholds of {kind!r} are not 0 <= r_0 < r_1 < ... "
             "Remedy: sort them and drop repeated ones."
@@ -215,16 +218,16 @@ class Play(Block):
     ----------
     threshold : float
         Half the dead zone, in the unit of the input; at least 0.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample.
-    input, output : Channel
-        Channel driven and channel given.
+    initial, input, output
+        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "play"
     kernel = play_step
     start_kernel = play_start
     parameters = ("threshold",)
+    n_states = 1  # the operator's own output
+    typical = (0.5,)
     notation = Notation(
         r"y = F_r[u],\quad F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
         threshold="r [{u}]",
@@ -237,13 +240,3 @@ class Play(Block):
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, (self.threshold,), (1.0,))
-
-    @property
-    def n_states(self) -> int:
-        """The operator's own output."""
-        return 1
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a play operator with a dead zone of 1 bar."""
-        return cls(0.5)

@@ -33,7 +33,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Cost
+from mckibben.blocks.base import Cost, one_per
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -390,9 +390,7 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
 
 
 @step
-def krasnoselskii_pokrovskii_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def ridges_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; coefficients are [number of intervals, offset, levels, weights].
 
     The state is [operators, previous input].
@@ -407,9 +405,7 @@ def krasnoselskii_pokrovskii_step(
 
 
 @kernel
-def krasnoselskii_pokrovskii_start(
-    coefficients: Array, state: Array, inputs: Array, virgin: bool
-) -> None:
+def ridges_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start on the rising ridges, or half-way between the ridges."""
     n = int(coefficients[0])
     levels = coefficients[2 : 3 + n]
@@ -446,13 +442,12 @@ class KrasnoselskiiPokrovskii(Invertible):
     kind = "krasnoselskii-pokrovskii"
     solved = True
     inverse_remembers = "input"
-    kernel = krasnoselskii_pokrovskii_step
-    start_kernel = krasnoselskii_pokrovskii_start
-    inverse_kernel, inverse_start_kernel = solved_inverse(
-        _trial, _advance, krasnoselskii_pokrovskii_start
-    )
+    kernel = ridges_step
+    start_kernel = ridges_start
+    inverse_kernel, inverse_start_kernel = solved_inverse(_trial, _advance, ridges_start)
     increasing = ("levels",)
     parameters = ("weights", "offset")
+    n_states = one_per("weights", 1)  # operators and the previous input
     notation = Notation(
         r"y = y_0 + \sum_{j \le i} w_{ij} s_{ij}",
         r"s_{ij,t} = \begin{cases} \max(s_{ij,t-1},\, \rho_i(u_t)) & u \text{ rises} \\ "
@@ -478,11 +473,6 @@ class KrasnoselskiiPokrovskii(Invertible):
     def input_range(self) -> tuple[float, float]:
         """The first and last level."""
         return self.levels[0], self.levels[-1]
-
-    @property
-    def n_states(self) -> int:
-        """Operators and the previous input."""
-        return len(self.weights) + 1
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [number of intervals, offset, levels, weights]."""

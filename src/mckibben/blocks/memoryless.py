@@ -161,8 +161,7 @@ def piecewise_linear_step(coefficients: Array, state: Array, inputs: Array, outp
 class PiecewiseLinear(Block):
     """Straight lines between knots, continued beyond the first and the last.
 
-    A superposition of dead zones: after a Prandtl-Ishlinskii model it makes the modified one (MPI), with
-    an inverse of the same form.
+    After a Prandtl-Ishlinskii model it makes the modified one (MPI).
 
     Parameters
     ----------
@@ -234,11 +233,17 @@ def least_slope(
     polynomial: Sequence[float], centre: float, scale: float, limits: tuple[float, float]
 ) -> float:
     """Return the least derivative by the input over a range of inputs."""
-    slope = np.polynomial.Polynomial(polynomial).deriv()
     low, high = ((end - centre) / scale for end in limits)
+    return float(np.min(slopes_at(polynomial, low, high))) / scale
+
+
+def slopes_at(polynomial: Sequence[float], low: float, high: float) -> Array:
+    """Return a polynomial's slopes at both ends of a range, and where they turn in it."""
+    slope = np.polynomial.Polynomial(polynomial).deriv()
     turns = np.asarray(slope.deriv().roots(), dtype=np.complex128)
-    at = np.array([low, high, *turns.real[np.abs(turns.imag) < 1e-9].clip(low, high)])
-    return float(np.min(slope(at))) / scale
+    return np.asarray(
+        slope(np.array([low, high, *turns.real[np.abs(turns.imag) < 1e-9].clip(low, high)]))
+    )
 
 
 @step
@@ -319,10 +324,7 @@ class Polynomial(Invertible):
             raise ModelError(
                 "'polynomial' has no inverse without an input range. Remedy: give input_range."
             )
-        low, high = self._arguments()
-        slope = np.polynomial.Polynomial(self.polynomial).deriv()
-        turns = np.asarray(slope.deriv().roots(), dtype=np.complex128)
-        slopes = slope(np.array([low, high, *turns.real[turns.imag == 0].clip(low, high)]))
+        slopes = slopes_at(self.polynomial, *self._arguments())
         if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:
             raise ModelError(
                 "'polynomial' has no inverse: it does not increase over its whole input range. Remedy: "

@@ -80,7 +80,6 @@ class Coupling(Block):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return G^T, row after row."""
-        del sample_time
         return np.ascontiguousarray(self.matrix.T).ravel()
 
     @property
@@ -117,7 +116,6 @@ class Coupling(Block):
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the gains."""
-        del sample_time
         return LinearSystem.gain(np.array(self.gains).T)
 
     @classmethod

@@ -3,12 +3,11 @@
 Every input has Gaussian sets; a rule is one set of each input, fires by their product, and answers
 with a linear function of all inputs; answers are weighted by normalised firing. Since there is a rule
 for every combination, the normalised firing of a rule is the product of memberships normalised input
-by input, which is how it is computed: in the log domain, where nothing underflows far from all centres.
+by input, which are computed in the log domain, where nothing underflows far from all centres.
 
-The inverse needs the answer and its slopes again and again for the same scheduling inputs. So these are
-contracted away once a sample: what is left are rules of the driven inputs alone, each the mean of those
-it stands for, weighted by their firing. Slopes are exact: with mu_s the normalised memberships of an
-input x_i, of Gaussian sets at c_s of width w_s,
+For the inverse, known scheduling inputs are contracted away once a sample: what is left are rules of the
+driven inputs alone, each the mean of those it stands for, weighted by their firing. Slopes are exact:
+with mu_s the normalised memberships of an input x_i, of Gaussian sets at c_s of width w_s,
 
     d ln mu_s / d x_i = sum_r mu_r (x_i - c_r) / w_r^2 - (x_i - c_s) / w_s^2.
 
@@ -65,7 +64,7 @@ def fill_memberships(x: float, centres: Array, widths: Array, memberships: Array
 def fill_between(c: Array, first: int, last: int, x: Array, memberships: Array) -> int:
     """Fill the memberships of inputs ``first`` to ``last`` alone; return the combinations of their sets.
 
-    ``c`` is what `answer` reads; ``x`` begins at the first of these inputs, memberships at that of all.
+    ``c`` is what `contract` reads; ``x`` begins at the first of these inputs.
     """
     n, most = int(c[0]), int(c[4])
     at, n_sets, combinations = 5 + n, 0, 1
@@ -97,62 +96,35 @@ def consequents_at(c: Array) -> int:
 
 
 @kernel
-def answer(c: Array, x: Array, memberships: Array, y: Array) -> None:
-    """Fill the outputs at one input sample.
+def contract(c: Array, m: int, known: Array, memberships: Array, left: Array) -> None:
+    """Fill the rules that are left of the first m inputs where the others are known.
 
     ``c`` is [inputs, outputs, driven, constants, most sets, sets of every input, centres, widths,
     consequents]; a rule's consequents are one row an output: a coefficient for every input, and the
-    constant if there are constants.
+    constant if there are constants. ``left`` has, rule after rule, one row an output: m coefficients and
+    a constant; of no inputs, the outputs themselves.
     """
     n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
-    n_rules = fill_between(c, 0, n, x, memberships)
-    rows = c[consequents_at(c) :]
-    at, width = 0, n + constant
-    for j in range(n_out):
-        y[j] = 0.0
-    for rule in range(n_rules):
-        firing, rest = 1.0, rule
-        for i in range(n - 1, -1, -1):
-            sets = int(c[5 + i])
-            firing *= memberships[i * most + rest % sets]
-            rest //= sets
-        if firing > NOTHING:
-            for j in range(n_out):
-                total = rows[at + n] if constant else 0.0
-                for i in range(n):
-                    total += rows[at + i] * x[i]
-                y[j] += firing * total
-                at += width
-        else:
-            at += n_out * width
-
-
-@kernel
-def contract(c: Array, m: int, scheduling: Array, memberships: Array, left: Array) -> None:
-    """Fill the rules that are left of the first m inputs where the others are known.
-
-    ``left`` has, rule after rule, one row an output: m coefficients and a constant.
-    """
-    n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
-    n_known = fill_between(c, m, n, scheduling, memberships)
+    n_known = fill_between(c, m, n, known, memberships)
     rows, width = c[consequents_at(c) :], n + constant
     for place in range(left.size):
         left[place] = 0.0
-    for known in range(n_known):
-        firing, rest = 1.0, known
+    for k in range(n_known):
+        firing, rest = 1.0, k
         for i in range(n - 1, m - 1, -1):
             sets = int(c[5 + i])
             firing *= memberships[i * most + rest % sets]
             rest //= sets
-        for row in range(left.size // (m + 1)):
-            rule, j = row // n_out, row % n_out
-            at = ((rule * n_known + known) * n_out + j) * width
-            total = rows[at + n] if constant else 0.0
-            for i in range(m, n):
-                total += rows[at + i] * scheduling[i - m]
-            for i in range(m):
-                left[row * (m + 1) + i] += firing * rows[at + i]
-            left[row * (m + 1) + m] += firing * total
+        if firing > NOTHING:
+            for row in range(left.size // (m + 1)):
+                rule, j = row // n_out, row % n_out
+                at = ((rule * n_known + k) * n_out + j) * width
+                total = rows[at + n] if constant else 0.0
+                for i in range(m, n):
+                    total += rows[at + i] * known[i - m]
+                for i in range(m):
+                    left[row * (m + 1) + i] += firing * rows[at + i]
+                left[row * (m + 1) + m] += firing * total
 
 
 @kernel
@@ -211,7 +183,7 @@ def fuzzy_network_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Answer a sample; scratch are the memberships."""
-    answer(coefficients, inputs, scratch, outputs)
+    contract(coefficients, 0, inputs, scratch, outputs)
 
 
 @step
@@ -303,7 +275,7 @@ def fuzzy_network_inverse_start(
         fuzzy_network_inverse_step(coefficients, trial, rest, inputs, driven)
         for i in range(n):
             x[i] = driven[i] if i < m else inputs[i]
-        answer(c, x, rest, y)
+        contract(c, 0, x, rest, y)
         error = 0.0
         for j in range(m):
             error = max(error, abs(y[j] - inputs[j]))
@@ -337,6 +309,7 @@ class FuzzyNetwork(Invertible):
     inverse_kernel = fuzzy_network_inverse_step
     inverse_start_kernel = fuzzy_network_inverse_start
     inverse_path_dependent = True
+    solved = True
     of_local_rules = True
     parameters = ("centres", "widths", "consequents")
     notation = Notation(
@@ -392,14 +365,12 @@ class FuzzyNetwork(Invertible):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return sizes, then `pack`."""
-        del sample_time
         sets = [len(row) for row in self.centres]
         sizes = [len(sets), len(self.given), len(self.driven), int(self.constants), max(sets)]
         return np.concatenate([[*sizes, *sets], self.pack()])
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what memberships and all rules cost."""
-        del sample_time
         n, rules = len(self.centres), int(np.prod([len(row) for row in self.centres]))
         each = n + len(self.given) * (2 * n + 2)
         operations = rules * each + 10 * sum(map(len, self.centres))
@@ -407,7 +378,6 @@ class FuzzyNetwork(Invertible):
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
         """Return what contracting what schedules costs, then steps of Newton's method with slopes."""
-        del sample_time
         m, n = len(self.driven), len(self.centres)
         rules = int(np.prod([len(row) for row in self.centres]))
         once = rules * m * (2 * n + 2) + 10 * sum(map(len, self.centres[m:]))
@@ -444,8 +414,6 @@ class FuzzyNetwork(Invertible):
     def inverse_numbers(self, own: Array) -> Array:
         """Return the limits, lowest then highest, and the network's."""
         return np.concatenate([*np.array(self.limits).T, own])
-
-    solved = True
 
     def inverse_complaint(self, state: Array) -> str:
         """Tell of references that the network cannot give."""

@@ -18,7 +18,7 @@ PI-NARMAX Model", Section 3.
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Interval
@@ -27,7 +27,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Block, Cost, own_sample_time
 from mckibben.blocks.fields import STRICT, Channel, Channels, Positive, Rows, Vector
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -87,20 +87,11 @@ def recurrent_fuzzy_network_step(
         y += firing * answer
     y = y / total if total > LEAST_FIRING else (state[0] if n_a > 0 else 0.0)
     outputs[0] = y
-    for k in range(n_a - 1, 0, -1):
-        state[k] = state[k - 1]
-    if n_a > 0:
-        state[0] = y
-    for k in range(n_b - 1, 0, -1):
-        state[n_a + k] = state[n_a + k - 1]
-    if n_b > 0:
-        state[n_a] = inputs[0]
+    remember(y, state[:n_a])
+    remember(inputs[0], state[n_a : n_a + n_b])
     for s in range(n_scheduled):
         at = n_a + n_b + s * n_c
-        for k in range(n_c - 1, 0, -1):
-            state[at + k] = state[at + k - 1]
-        if n_c > 0:
-            state[at] = inputs[1 + s]
+        remember(inputs[1 + s], state[at : at + n_c])
 
 
 @kernel
@@ -141,6 +132,20 @@ class RecurrentFuzzyNetwork(Block):
     start_kernel = recurrent_start
     rate_dependent = True
     of_local_rules = True
+    typical = (
+        ((0.0, 40.0), (0.0, 40.0), (0.0, 150.0)),
+        ((30.0, 30.0), (30.0, 30.0), (100.0, 100.0)),
+        ((0.5, -0.5), (0.3, 0.2), (2.0, -1.0)),
+        tuple(
+            number
+            for rule in range(8)
+            for number in (0.6 + 0.02 * (rule & 1), 0.3 - 0.02 * (rule >> 2), -0.01, 0.5)
+        ),
+        0.01,
+        (Channel("displacement_free", "mm"),),
+        (Channel("force", "N"),),
+        (Channel("displacement", "mm"),),
+    )
     no_inverse = (
         "has no inverse: a sample of its input moves its output by next to nothing. "
         "Remedy: invert balance, or close a loop."
@@ -238,7 +243,6 @@ class RecurrentFuzzyNetwork(Block):
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what memberships and all rules cost."""
-        del sample_time
         n, sets = self.n_regressors, self.n_sets
         operations = sets**n * (3 * n + 3) + 10 * n * sets
         return Cost(operations, operations)
@@ -262,22 +266,3 @@ class RecurrentFuzzyNetwork(Block):
         place = index[-1] % (len(per) + 1)
         given = self.outputs[0].unit
         return f"{given or '1'}/{per[place]}" if place < len(per) and per[place] else given
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a small, stable network of a muscle under a load."""
-        centres, widths = (0.0, 40.0), (30.0, 30.0)
-        loads, spans = (0.0, 150.0), (100.0, 100.0)
-        consequents = []
-        for rule in range(8):
-            consequents += [0.6 + 0.02 * (rule & 1), 0.3 - 0.02 * (rule >> 2), -0.01, 0.5]
-        return cls(
-            (centres, centres, loads),
-            (widths, widths, spans),
-            ((0.5, -0.5), (0.3, 0.2), (2.0, -1.0)),
-            tuple(consequents),
-            0.01,
-            (Channel("displacement_free", "mm"),),
-            (Channel("force", "N"),),
-            (Channel("displacement", "mm"),),
-        )

@@ -39,7 +39,7 @@ from mckibben.blocks.fields import (
     StoredInitial,
 )
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
+from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, remember, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError, ModelWarning
 
@@ -92,8 +92,7 @@ def air_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -
     late = int(coefficients[7])
     state[0] = _moved(coefficients, state[0], inputs[0])
     outputs[0] = state[late]
-    for k in range(late, 0, -1):
-        state[k] = state[k - 1]
+    remember(state[0], state[1 : late + 1])
 
 
 @kernel

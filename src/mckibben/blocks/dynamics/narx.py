@@ -34,7 +34,7 @@ from mckibben.blocks.fields import (
     rows,
 )
 from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
-from mckibben.blocks.kernels import inlined, kernel, step
+from mckibben.blocks.kernels import inlined, kernel, remember, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -70,10 +70,7 @@ def take_input(u: float, coefficients: Array, state: Array) -> None:
     """Put a new input among the past ones, and move the play operators."""
     n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
     x = (u - coefficients[3]) / coefficients[4]
-    for i in range(n + m - 1, n, -1):
-        state[i] = state[i - 1]
-    if m > 0:
-        state[n] = x
+    remember(x, state[n : n + m])
     for i in range(k):
         r = coefficients[HEAD + i]
         place = n + m + i
@@ -83,11 +80,7 @@ def take_input(u: float, coefficients: Array, state: Array) -> None:
 @kernel
 def give_output(y: float, coefficients: Array, state: Array) -> float:
     """Put a new output among the past ones, and return it in its own unit."""
-    n = int(coefficients[0])
-    for i in range(n - 1, 0, -1):
-        state[i] = state[i - 1]
-    if n > 0:
-        state[0] = y
+    remember(y, state[: int(coefficients[0])])
     return coefficients[5] + coefficients[6] * y
 
 

@@ -33,7 +33,7 @@ from mckibben.blocks.fields import (
     Positive,
     Vector,
 )
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import Notation, tex
 from mckibben.errors import ModelError
@@ -55,9 +55,7 @@ def process_model_step(coefficients: Array, state: Array, inputs: Array, outputs
     now, before = coefficients[4], coefficients[5]
     c = coefficients[6:]
     kept = state.size - 2 * n
-    for k in range(kept - 1, 0, -1):
-        state[n + k] = state[n + k - 1]
-    state[n] = inputs[0] - u0
+    remember(inputs[0] - u0, state[n : n + kept])
     first, second, third = state[n + m], state[n + m + 1], state[n + m + 2]
     y = now * first + before * second
     for i in range(n):

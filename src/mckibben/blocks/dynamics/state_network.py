@@ -216,7 +216,6 @@ class StateNetwork(Block):
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what a step costs: every weight four times a substep, and sigmoids."""
-        del sample_time
         operations = self.substeps * 4 * (2 * self.n_parameters + 20 * len(self.hidden))
         return Cost(operations, operations)
 

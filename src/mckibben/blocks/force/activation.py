@@ -8,7 +8,7 @@ none.
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Interval
@@ -118,6 +118,16 @@ class ActivationPressure(Block):
     rate_dependent = True
     no_inverse = UNDOES_A_MUSCLE
     parameters = ("contractions", "pressures", "phi", "gamma")
+    typical = (
+        (*[0.0] * 3, -1.0, *[0.0] * 2, 0.01, 6.0, *[0.0] * 3, 2.0, 0.0, 0.001, 0.0, 4.0),
+        (
+            *(0.0, 0.0, 0.1, 0.2),
+            *(0.0, 0.0, 0.1, 4.0),
+            *(0.0, 0.0, 0.1, 1.0),
+            *(0.0, 0.0, 0.1, 2.0),
+        ),
+        *((0.0, 0.0, 0.01, 0.3), (0.27, 0.67), 1.0),
+    )
     n_states = 2  # previous contraction and filtered rate
     notation = Notation(
         r"p = \sum_{k=0}^{3} b_k(F)\, \epsilon^k + \gamma\, \phi(F)\, \dot{\epsilon}",
@@ -160,22 +170,6 @@ class ActivationPressure(Block):
         rate = rate_filter(self.rate_time_constant, step)
         gamma = self.gamma[0] * self.frequency + self.gamma[1]
         return np.array([*rate, gamma, *self.phi, *self.contractions, *self.pressures])
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a model for contractions and forces of a few units."""
-        return cls(
-            (
-                *(0.0, 0.0, 0.0, -1.0),
-                *(0.0, 0.0, 0.01, 6.0),
-                *(0.0, 0, 0, 2.0),
-                *(0, 0.001, 0, 4.0),
-            ),
-            (*(0.0, 0.0, 0.1, 0.2), *(0.0, 0.0, 0.1, 4.0), *(0.0, 0, 0.1, 1.0), *(0, 0, 0.1, 2.0)),
-            (0.0, 0.0, 0.01, 0.3),
-            (0.27, 0.67),
-            1.0,
-        )
 
 
 # -- the model with memory -------------------------------------------------------------------
@@ -272,6 +266,10 @@ class ActivationMemory(Block):
     rate_dependent = True
     no_inverse = UNDOES_A_MUSCLE
     parameters = ("surface", "friction", "viscosity", "relaxation")
+    typical = (
+        *((2.0, 0.5, 1.5, 0.1, 0.2, 0.0), (0.2, 0.8), (0.3, 0.2, 0.1, 0.0), (0.05, 0.01)),
+        *((0.1, 0.02), (0.5,), 2, 1, (2.5, 2.5), (2.5, 2.5)),
+    )
     notation = Notation(
         r"p = \sum_{ij} c_{ij} x^i f^j + \sum_k (a_k + b_k f) S_k[\epsilon] + (d_0 + d_1 "
         r"f) \dot{\epsilon} + \sum_m (g_m + h_m f)(x_m - x)",
@@ -345,19 +343,3 @@ class ActivationMemory(Block):
         decays = np.exp(-step / np.array(self.time_constants))
         slow = [*self.viscosity, *self.relaxation, *decays]
         return np.array([*rate, *scales, *counts, *self.surface, *operators, *slow])
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a model for contractions and forces of a few units."""
-        return cls(
-            surface=(2.0, 0.5, 1.5, 0.1, 0.2, 0.0),
-            thresholds=(0.2, 0.8),
-            friction=(0.3, 0.2, 0.1, 0.0),
-            viscosity=(0.05, 0.01),
-            relaxation=(0.1, 0.02),
-            time_constants=(0.5,),
-            degree=2,
-            force_degree=1,
-            input_scale=(2.5, 2.5),
-            force_scale=(2.5, 2.5),
-        )

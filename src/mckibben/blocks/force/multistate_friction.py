@@ -22,7 +22,7 @@ pressure_gain 0 is the paper's model.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, FiniteFloat
@@ -172,6 +172,13 @@ class MultistateFriction(Block):
     kernel = multistate_friction_step
     start_kernel = multistate_friction_start
     rate_dependent = True
+    typical = (  # of eleven parameters, as the paper prints it
+        ELEVEN,
+        (
+            *(18.214, 4.987e-3, 128.795, 3.982e-3, 103.096),
+            *(34.738, 1.006e-3, 13.431, 1e-4, 0.988e-3, 1.256),
+        ),
+    )
     no_inverse = (
         "has no inverse: while it slips, one force belongs to many lengths. Remedy: compensate it by "
         "ForceFeedforward(law, friction), in closed form."
@@ -248,14 +255,3 @@ class MultistateFriction(Block):
             letter = {"sigma": r"\sigma", "F_c": "F_c"}.get(symbol, symbol)
             told.setdefault(where, []).append(f"{letter} = {with_unit(tex(value), unit)}")
         return tuple(rf"\text{{{at}: }}" + r",\quad ".join(lines) for at, lines in told.items())
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return the model of eleven parameters that the paper prints."""
-        return cls(
-            ELEVEN,
-            (
-                *(18.214, 4.987e-3, 128.795, 3.982e-3, 103.096),
-                *(34.738, 1.006e-3, 13.431, 1e-4, 0.988e-3, 1.256),
-            ),
-        )

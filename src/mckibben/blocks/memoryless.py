@@ -347,7 +347,7 @@ class Polynomial(Invertible):
 # -- logarithm and exponential ---------------------------------------------------------------
 
 FLOOR = 0.05
-"""Of u + offset, where the logarithm turns into its tangent, so that every input has an output."""
+"""Of u + offset, where the logarithm turns into its tangent."""
 
 
 @step
@@ -367,7 +367,19 @@ def exponential_step(coefficients: Array, state: Array, inputs: Array, outputs: 
 
 
 @dataclass(frozen=True, config=STRICT)
-class Logarithm(Block):
+class Raised(Block):
+    """A logarithm of a raised input, or what undoes it."""
+
+    parameters = ("offset",)
+    typical = (0.5,)
+
+    offset: NotNegative = 0.0
+    input: ChannelField = PRESSURE
+    output: ChannelField = PRESSURE
+
+
+@dataclass(frozen=True, config=STRICT)
+class Logarithm(Raised):
     """Logarithm of a raised input.
 
     Friction in a muscle grows in proportion to pressure, so play operators of constant threshold belong
@@ -384,20 +396,14 @@ class Logarithm(Block):
 
     kind = "logarithm"
     kernel = logarithm_step
-    parameters = ("offset",)
-    typical = (0.5,)
     notation = Notation(r"y = \ln(u + c)", offset="c [{u}]")
-
-    offset: NotNegative = 0.0
-    input: ChannelField = PRESSURE
-    output: ChannelField = PRESSURE
 
     def inverse(self) -> Block:
         return Exponential(self.offset, self.output, self.input)
 
 
 @dataclass(frozen=True, config=STRICT)
-class Exponential(Block):
+class Exponential(Raised):
     """What undoes a `Logarithm`.
 
     Parameters
@@ -410,13 +416,7 @@ class Exponential(Block):
 
     kind = "exponential"
     kernel = exponential_step
-    parameters = ("offset",)
-    typical = (0.5,)
     notation = Notation("y = e^{u} - c", offset="c [{y}]")
-
-    offset: NotNegative = 0.0
-    input: ChannelField = PRESSURE
-    output: ChannelField = PRESSURE
 
     def inverse(self) -> Block:
         return Logarithm(self.offset, self.output, self.input)

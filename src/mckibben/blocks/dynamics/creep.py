@@ -92,6 +92,7 @@ class Creep(Invertible):
     counts_clipped = False
     parameters = ("compliances", "time_constants")
     n_states = one_per("compliances")  # one to every Kelvin-Voigt element
+    n_fitted = n_states
     typical = ((0.08, 0.05), (1.5, 40.0))
     notation = Notation(
         r"y = u + \sum_k c_k x_k,\quad \tau_k \dot{x}_k = u - x_k",
@@ -116,11 +117,6 @@ class Creep(Invertible):
                 f"{self.kind!r} has a negative compliance, or a time constant that is not positive. "
                 "Remedy: give compliances of 0 or more, and positive times in seconds."
             )
-
-    @property
-    def n_fitted(self) -> int:
-        """All of them."""
-        return self.n_states
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [decays over a sample, compliances]."""

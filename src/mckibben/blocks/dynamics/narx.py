@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Callable
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from annotated_types import Interval, MaxLen
@@ -22,7 +23,7 @@ from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, own_sample_time
+from mckibben.blocks.base import Block, Start, own_sample_time
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -34,7 +35,7 @@ from mckibben.blocks.fields import (
     rows,
 )
 from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
-from mckibben.blocks.kernels import inlined, kernel, remember, step
+from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -84,35 +85,46 @@ def give_output(y: float, coefficients: Array, state: Array) -> float:
     return coefficients[5] + coefficients[6] * y
 
 
-@inlined
-def start_resting(
-    regression: Any, coefficients: Array, state: Array, inputs: Array, virgin: bool
-) -> None:
-    """Start at rest at the first input: where the regression gives back the output it is given.
+def narx_kernels(regression: Callable[[Array, Array], float]) -> tuple[Step, Start]:
+    """Return the step and the start of a model by its scaled output of the regressors in the state."""
 
-    Of several such outputs within the data's range, the lowest for an input that has risen, the middle
-    one for a virgin start; where there is none, the output that changes least.
-    """
-    n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
-    x = (inputs[0] - coefficients[3]) / coefficients[4]
-    state[n : n + m] = x
-    start_operators(coefficients[HEAD : HEAD + k], x, x, virgin, state[n + m :])
-    found, rests = 0.0, 0
-    for _ in range(2 if virgin else 1):
-        wanted = rests // 2
-        rests, least, before, last = 0, math.inf, 0.0, 0.0
-        for place in range(PLACES):
-            y = place * SPACING - FARTHEST
-            state[:n] = y
-            change = regression(coefficients, state) - y
-            if rests == 0 and abs(change) < least:
-                found, least = y, abs(change)
-            if place > 0 and ((before > 0.0) != (change > 0.0) or (before < 0.0) != (change < 0.0)):
-                if rests == wanted:
-                    found = last - SPACING * before / (change - before)
-                rests += 1
-            before, last = change, y
-    state[:n] = found
+    def narx_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Run the model."""
+        take_input(inputs[0], coefficients, state)
+        outputs[0] = give_output(regression(coefficients, state), coefficients, state)
+
+    def narx_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start at rest at the first input: where the regression gives back the output it is given.
+
+        Of several such outputs within the data's range, the lowest for an input that has risen, the
+        middle one for a virgin start; where there is none, the output that changes least.
+        """
+        n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
+        x = (inputs[0] - coefficients[3]) / coefficients[4]
+        state[n : n + m] = x
+        start_operators(coefficients[HEAD : HEAD + k], x, x, virgin, state[n + m :])
+        found, rests = 0.0, 0
+        for _ in range(2 if virgin else 1):
+            wanted = rests // 2
+            rests, least, before, last = 0, math.inf, 0.0, 0.0
+            for place in range(PLACES):
+                y = place * SPACING - FARTHEST
+                state[:n] = y
+                change = regression(coefficients, state) - y
+                if rests == 0 and abs(change) < least:
+                    found, least = y, abs(change)
+                if place > 0 and (
+                    (before > 0.0) != (change > 0.0) or (before < 0.0) != (change < 0.0)
+                ):
+                    if rests == wanted:
+                        found = last - SPACING * before / (change - before)
+                    rests += 1
+                before, last = change, y
+        state[:n] = found
+
+    narx_step.__qualname__ = f"{regression.__qualname__}.step"
+    narx_start.__qualname__ = f"{regression.__qualname__}.start"
+    return step(narx_step), kernel(narx_start)
 
 
 @kernel
@@ -136,19 +148,6 @@ def sum_of_terms(coefficients: Array, state: Array) -> float:
             product *= state[place]
         y += product
     return y
-
-
-@step
-def narx_polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model."""
-    take_input(inputs[0], coefficients, state)
-    outputs[0] = give_output(sum_of_terms(coefficients, state), coefficients, state)
-
-
-@kernel
-def narx_polynomial_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start the model at rest."""
-    start_resting(sum_of_terms, coefficients, state, inputs, virgin)
 
 
 @kernel
@@ -175,19 +174,6 @@ def network(coefficients: Array, state: Array) -> float:
         a = (1.0 - s * s) * math.exp(-0.5 * s * s) if wavelets else math.tanh(s)
         y += hidden[h * width + n + 1] * a
     return y
-
-
-@step
-def narx_network_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model."""
-    take_input(inputs[0], coefficients, state)
-    outputs[0] = give_output(network(coefficients, state), coefficients, state)
-
-
-@kernel
-def narx_network_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start the model at rest."""
-    start_resting(network, coefficients, state, inputs, virgin)
 
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
@@ -293,8 +279,7 @@ class NarxPolynomial(Narx):
     """
 
     kind = "narx-polynomial"
-    kernel = narx_polynomial_step
-    start_kernel = narx_polynomial_start
+    kernel, start_kernel = narx_kernels(sum_of_terms)
     parameters = ("weights",)
     notation = Notation(
         r"\bar{y}_t = \sum_i w_i \prod_{j \in P_i} x_{j,t}", *REGRESSORS, weights="w_i", **SYMBOLS
@@ -376,8 +361,7 @@ class NarxNetwork(Narx):
     """
 
     kind = "narx-network"
-    kernel = narx_network_step
-    start_kernel = narx_network_start
+    kernel, start_kernel = narx_kernels(network)
     parameters = ("bias", "linear", "hidden")
     notation = Notation(
         r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)",

@@ -28,7 +28,6 @@ from mckibben.blocks.fields import (
     STRICT,
     ChannelField,
     FittedInitial,
-    Initial,
     NotNegative,
     Positive,
     Vector,
@@ -37,7 +36,6 @@ from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import Notation, tex
 from mckibben.errors import ModelError
-from mckibben.recording import Recording
 
 LONGEST_DELAY = 254
 """Samples."""
@@ -112,6 +110,7 @@ class ProcessModel(Block):
     start_kernel = process_model_start
     rate_dependent = True
     filters = True
+    start_on = start_on
     no_inverse = (
         "has no exact inverse: its output lags its input, so following a reference would take "
         "derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, mpi), or a transfer-function "
@@ -170,19 +169,12 @@ class ProcessModel(Block):
         under = "U" if self.damping is not None else ""
         return f"P{self.order}{'D' * (self.delay > 0)}{under}{'Z' * (self.zero_time is not None)}"
 
-    @property
-    def n_fitted(self) -> int:
-        """As many as there are lags."""
-        return self.order
+    n_fitted = order
 
     @property
     def n_states(self) -> int:
         """Of the lags, past inputs, and as many for the lags again, to compute in."""
         return 2 * self.order + (3 if self.delay == 0 else LONGEST_DELAY + 3)
-
-    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        """Return the state that explains the recording's outputs best, where that is the rule."""
-        return start_on(self, recording, initial)
 
     def denominator(self) -> Array:
         """Return D(s), descending powers."""

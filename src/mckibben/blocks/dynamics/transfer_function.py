@@ -26,7 +26,6 @@ from mckibben.blocks.fields import (
     ChannelField,
     Coefficients,
     FittedInitial,
-    Initial,
     NotNegative,
     Positive,
 )
@@ -97,6 +96,7 @@ class TransferFunction(Block):
     start_kernel = filter_start
     rate_dependent = True
     filters = True
+    start_on = start_on
     parameters = (
         "numerator",
         "denominator",
@@ -162,10 +162,6 @@ class TransferFunction(Block):
         b = np.pad(np.array(self.numerator), (0, n + 1 - len(self.numerator)))
         f = np.pad(np.array([1.0, *self.denominator]), (0, n - len(self.denominator)))
         return b, f
-
-    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        """Return the state that explains the recording's outputs best, where that is the rule."""
-        return start_on(self, recording, initial)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [u_0, y_0, b, f, gain], with no gain where that is infinite."""

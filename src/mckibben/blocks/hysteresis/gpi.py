@@ -27,8 +27,8 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import Learnable, start_learning
-from mckibben.blocks.adaptive.operators import follow_learning, inverse_at, learnable_operators
+from mckibben.blocks.adaptive.learning import Learnable
+from mckibben.blocks.adaptive.operators import learnable_operators, learning_kernels
 from mckibben.blocks.base import Block, one_per
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import (
@@ -107,13 +107,14 @@ def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> tuple[Any, ..
         state[n] = u
 
     @inlined
-    def go(way: float, c: Array, state: Array, n: int) -> None:
+    def go(way: float, c: Array, state: Array, n: int) -> float:
         """Move to the input, within its limits, at which the envelope of a direction has the edge."""
         first = 2 * n + 3 + int(c[2])
         if way > 0.0:
             state[n] = min(max(rising_from(state[0], c[2 * n + 3 : first]), c[0]), c[1])
         elif way < 0.0:
             state[n] = min(max(falling_from(state[0], c[first:]), c[0]), c[1])
+        return state[n]
 
     @step
     def gpi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
@@ -126,8 +127,7 @@ def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> tuple[Any, ..
         if clipped:
             state[n + 2] += 1.0
         state[n + 1] = inputs[0]
-        go(way, coefficients, state, n)
-        outputs[0] = state[n]
+        outputs[0] = go(way, coefficients, state, n)
 
     @kernel
     def gpi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
@@ -140,30 +140,8 @@ def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> tuple[Any, ..
         go(-1.0 if virgin and y < 0.0 else 1.0, coefficients, state, n)
         state[n + 1], state[n + 2] = y, 0.0
 
-    @step
-    def gpi_adaptive_step(
-        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
-    ) -> None:
-        """Invert, and learn the weights and an offset from what is measured."""
-        n = int(coefficients[0]) - 1
-        own = coefficients[inverse_at(coefficients) :]
-        s, last, learnt = state[:n], state[n + 1 : n + 4], state[n + 4 :]
-        way = follow_learning(
-            coefficients, own[3 : n + 3], s, last, learnt, scratch, inputs[0], inputs[1]
-        )
-        go(way, own, state, n)
-        outputs[0] = state[n]
-
-    @kernel
-    def gpi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-        """Start as the inverse does, with the weights as fitted."""
-        n = int(coefficients[0]) - 1
-        gpi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 3], inputs, virgin)
-        state[n + 3] = 0.0
-        start_learning(coefficients, state[n + 4 :])
-
     forward = (gpi_step, gpi_start, gpi_inverse_step, gpi_inverse_start)
-    return *forward, gpi_adaptive_step, gpi_adaptive_start
+    return *forward, *learning_kernels(gpi_inverse_start, go, 1)
 
 
 def of_envelopes(place: int) -> Any:
@@ -174,23 +152,6 @@ def of_envelopes(place: int) -> Any:
         return kernels_of(*kinds)[place]
 
     return property(kernel_of)
-
-
-@kernel
-def gpi_matrix(
-    u: Array, rising: Array, falling: Array, r: Array, s: Array, operators: Array
-) -> None:
-    """Run generalised play operators side by side: ``operators[t, i]`` is operator i after sample t.
-
-    Shapes: u, rising and falling (n,), r and s (N,), operators (n, N). Changes the states ``s``, which
-    are those after the first sample: nothing moves before the second.
-    """
-    for t in range(u.size):
-        lower = rising[t] if u[t] > u[max(t - 1, 0)] else -np.inf
-        upper = falling[t] if u[t] < u[max(t - 1, 0)] else np.inf
-        for i in range(r.size):
-            s[i] = min(max(s[i], lower - r[i]), upper + r[i])
-            operators[t, i] = s[i]
 
 
 def smallest_gap(

@@ -84,25 +84,15 @@ def started(r: Array, rising: float, falling: float, rule: str) -> Array:
 
 
 @kernel
-def start_from_rest(
-    target: float, lowest: float, highest: float, r: Array, w: Array, s: Array
-) -> None:
-    """Start as one excursion from rest leaves operators when the weighted sum is ``target``."""
-    for i in range(r.size):
-        s[i] = 0.0
-    if target > 0.0:
-        rise_to(target, highest, r, w, s)
-    elif target < 0.0:
-        fall_to(target, lowest, r, w, s)
-
-
-@kernel
 def start_sum(
     target: float, lowest: float, highest: float, r: Array, w: Array, virgin: bool, s: Array
 ) -> None:
     """Start operators so that their weighted sum is ``target``, within the limits of their input."""
     if virgin:
-        start_from_rest(target, lowest, highest, r, w, s)
+        s[:] = 0.0
+        if target != 0.0:
+            way = 1.0 if target > 0.0 else -1.0
+            move_to(target, way, highest if target > 0.0 else lowest, r, w, s)
         return
     risen, slope = target, 0.0
     for i in range(r.size):
@@ -131,49 +121,27 @@ def follow(
     missing = target - total
     slack = SLACK * abs(highest - lowest)
     if target > previous and missing > ROUNDING * size:
-        return 1.0, rise_to(target, highest, r, w, s) > highest + slack
+        return 1.0, move_to(target, 1.0, highest, r, w, s) > highest + slack
     if target < previous and missing < -ROUNDING * size:
-        return -1.0, fall_to(target, lowest, r, w, s) < lowest - slack
+        return -1.0, move_to(target, -1.0, lowest, r, w, s) < lowest - slack
     above = missing > w[0] * slack and s[0] >= highest
     below = missing < -w[0] * slack and s[0] <= lowest
     return 0.0, above or below
 
 
 @kernel
-def rise_to(target: float, z_max: float, r: Array, w: Array, s: Array) -> float:
-    """Raise the input of a weighted sum of play operators until the sum is ``target``.
+def move_to(target: float, way: float, limit: float, r: Array, w: Array, s: Array) -> float:
+    """Move the input of a sum of play operators up or down (``way`` 1 or -1) until it is ``target``.
 
-    Changes the states ``s``, as far as ``z_max`` allows, and returns the input that the target asks for.
-    """
-    z = _reach(target, 1.0, r, w, s)
-    for i in range(r.size):
-        s[i] = max(s[i], min(z, z_max) - r[i])
-    return z
-
-
-@kernel
-def fall_to(target: float, z_min: float, r: Array, w: Array, s: Array) -> float:
-    """Lower the input until the sum is ``target``; the mirror of `rise_to`."""
-    z = _reach(target, -1.0, r, w, s)
-    for i in range(r.size):
-        s[i] = min(s[i], max(z, z_min) + r[i])
-    return z
-
-
-@kernel
-def _reach(target: float, way: float, r: Array, w: Array, s: Array) -> float:
-    """Return the input, going up or down (``way`` 1 or -1), at which the sum is ``target``.
-
-    While the input z rises, operator i moves once z > s_i + r_i, and operators start moving in the
-    order of their thresholds; between two starts the sum is linear in z.
+    Changes the states ``s``, as far as the limit of the input allows, and returns the input that the
+    target asks for. While the input z rises, operator i moves once z > s_i + r_i, and operators start
+    moving in the order of their thresholds; between two starts the sum is linear in z.
     """
     n = r.size
     still = 0.0
     for i in range(n):
         still += w[i] * s[i]
-    slope = 0.0
-    moving = 0.0
-    z = s[0]
+    slope, moving, z = 0.0, 0.0, s[0]
     for i in range(n):
         still -= w[i] * s[i]
         slope += w[i]
@@ -181,6 +149,8 @@ def _reach(target: float, way: float, r: Array, w: Array, s: Array) -> float:
         z = (target - still + way * moving) / slope
         if i + 1 == n or way * z <= way * s[i + 1] + r[i + 1]:
             break
+    for i in range(n):
+        s[i] = max(s[i], min(z, limit) - r[i]) if way > 0.0 else min(s[i], max(z, limit) + r[i])
     return z
 
 
@@ -199,14 +169,19 @@ def play_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -
 
 
 @kernel
-def play_matrix(u: Array, r: Array, s: Array, operators: Array) -> None:
+def play_matrix(
+    u: Array, rising: Array, falling: Array, r: Array, s: Array, operators: Array
+) -> None:
     """Run play operators side by side: ``operators[t, i]`` is operator i after sample t.
 
-    Shapes: u (n,), r and s (N,), operators (n, N). Changes the states ``s``.
+    Shapes: u and what its edges see of it, rising and falling, (n,), r and s (N,), operators (n, N).
+    Changes the states ``s``, which are those after the first sample: nothing moves before the second.
     """
     for t in range(u.size):
+        lower = rising[t] if u[t] > u[max(t - 1, 0)] else -np.inf
+        upper = falling[t] if u[t] < u[max(t - 1, 0)] else np.inf
         for i in range(r.size):
-            s[i] = min(max(s[i], u[t] - r[i]), u[t] + r[i])
+            s[i] = min(max(s[i], lower - r[i]), upper + r[i])
             operators[t, i] = s[i]
 
 

@@ -15,18 +15,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    Coefficients,
-    InputRange,
-    NotNegative,
-    Positive,
-    Vector,
-)
 from mckibben.blocks.inverse import Invertible, nothing_clipped
 from mckibben.blocks.kernels import DERIVED, SLACK, improved, inlined, kernel, step
 from mckibben.blocks.linear import LinearSystem
@@ -43,7 +33,7 @@ def affine_step(coefficients: Array, state: Array, inputs: Array, outputs: Array
     outputs[0] = coefficients[0] * inputs[0] + coefficients[1]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Affine(Block):
     """Gain and offset, y = gain u + offset.
 
@@ -68,8 +58,8 @@ class Affine(Block):
 
     gain: FiniteFloat
     offset: FiniteFloat = 0.0
-    input: ChannelField = DISPLACEMENT
-    output: ChannelField = DISPLACEMENT
+    input: fields.ChannelField = fields.DISPLACEMENT
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def inverse(self) -> Affine:
         if self.gain == 0:
@@ -91,7 +81,7 @@ def negative_step(coefficients: Array, state: Array, inputs: Array, outputs: Arr
     outputs[0] = -inputs[0]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Negative(Block):
     """y = -u, for outputs that fall while the input rises, such as a muscle's length.
 
@@ -106,8 +96,8 @@ class Negative(Block):
     typical = ()
     notation = Notation("y = -u")
 
-    input: ChannelField = DISPLACEMENT
-    output: ChannelField = DISPLACEMENT
+    input: fields.ChannelField = fields.DISPLACEMENT
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def inverse(self) -> Negative:
         return Negative(self.output, self.input)
@@ -157,7 +147,7 @@ def piecewise_linear_step(coefficients: Array, state: Array, inputs: Array, outp
     outputs[0] = interpolate(inputs[0], coefficients[:n], coefficients[n:])
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class PiecewiseLinear(Block):
     """Straight lines between knots, continued beyond the first and the last.
 
@@ -186,10 +176,10 @@ class PiecewiseLinear(Block):
         values="v_k [{y}]",
     )
 
-    knots: Vector
-    values: Vector
-    input: ChannelField = DISPLACEMENT
-    output: ChannelField = DISPLACEMENT
+    knots: fields.Vector
+    values: fields.Vector
+    input: fields.ChannelField = fields.DISPLACEMENT
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_increasing(f"{self.kind} block", self.knots, self.values)
@@ -201,7 +191,7 @@ class PiecewiseLinear(Block):
 # -- polynomials -----------------------------------------------------------------------------
 
 
-Reversible = Annotated[Coefficients, MinLen(1)]
+Reversible = Annotated[fields.Coefficients, MinLen(1)]
 """Ascending coefficients of a polynomial that increases, as a field of a block."""
 
 
@@ -272,7 +262,7 @@ def undo_polynomial(coefficients: Array, state: Array, inputs: Array, outputs: A
     outputs[0] = coefficients[0] + coefficients[1] * x
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Polynomial(Invertible):
     """Polynomial of a centred and scaled input.
 
@@ -308,12 +298,12 @@ class Polynomial(Invertible):
         scale="s [{u}]",
     )
 
-    polynomial: Coefficients
+    polynomial: fields.Coefficients
     centre: FiniteFloat = 0.0
-    scale: Positive = 1.0
-    input_range: InputRange | None = None
-    input: ChannelField = DISPLACEMENT
-    output: ChannelField = DISPLACEMENT
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    input: fields.ChannelField = fields.DISPLACEMENT
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         if not self.polynomial:
@@ -366,19 +356,19 @@ def exponential_step(coefficients: Array, state: Array, inputs: Array, outputs: 
     outputs[0] = x - coefficients[0]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Raised(Block):
     """A logarithm of a raised input, or what undoes it."""
 
     parameters = ("offset",)
     typical = (0.5,)
 
-    offset: NotNegative = 0.0
-    input: ChannelField = PRESSURE
-    output: ChannelField = PRESSURE
+    offset: fields.NotNegative = 0.0
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.PRESSURE
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Logarithm(Raised):
     """Logarithm of a raised input.
 
@@ -402,7 +392,7 @@ class Logarithm(Raised):
         return Exponential(self.offset, self.output, self.input)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Exponential(Raised):
     """What undoes a `Logarithm`.
 
@@ -461,7 +451,7 @@ def contact_inverse_step(coefficients: Array, state: Array, inputs: Array, outpu
     outputs[0] = u if inputs[0] >= 0.0 else -u
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Contact(Invertible):
     """Dead zone of small pressures, which only fill the bladder towards the braid.
 
@@ -488,6 +478,6 @@ class Contact(Invertible):
         input="u",
     )
 
-    pressure: Positive
-    input: ChannelField = PRESSURE
-    output: ChannelField = PRESSURE
+    pressure: fields.Positive
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.PRESSURE

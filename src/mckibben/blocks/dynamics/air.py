@@ -27,17 +27,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import needs_sample_time
-from mckibben.blocks.fields import (
-    PRESSURE,
-    STRICT,
-    Channel,
-    ChannelField,
-    InputRange,
-    NotNegative,
-    Positive,
-    StoredInitial,
-)
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, remember, step
 from mckibben.blocks.notation import Notation
@@ -138,7 +129,7 @@ def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: 
     state[0], state[1] = _resting(c, u, virgin), 0.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Air(Invertible):
     """Valve or regulator, and the air behind it, from command to measured pressure.
 
@@ -190,18 +181,18 @@ class Air(Invertible):
         supply=r"p_{\max} [{y}]",
     )
 
-    gain: Positive
+    gain: fields.Positive
     offset: FiniteFloat
-    hysteresis: NotNegative
+    hysteresis: fields.NotNegative
     filling_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
     venting_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
-    dead_time: NotNegative = 0.0
+    dead_time: fields.NotNegative = 0.0
     ambient: FiniteFloat | None = 0.0
     supply: FiniteFloat | None = None
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = Channel("voltage", "V")
-    output: ChannelField = PRESSURE
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.Channel("voltage", "V")
+    output: fields.ChannelField = fields.PRESSURE
 
     def __post_init__(self) -> None:
         lowest, highest = self.pressures

@@ -23,17 +23,8 @@ from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Start, own_sample_time
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    Positive,
-    StoredInitial,
-    Vector,
-    rows,
-)
 from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
 from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.notation import Notation
@@ -49,7 +40,7 @@ the other."""
 HIGHEST_DEGREE, MOST_TERMS = 20, 10_000
 
 Term = Annotated[tuple[int, ...], MaxLen(HIGHEST_DEGREE)]
-Terms = Annotated[tuple[Term, ...], MaxLen(MOST_TERMS), BeforeValidator(rows)]
+Terms = Annotated[tuple[Term, ...], MaxLen(MOST_TERMS), BeforeValidator(fields.rows)]
 
 Lags = Annotated[int, Interval(ge=0, le=50)]
 
@@ -176,7 +167,7 @@ def network(coefficients: Array, state: Array) -> float:
     return y
 
 
-@dataclass(frozen=True, kw_only=True, config=STRICT)
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class Narx(Block):
     """Fields and states of NARX models.
 
@@ -209,13 +200,13 @@ class Narx(Block):
     output_lags: Lags
     input_lags: Lags
     delay: Lags = 0
-    thresholds: Vector = ()
+    thresholds: fields.Vector = ()
     input_scale: tuple[FiniteFloat, FiniteFloat]
     output_scale: tuple[FiniteFloat, FiniteFloat]
-    sample_time: Positive
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    sample_time: fields.Positive
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         if not (self.input_scale[1] > 0 and self.output_scale[1] > 0):
@@ -263,7 +254,7 @@ class Narx(Block):
         return state
 
 
-@dataclass(frozen=True, kw_only=True, config=STRICT)
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class NarxPolynomial(Narx):
     """Polynomial NARX model: f is a sum of products of regressors.
 
@@ -286,7 +277,7 @@ class NarxPolynomial(Narx):
     )
 
     terms: Terms
-    weights: Vector
+    weights: fields.Vector
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -342,7 +333,7 @@ def products(regressors: Array, terms: Terms) -> Array:
     return found
 
 
-@dataclass(frozen=True, kw_only=True, config=STRICT)
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class NarxNetwork(Narx):
     """NARX model with a network: f(x) = bias + linear . x + sum_h out_h a(hidden_h . x + shift_h).
 
@@ -373,8 +364,8 @@ class NarxNetwork(Narx):
     )
 
     bias: FiniteFloat
-    linear: Vector
-    hidden: Vector
+    linear: fields.Vector
+    hidden: fields.Vector
     activation: Literal["tanh", "wavelet"] = "tanh"
 
     def __post_init__(self) -> None:

@@ -20,18 +20,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block, needs_sample_time
 from mckibben.blocks.dynamics.starts import start_on
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    FittedInitial,
-    NotNegative,
-    Positive,
-    Vector,
-)
 from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import Notation, tex
@@ -77,7 +68,7 @@ def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin
     state[n : state.size - n] = u
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class ProcessModel(Block):
     """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
 
@@ -128,16 +119,16 @@ class ProcessModel(Block):
     )
 
     gain: FiniteFloat
-    time_constants: Vector
-    damping: Positive | None = None
+    time_constants: fields.Vector
+    damping: fields.Positive | None = None
     zero_time: FiniteFloat | None = None
-    delay: NotNegative = 0.0
+    delay: fields.NotNegative = 0.0
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
     hold: Literal["first", "zero"] = "first"
-    initial: FittedInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    initial: fields.FittedInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n = len(self.time_constants)

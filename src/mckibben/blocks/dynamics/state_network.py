@@ -21,17 +21,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Cost, needs_sample_time, one_per
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    FORCE,
-    STRICT,
-    ChannelField,
-    Positive,
-    Rows,
-    StoredInitial,
-)
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -123,7 +115,7 @@ def state_network_start(
         state[n] = inputs[0]
 
 
-@dataclass(frozen=True, kw_only=True, config=STRICT)
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class StateNetwork(Block):
     """State-space model of a linear part and tanh units.
 
@@ -171,19 +163,19 @@ class StateNetwork(Block):
         output_scale="y_s [{y}]",
     )
 
-    linear: Rows
-    hidden: Rows
-    readout: Rows
-    rate: Positive
+    linear: fields.Rows
+    hidden: fields.Rows
+    readout: fields.Rows
+    rate: fields.Positive
     input_offset: FiniteFloat = 0.0
-    input_scale: Positive = 1.0
+    input_scale: fields.Positive = 1.0
     output_offset: FiniteFloat = 0.0
-    output_scale: Positive = 1.0
+    output_scale: fields.Positive = 1.0
     substeps: Substeps = 1
     hold: Hold = "first"
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = FORCE
-    output: ChannelField = DISPLACEMENT
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n, units = len(self.linear), len(self.hidden)

@@ -17,18 +17,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block, one_per, own_sample_time
 from mckibben.blocks.dynamics.starts import free_responses, start_on
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    Coefficients,
-    FittedInitial,
-    NotNegative,
-    Positive,
-)
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import FEW, Notation, summed
@@ -65,7 +56,7 @@ def filter_start(coefficients: Array, state: Array, inputs: Array, virgin: bool)
         state[i - 1] = coming
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class TransferFunction(Block):
     """Discrete transfer function about an operating point.
 
@@ -118,17 +109,17 @@ class TransferFunction(Block):
         noise_deviation=r"\sigma_e [{y}]",
     )
 
-    numerator: Coefficients
-    denominator: Coefficients
-    sample_time: Positive
+    numerator: fields.Coefficients
+    denominator: fields.Coefficients
+    sample_time: fields.Positive
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
-    initial: FittedInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
-    noise_numerator: Coefficients = ()
-    noise_denominator: Coefficients = ()
-    noise_deviation: NotNegative | None = None
+    initial: fields.FittedInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
+    noise_numerator: fields.Coefficients = ()
+    noise_denominator: fields.Coefficients = ()
+    noise_deviation: fields.NotNegative | None = None
 
     def __post_init__(self) -> None:
         if not self.numerator:

@@ -16,17 +16,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Ports, needs_sample_time, rate_filter
-from mckibben.blocks.fields import (
-    CONTRACTION,
-    FORCE,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    NotNegative,
-    StoredInitial,
-    Vector,
-)
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -83,7 +74,7 @@ def published_start(coefficients: Array, state: Array, inputs: Array, virgin: bo
     state[0], state[1] = inputs[0], 0.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class ActivationPressure(Block):
     """Pressure that gives a contraction under a force, at one frequency of excitation.
 
@@ -146,16 +137,16 @@ class ActivationPressure(Block):
         output="p",
     )
 
-    contractions: Vector
-    pressures: Vector
-    phi: Vector
+    contractions: fields.Vector
+    pressures: fields.Vector
+    phi: fields.Vector
     gamma: tuple[FiniteFloat, FiniteFloat]
-    frequency: NotNegative
-    rate_time_constant: NotNegative = 0.0
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = CONTRACTION
-    force: ChannelField = FORCE
-    output: ChannelField = PRESSURE
+    frequency: fields.NotNegative
+    rate_time_constant: fields.NotNegative = 0.0
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.CONTRACTION
+    force: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.PRESSURE
 
     def __post_init__(self) -> None:
         sizes = (len(self.contractions), len(self.pressures), len(self.phi))
@@ -226,7 +217,7 @@ def remembering_start(coefficients: Array, state: Array, inputs: Array, virgin: 
     state[n + 2 :] = (e - coefficients[2]) / coefficients[3]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class ActivationMemory(Block):
     """Pressure that gives a contraction under a force, whatever the frequency.
 
@@ -289,21 +280,21 @@ class ActivationMemory(Block):
         output="p",
     )
 
-    surface: Vector
-    thresholds: Vector
-    friction: Vector
+    surface: fields.Vector
+    thresholds: fields.Vector
+    friction: fields.Vector
     viscosity: tuple[FiniteFloat, FiniteFloat]
-    relaxation: Vector
-    time_constants: Vector
+    relaxation: fields.Vector
+    time_constants: fields.Vector
     degree: Annotated[int, Interval(ge=0, le=9)]
     force_degree: Annotated[int, Interval(ge=0, le=9)]
     input_scale: tuple[FiniteFloat, FiniteFloat]
     force_scale: tuple[FiniteFloat, FiniteFloat]
-    rate_time_constant: NotNegative = 0.0
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = CONTRACTION
-    force: ChannelField = FORCE
-    output: ChannelField = PRESSURE
+    rate_time_constant: fields.NotNegative = 0.0
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.CONTRACTION
+    force: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.PRESSURE
 
     def __post_init__(self) -> None:
         size = (self.degree + 1) * (self.force_degree + 1)

@@ -19,14 +19,7 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    NotNegative,
-    Positive,
-)
+from mckibben.blocks import fields
 from mckibben.blocks.force.laws import braid
 from mckibben.blocks.inverse import Invertible, nothing_clipped
 from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
@@ -91,7 +84,7 @@ def braid_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs
     outputs[0] = balance(inside, c)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class BraidEquilibrium(Invertible):
     """Displacement at which a loaded, braided muscle rests under a pressure.
 
@@ -143,15 +136,15 @@ class BraidEquilibrium(Invertible):
         input="p",
     )
 
-    load: Positive
-    stiffness: NotNegative
-    hardening: NotNegative
+    load: fields.Positive
+    stiffness: fields.NotNegative
+    hardening: fields.NotNegative
     braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95)]
-    rest_length: Positive
+    rest_length: fields.Positive
     offset: FiniteFloat = 0.0
-    diameter: Positive = 20.0
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    diameter: fields.Positive = 20.0
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     @property
     def input_range(self) -> tuple[float, float]:

@@ -12,17 +12,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block
-from mckibben.blocks.fields import (
-    FORCE,
-    LENGTH,
-    PRESSURE,
-    STRICT,
-    Channel,
-    ChannelField,
-    Positive,
-    Vector,
-)
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.memoryless import polynomial_at
 from mckibben.blocks.notation import Notation
@@ -50,9 +41,9 @@ class ForceLaw(Block):
         "gives a force at a length, use ForceFeedforward(law)."
     )
 
-    input: Channel
-    pressure: Channel
-    output: Channel
+    input: fields.Channel
+    pressure: fields.Channel
+    output: fields.Channel
 
     terms_kernel: ClassVar[Callable[[float, Array], tuple[float, float]]]
     """Force per pressure [N/bar], and force without any [N], from a length and `coefficients`."""
@@ -93,7 +84,7 @@ def polynomial_force_step(coefficients: Array, state: Array, inputs: Array, outp
     outputs[0] = inputs[1] * per_bar + rest
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class PolynomialForce(ForceLaw):
     """Force linear in pressure, polynomial in length.
 
@@ -130,13 +121,13 @@ class PolynomialForce(ForceLaw):
         output="f",
     )
 
-    per_bar: Vector
-    elastic: Vector
+    per_bar: fields.Vector
+    elastic: fields.Vector
     centre: FiniteFloat = 0.0
-    scale: Positive = 1.0
-    input: ChannelField = LENGTH
-    pressure: ChannelField = PRESSURE
-    output: ChannelField = FORCE
+    scale: fields.Positive = 1.0
+    input: fields.ChannelField = fields.LENGTH
+    pressure: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.FORCE
 
     def __post_init__(self) -> None:
         if not self.per_bar or not self.elastic:
@@ -164,7 +155,7 @@ def chou_hannaford_terms(length: float, c: Array) -> tuple[float, float]:
     return c[0] * (length * length - c[1]), c[2]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class ChouHannaford(ForceLaw):
     """Force of an inextensible braid, with friction or elasticity as a constant.
 
@@ -198,12 +189,12 @@ class ChouHannaford(ForceLaw):
         output="f",
     )
 
-    thread_length: Positive
-    turns: Positive
+    thread_length: fields.Positive
+    turns: fields.Positive
     constant: FiniteFloat = 0.0
-    input: ChannelField = LENGTH
-    pressure: ChannelField = PRESSURE
-    output: ChannelField = FORCE
+    input: fields.ChannelField = fields.LENGTH
+    pressure: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.FORCE
 
     def coefficients(self, sample_time: float | None) -> Array:
         per_bar = 3 * NEWTONS_PER_BAR / (4 * math.pi * self.turns**2)
@@ -235,7 +226,7 @@ def tondu_lopez_terms(length: float, c: Array) -> tuple[float, float]:
     return mu * c[1] * (c[2] * short * short - c[3]), c[8]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class TonduLopez(ForceLaw):
     """Force of a braided cylinder, with corrections for end caps and low pressure.
 
@@ -281,15 +272,15 @@ class TonduLopez(ForceLaw):
         output="f",
     )
 
-    rest_length: Positive
-    diameter: Positive
+    rest_length: fields.Positive
+    diameter: fields.Positive
     braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95)]
     mu: tuple[FiniteFloat, FiniteFloat] = (0.0, 1.0)
     kappa: tuple[FiniteFloat, FiniteFloat] = (0.0, 1.0)
     constant: FiniteFloat = 0.0
-    input: ChannelField = LENGTH
-    pressure: ChannelField = PRESSURE
-    output: ChannelField = FORCE
+    input: fields.ChannelField = fields.LENGTH
+    pressure: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.FORCE
 
     def coefficients(self, sample_time: float | None) -> Array:
         cylinder = braid(self.braid_angle, self.diameter)

@@ -29,17 +29,8 @@ from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block, needs_sample_time, one_per
-from mckibben.blocks.fields import (
-    FORCE,
-    LENGTH,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    StoredInitial,
-    Vector,
-    plain_sequence,
-)
 from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.notation import Notation, tex, with_unit
 from mckibben.errors import ModelError
@@ -144,7 +135,7 @@ def multistate_friction_start(
     state[n] = inputs[0]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class MultistateFriction(Block):
     """Friction force by length, with elements that switch with the direction of motion.
 
@@ -198,14 +189,14 @@ class MultistateFriction(Block):
         output="f",
     )
 
-    elements: Annotated[tuple[Direction, ...], BeforeValidator(plain_sequence)]
-    values: Vector
+    elements: Annotated[tuple[Direction, ...], BeforeValidator(fields.plain_sequence)]
+    values: fields.Vector
     pressure_gain: FiniteFloat = 0.0
     reference_pressure: FiniteFloat = 0.0
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = LENGTH
-    pressure: ChannelField = PRESSURE
-    output: ChannelField = FORCE
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.LENGTH
+    pressure: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.FORCE
 
     def __post_init__(self) -> None:
         wanted = sum(SIZES[element] for element in self.elements)

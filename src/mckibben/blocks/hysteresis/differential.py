@@ -36,17 +36,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Start
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    Positive,
-    StoredInitial,
-    Vector,
-)
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
@@ -184,7 +175,7 @@ def _bouc_wen_output(u: float, z: float, c: Array) -> float:
     return polynomial_at((u - c[4]) / c[5], c, 6, c.size - 6) + c[3] * z
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class BoucWen(Loop):
     """Normalised Bouc-Wen model with a reversible polynomial.
 
@@ -218,15 +209,15 @@ class BoucWen(Loop):
 
     polynomial: Reversible
     weight: FiniteFloat
-    rate: Positive
+    rate: fields.Positive
     sigma: Annotated[FiniteFloat, Ge(0.5)]
     exponent: Literal[1, 2] = 1
     centre: FiniteFloat = 0.0
-    scale: Positive = 1.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def least_slope(self) -> float:
         steepest = self.rate * max(1.0, 2.0 * self.sigma)
@@ -267,7 +258,7 @@ def _generalized_output(u: float, z: float, c: Array) -> float:
     return polynomial_at((u - c[3]) / c[4], c, 10, c.size - 10) + c[2] * z
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class GeneralizedBoucWen(Loop):
     """Generalised Bouc-Wen model with a reversible polynomial.
 
@@ -306,15 +297,15 @@ class GeneralizedBoucWen(Loop):
 
     polynomial: Reversible
     weight: FiniteFloat
-    rate: Positive
-    shape: Vector
+    rate: fields.Positive
+    shape: fields.Vector
     exponent: Literal[1, 2] = 1
     centre: FiniteFloat = 0.0
-    scale: Positive = 1.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
@@ -378,7 +369,7 @@ def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: flo
     return found[:size]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Duhem(Loop):
     """Duhem model with a polynomial to tend to and a polynomial slope.
 
@@ -415,13 +406,13 @@ class Duhem(Loop):
 
     target: Reversible
     slope: Reversible
-    alpha: Positive
+    alpha: fields.Positive
     centre: FiniteFloat = 0.0
-    scale: Positive = 1.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [alpha, centre, scale, P rising, P falling, f], filled up to as many numbers as P."""

@@ -19,18 +19,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import one_per
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    NotNegative,
-    Positive,
-    StoredInitial,
-    Vector,
-)
 from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel, summing_step
@@ -97,7 +87,7 @@ def eupi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -
     start_operators(coefficients[7 : state.size + 7], x, x, virgin, state)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class EUPI(Invertible):
     """Extended unparallel Prandtl-Ishlinskii model.
 
@@ -146,16 +136,16 @@ class EUPI(Invertible):
         offset="y_0 [{y}]",
     )
 
-    thresholds: Vector
-    weights: Vector
-    falling_slope: Positive
-    falling_threshold: NotNegative
+    thresholds: fields.Vector
+    weights: fields.Vector
+    falling_slope: fields.Positive
+    falling_threshold: fields.NotNegative
     polynomial: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
     offset: FiniteFloat
-    input_range: InputRange
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    input_range: fields.InputRange
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)

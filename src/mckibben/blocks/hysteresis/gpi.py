@@ -27,20 +27,11 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.adaptive.learning import Learnable
 from mckibben.blocks.adaptive.operators import learnable_operators, learning_kernels
 from mckibben.blocks.base import Block, one_per
 from mckibben.blocks.compose import Series
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    StoredInitial,
-    Vector,
-    vector,
-)
 from mckibben.blocks.hysteresis.envelopes import Envelope, Tanh, nested_envelope
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
@@ -167,7 +158,7 @@ def smallest_gap(
     return float(gaps[best]), float(u[best])
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class GPI(Invertible):
     """Generalised Prandtl-Ishlinskii model.
 
@@ -202,14 +193,14 @@ class GPI(Invertible):
         weights="x_i [{y}]",
     )
 
-    thresholds: Vector
-    weights: Vector
+    thresholds: fields.Vector
+    weights: fields.Vector
     rising: EnvelopeField
     falling: EnvelopeField
-    input_range: InputRange
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    input_range: fields.InputRange
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
@@ -255,7 +246,7 @@ class GPI(Invertible):
         limits = float(self.falling(low)), float(self.rising(high))
 
         def with_parameters(theta: Array) -> Block:
-            changed, offset = replace(self, weights=vector(theta[:-1])), float(theta[-1])
+            changed, offset = replace(self, weights=fields.vector(theta[:-1])), float(theta[-1])
             shift = Affine(1.0, offset, self.output, self.output)
             return Series((changed, shift)) if offset else changed
 

@@ -17,17 +17,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import one_per
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    Positive,
-    StoredInitial,
-    Vector,
-)
 from mckibben.blocks.hysteresis.play_operators import check_thresholds
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import accumulate, kernel, step
@@ -129,7 +120,7 @@ def maxwell_slip_start(coefficients: Array, state: Array, inputs: Array, virgin:
     state[n] = inputs[0]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class MaxwellSlip(Invertible):
     """Springs that slip, beside a reversible polynomial.
 
@@ -188,17 +179,17 @@ class MaxwellSlip(Invertible):
         scale="s [{u}]",
     )
 
-    breakaways: Vector
-    weights: Vector
+    breakaways: fields.Vector
+    weights: fields.Vector
     polynomial: Reversible
-    stiffness_ratio: Positive = 1.0
-    limit_ratio: Positive = 1.0
+    stiffness_ratio: fields.Positive = 1.0
+    limit_ratio: fields.Positive = 1.0
     centre: FiniteFloat = 0.0
-    scale: Positive = 1.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.breakaways, self.weights)

@@ -34,18 +34,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Cost, Run, Start, needs_sample_time
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    FORCE,
-    STRICT,
-    ChannelField,
-    NotNegative,
-    Positive,
-    StoredInitial,
-    Vector,
-)
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import gathered
@@ -214,7 +205,7 @@ def bouc_wen_slope(z: float, velocity: float, numbers: Array) -> float:
     return numbers[0] - numbers[1] * along - numbers[2] * abs(z)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class BoucWenOscillator(Oscillator):
     """Mass, damper and spring with a Bouc-Wen element, from force to displacement.
 
@@ -246,18 +237,18 @@ class BoucWenOscillator(Oscillator):
         output_offset="y_0 [{y}]",
     )
 
-    mass: Positive
-    damping: NotNegative
-    stiffness: Positive
-    slope: Positive
+    mass: fields.Positive
+    damping: fields.NotNegative
+    stiffness: fields.Positive
+    slope: fields.Positive
     gamma: FiniteFloat
     delta: FiniteFloat
     output_offset: FiniteFloat | None = None
     substeps: Substeps = 10
     hold: Hold = "first"
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = FORCE
-    output: ChannelField = DISPLACEMENT
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
 
 @kernel
@@ -280,7 +271,7 @@ def duhem_slope(z: float, velocity: float, numbers: Array) -> float:
     return numbers[j] + share * (numbers[j + 1] - numbers[j])
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class DuhemOscillator(Oscillator):
     """Mass, damper and spring with an element of any slopes, from force to displacement.
 
@@ -317,18 +308,18 @@ class DuhemOscillator(Oscillator):
         output_offset="y_0 [{y}]",
     )
 
-    mass: Positive
-    damping: NotNegative
-    stiffness: Positive
-    rising: Vector
-    falling: Vector
-    knots: Vector
+    mass: fields.Positive
+    damping: fields.NotNegative
+    stiffness: fields.Positive
+    rising: fields.Vector
+    falling: fields.Vector
+    knots: fields.Vector
     output_offset: FiniteFloat | None = None
     substeps: Substeps = 10
     hold: Hold = "first"
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = FORCE
-    output: ChannelField = DISPLACEMENT
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n = len(self.knots)

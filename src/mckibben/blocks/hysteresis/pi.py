@@ -22,20 +22,10 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.adaptive.learning import Learnable
 from mckibben.blocks.adaptive.operators import learnable_operators, learning_kernels
 from mckibben.blocks.base import needs_sample_time, one_per, rate_filter
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    NotNegative,
-    StoredInitial,
-    Vector,
-    vector,
-)
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
     check_thresholds,
@@ -105,7 +95,7 @@ def first_operator(way: float, c: Array, state: Array, n: int) -> float:
 adaptive_kernels = learning_kernels(pi_inverse_start, first_operator, 0)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class PI(Invertible):
     """Classical Prandtl-Ishlinskii model.
 
@@ -142,13 +132,13 @@ class PI(Invertible):
         offset="y_0 [{y}]",
     )
 
-    thresholds: Vector
-    weights: Vector
+    thresholds: fields.Vector
+    weights: fields.Vector
     offset: FiniteFloat = 0.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
@@ -176,7 +166,7 @@ class PI(Invertible):
             self.input_limits,
             self.offset,
             *adaptive_kernels,
-            lambda theta: replace(self, weights=vector(theta[:-1]), offset=float(theta[-1])),
+            lambda theta: replace(self, weights=fields.vector(theta[:-1]), offset=float(theta[-1])),
         )
 
     def worked(self) -> tuple[str, ...]:
@@ -241,7 +231,7 @@ def rate_pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool
     state[n], state[n + 1] = inputs[0], 0.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class RateDependentPI(Invertible):
     """Prandtl-Ishlinskii model whose weights are linear in the input's rate.
 
@@ -287,15 +277,15 @@ class RateDependentPI(Invertible):
         rate_time_constant="T [s]",
     )
 
-    thresholds: Vector
-    rate_weights: Vector
-    weights: Vector
+    thresholds: fields.Vector
+    rate_weights: fields.Vector
+    weights: fields.Vector
     offset: FiniteFloat = 0.0
-    rate_time_constant: NotNegative = 0.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    rate_time_constant: fields.NotNegative = 0.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)

@@ -31,18 +31,8 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Cost, one_per
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    Initial,
-    StoredInitial,
-    Vector,
-    vector,
-    wide,
-)
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
@@ -50,7 +40,7 @@ from mckibben.blocks.solving import solved_inverse, solved_start
 from mckibben.errors import ModelError
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Triangle(Invertible):
     """A model of cells between levels of the input, one for each pair of intervals.
 
@@ -70,12 +60,12 @@ class Triangle(Invertible):
     increasing = ("levels",)
     parameters = ("weights", "offset")
 
-    levels: Vector
-    weights: Vector
+    levels: fields.Vector
+    weights: fields.Vector
     offset: FiniteFloat = 0.0
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n = len(self.levels) - 1
@@ -83,7 +73,7 @@ class Triangle(Invertible):
             raise ModelError(
                 f"the levels of {self.kind!r} do not increase. Remedy: give two or more, in order."
             )
-        wide(self.input_range)
+        fields.wide(self.input_range)
         if len(self.weights) != n * (n + 1) // 2:
             raise ModelError(
                 f"{self.kind!r} with {n + 1} levels has {len(self.weights)} weights. "
@@ -102,7 +92,7 @@ class Triangle(Invertible):
     def near_diagonal(most: float) -> tuple[Any, ...]:
         """Return the numbers of a loop over 0 to 5 with more weight near the diagonal."""
         weights = [most / (1 + i - j) ** 2 for i in range(5) for j in range(i + 1)]
-        return vector(np.linspace(0.0, 5.0, 6)), tuple(weights), 1.0
+        return fields.vector(np.linspace(0.0, 5.0, 6)), tuple(weights), 1.0
 
 
 def on_diagonal(weights: Sequence[float]) -> Array:
@@ -271,7 +261,7 @@ def _first_output(u: float, memory: tuple[Array, Array]) -> float:
     return state[LAST_OUTPUT]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Preisach(Triangle):
     """Preisach model on a triangular grid.
 
@@ -312,7 +302,7 @@ class Preisach(Triangle):
         found[1:, :n] = np.cumsum(np.cumsum(cells[:, ::-1], axis=1)[:, ::-1], axis=0)
         return np.tril(found, -1)
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+    def initial_state(self, first: Array, initial: fields.Initial | None = None) -> Array:
         """Return the memory before the first sample; refuse a depth or direction that cannot be."""
         state = super().initial_state(first, initial)
         depth, direction = state[0], state[1]
@@ -412,7 +402,7 @@ def ridges_start(coefficients: Array, state: Array, inputs: Array, virgin: bool)
     state[place] = inputs[0]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class KrasnoselskiiPokrovskii(Triangle):
     """Krasnosel'skii-Pokrovskii model on a triangular grid.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, overload
 
@@ -170,7 +171,7 @@ class Block(DrawsItself, Parametrised):
     def _channels(self, *fields: str) -> tuple[Channel, ...]:
         found: list[Channel] = []
         for field in fields:
-            value = getattr(self, field)
+            value = attrgetter(field)(self)
             found += value if isinstance(value, tuple) else [value]
         return tuple(found)
 
@@ -557,6 +558,11 @@ class Block(DrawsItself, Parametrised):
     def save(self, path: str | Path) -> None:
         """Write the block as JSON that a person can read; see `mckibben.load`."""
         saving.save(self, path)
+
+
+def of(path: str) -> Any:
+    """Return a property: an attribute of a part, by its path with dots."""
+    return property(attrgetter(path))
 
 
 def one_per(field: str, more: int = 0) -> Any:

@@ -55,6 +55,14 @@ Rows = Annotated[tuple[Vector, ...], BeforeValidator(rows)]
 Positive = Annotated[FiniteFloat, Gt(0)]
 NotNegative = Annotated[FiniteFloat, Ge(0)]
 
+PositiveVector = Annotated[
+    tuple[Positive, ...], MaxLen(MOST_NUMBERS), BeforeValidator(plain_sequence)
+]
+PositiveRows = Annotated[tuple[PositiveVector, ...], BeforeValidator(rows)]
+
+Scale = tuple[FiniteFloat, Positive]
+"""Centre of a quantity, and half its range."""
+
 NARROWEST_SHARE = 1e-9
 """Least width of an input range as a share of the sizes of its ends."""
 

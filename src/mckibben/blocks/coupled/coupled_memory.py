@@ -21,7 +21,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Block, needs_sample_time
-from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -132,7 +132,7 @@ class CoupledMemory(Block):
     )
 
     lags: Vector
-    thresholds: Rows
+    thresholds: PositiveRows
     readout: Rows
     degree: Annotated[int, Interval(ge=1, le=3)]
     driven: Channels
@@ -152,8 +152,6 @@ class CoupledMemory(Block):
                 f"{self.kind!r} of {n} inputs has thresholds of "
                 f"{[len(row) for row in self.thresholds]}. Remedy: give as many for each input."
             )
-        if any(not r > 0 for row in self.thresholds for r in row):
-            raise ModelError(f"thresholds of {self.kind!r} are not positive. Remedy: correct them.")
         width = readout_width(n, len(self.lags), len(self.thresholds[0]), self.degree, self.crossed)
         if len(self.readout) != len(self.given) or any(len(row) != width for row in self.readout):
             raise ModelError(

@@ -26,7 +26,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Cost
-from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
@@ -305,7 +305,7 @@ class FuzzyNetwork(Invertible):
     )
 
     centres: Rows
-    widths: Rows
+    widths: PositiveRows
     consequents: Vector
     driven: Channels
     given: Channels
@@ -320,10 +320,6 @@ class FuzzyNetwork(Invertible):
             raise ModelError(
                 f"{self.kind!r} of {len(self.inputs)} inputs has centres of {sets} and widths of "
                 f"{[len(row) for row in self.widths]} sets. Remedy: give each input as many of both."
-            )
-        if any(not width > 0 for row in self.widths for width in row):
-            raise ModelError(
-                f"widths of {self.kind!r} are not positive. Remedy: give positive ones."
             )
         wanted = int(np.prod(sets)) * len(self.given) * (len(sets) + self.constants)
         if len(self.consequents) != wanted:

@@ -19,7 +19,7 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, of
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_in import balance_in
@@ -109,6 +109,9 @@ class LoadEstimate(Block):
     """
 
     kind = "load-estimate"
+    ports = ("forward.driven", "forward.given"), ("scheduled",), ("loads",)
+    rate_dependent = of("forward.rate_dependent")
+    n_states = of("forward.n_states")
     kernel = load_estimate_step
     start_kernel = load_estimate_start
     parameters = ("forward",)
@@ -141,33 +144,14 @@ class LoadEstimate(Block):
             )
 
     @property
-    def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether the balance is."""
-        return self.forward.rate_dependent
+    def loads(self) -> tuple[Channel, ...]:
+        """What schedules the balance last."""
+        return self.forward.scheduled[len(self.scheduled) :]
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Displacements, pressures, then what schedules but the loads."""
-        return (*self.forward.driven, *self.forward.given, *self._scheduled)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """What schedules, but the loads."""
-        return tuple(channel.name for channel in self._scheduled)
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Loads."""
-        return self.forward.scheduled[len(self._scheduled) :]
-
-    @property
-    def _scheduled(self) -> tuple[Channel, ...]:
+    def scheduled(self) -> tuple[Channel, ...]:
+        """What else schedules it."""
         return self.forward.scheduled[: len(self.forward.scheduled) - self.forward.n_loads]
-
-    @property
-    def n_states(self) -> int:
-        """The balance's."""
-        return self.forward.n_states
 
     @property
     def n_scratch(self) -> int:

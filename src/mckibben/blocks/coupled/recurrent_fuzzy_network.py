@@ -25,8 +25,8 @@ from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Cost, own_sample_time
-from mckibben.blocks.fields import STRICT, Channel, Channels, Positive, Rows, Vector
+from mckibben.blocks.base import SEVERAL, Block, Cost, of, own_sample_time
+from mckibben.blocks.fields import STRICT, Channel, Channels, Positive, PositiveRows, Rows, Vector
 from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -127,6 +127,8 @@ class RecurrentFuzzyNetwork(Block):
     """
 
     kind = "recurrent-fuzzy-network"
+    sample_time = of("own_time")
+    n_scratch = of("n_regressors")
     ports = SEVERAL
     kernel = recurrent_fuzzy_network_step
     start_kernel = recurrent_start
@@ -168,7 +170,7 @@ class RecurrentFuzzyNetwork(Block):
     )
 
     centres: Rows
-    widths: Rows
+    widths: PositiveRows
     feedbacks: Rows
     consequents: Vector
     own_time: Positive
@@ -193,19 +195,12 @@ class RecurrentFuzzyNetwork(Block):
                 f"{self.kind!r} wants centres, widths and feedbacks of {self.n_regressors} inputs, as "
                 "many sets for each. Remedy: give them."
             )
-        if any(not width > 0 for row in self.widths for width in row):
-            raise ModelError(f"widths of {self.kind!r} are not positive. Remedy: correct them.")
         wanted = self.n_sets**self.n_regressors * (self.n_regressors + 1)
         if len(self.consequents) != wanted:
             raise ModelError(
                 f"{self.kind!r} of this structure has {wanted} consequents, got "
                 f"{len(self.consequents)}. Remedy: give {wanted}."
             )
-
-    @property
-    def sample_time(self) -> float:  # type: ignore[override]
-        """What the network holds for [s]."""
-        return self.own_time
 
     @property
     def n_sets(self) -> int:
@@ -223,11 +218,6 @@ class RecurrentFuzzyNetwork(Block):
         """Past outputs and inputs, and the last memberships."""
         past = self.n_regressors - 1 - len(self.scheduled)
         return past + self.n_regressors * self.n_sets
-
-    @property
-    def n_scratch(self) -> int:
-        """The regressors."""
-        return self.n_regressors
 
     def state_at(self, first: Array, output: Array) -> Array:
         """Return the state at rest at the first inputs, where the output is known."""

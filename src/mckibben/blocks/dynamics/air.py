@@ -159,6 +159,7 @@ class Air(Invertible):
     """
 
     kind = "air"
+    n_inverse_states = 2  # the pressure, and samples clipped
     kernel = air_step
     start_kernel = air_start
     inverse_kernel = air_inverse_step
@@ -252,11 +253,6 @@ class Air(Invertible):
     def start_numbers(self) -> Array:
         """Return the coefficients at a sample time that its dead time allows."""
         return self.coefficients(self.dead_time or 1.0)
-
-    @property
-    def n_inverse_states(self) -> int:
-        """The pressure, and the count of samples clipped; past pressures do not matter."""
-        return 2
 
     def inverse_state(self, state: Array) -> Array:
         """Return the pressure, and no samples clipped."""

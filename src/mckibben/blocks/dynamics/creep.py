@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import needs_sample_time, one_per
-from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Vector
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, PositiveVector, Vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.linear import LinearSystem
@@ -101,7 +101,7 @@ class Creep(Invertible):
     )
 
     compliances: Vector
-    time_constants: Vector
+    time_constants: PositiveVector
     initial: Literal["first_sample", "virgin", "fitted"] = "first_sample"
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT
@@ -112,10 +112,9 @@ class Creep(Invertible):
                 f"{self.kind!r} has {len(self.compliances)} compliances and "
                 f"{len(self.time_constants)} time constants. Remedy: give one to each."
             )
-        if min(self.compliances, default=0.0) < 0 or min(self.time_constants, default=1.0) <= 0:
+        if min(self.compliances, default=0.0) < 0:
             raise ModelError(
-                f"{self.kind!r} has a negative compliance, or a time constant that is not positive. "
-                "Remedy: give compliances of 0 or more, and positive times in seconds."
+                f"{self.kind!r} has a negative compliance. Remedy: give compliances of 0 or more."
             )
 
     def coefficients(self, sample_time: float | None) -> Array:

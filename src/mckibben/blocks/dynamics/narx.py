@@ -201,18 +201,14 @@ class Narx(Block):
     input_lags: Lags
     delay: Lags = 0
     thresholds: fields.Vector = ()
-    input_scale: tuple[FiniteFloat, FiniteFloat]
-    output_scale: tuple[FiniteFloat, FiniteFloat]
+    input_scale: fields.Scale
+    output_scale: fields.Scale
     sample_time: fields.Positive
     initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.PRESSURE
     output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
-        if not (self.input_scale[1] > 0 and self.output_scale[1] > 0):
-            raise ModelError(
-                f"{self.kind!r} has a scale that is not positive. Remedy: give (centre, half range)."
-            )
         check_order(self.kind, self.thresholds)
         if not self.places:
             raise ModelError(f"{self.kind!r} has no regressors. Remedy: give a lag or an operator.")

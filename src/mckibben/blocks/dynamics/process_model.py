@@ -119,7 +119,7 @@ class ProcessModel(Block):
     )
 
     gain: FiniteFloat
-    time_constants: fields.Vector
+    time_constants: fields.PositiveVector
     damping: fields.Positive | None = None
     zero_time: FiniteFloat | None = None
     delay: fields.NotNegative = 0.0
@@ -132,14 +132,10 @@ class ProcessModel(Block):
 
     def __post_init__(self) -> None:
         n = len(self.time_constants)
-        if (
-            not 1 <= n <= 3
-            or min(self.time_constants) <= 0
-            or (self.damping is not None and n != 1)
-        ):
+        if not 1 <= n <= 3 or (self.damping is not None and n != 1):
             raise ModelError(
                 f"{self.kind!r} has the time constants {self.time_constants}. Remedy: give one to three "
-                "positive ones [s], and one alone with a damping."
+                "[s], and one alone with a damping."
             )
 
     @property

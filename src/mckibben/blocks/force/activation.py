@@ -18,6 +18,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Ports, needs_sample_time, rate_filter
+from mckibben.blocks.hysteresis.play_operators import check_order
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -281,15 +282,15 @@ class ActivationMemory(Block):
     )
 
     surface: fields.Vector
-    thresholds: fields.Vector
+    thresholds: fields.PositiveVector
     friction: fields.Vector
     viscosity: tuple[FiniteFloat, FiniteFloat]
     relaxation: fields.Vector
-    time_constants: fields.Vector
+    time_constants: fields.PositiveVector
     degree: Annotated[int, Interval(ge=0, le=9)]
     force_degree: Annotated[int, Interval(ge=0, le=9)]
-    input_scale: tuple[FiniteFloat, FiniteFloat]
-    force_scale: tuple[FiniteFloat, FiniteFloat]
+    input_scale: fields.Scale
+    force_scale: fields.Scale
     rate_time_constant: fields.NotNegative = 0.0
     initial: fields.StoredInitial = "first_sample"
     input: fields.ChannelField = fields.CONTRACTION
@@ -298,26 +299,17 @@ class ActivationMemory(Block):
 
     def __post_init__(self) -> None:
         size = (self.degree + 1) * (self.force_degree + 1)
-        r = np.array(self.thresholds)
-        if len(self.surface) != size or len(self.friction) != 2 * r.size:
+        n = 2 * len(self.thresholds)
+        if len(self.surface) != size or len(self.friction) != n:
             raise ModelError(
                 f"{self.kind!r} has {len(self.surface)} numbers in its surface and "
-                f"{len(self.friction)} of friction. Remedy: give {size} and {2 * r.size}."
+                f"{len(self.friction)} of friction. Remedy: give {size} and {n}."
             )
-        if np.any(np.diff(r, prepend=0.0) <= 0):
-            raise ModelError(
-                f"the thresholds of {self.kind!r} are not 0 < r_0 < r_1 < ... "
-                "Remedy: sort them and drop repeated ones."
-            )
-        taus = self.time_constants
-        if len(self.relaxation) != 2 * len(taus) or min(taus, default=1.0) <= 0:
+        check_order(self.kind, self.thresholds)
+        if len(self.relaxation) != 2 * len(self.time_constants):
             raise ModelError(
                 f"{self.kind!r} has {len(self.relaxation)} numbers of relaxation and the time constants "
-                f"{taus}. Remedy: give two to every positive time constant."
-            )
-        if not (self.input_scale[1] > 0 and self.force_scale[1] > 0):
-            raise ModelError(
-                f"{self.kind!r} has a scale that is not positive. Remedy: give (centre, half range)."
+                f"{self.time_constants}. Remedy: give two to every time constant."
             )
 
     @property

@@ -18,7 +18,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Kernel, Start
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.fields import STRICT, Initial
 from mckibben.blocks.force.laws import ForceLaw, PolynomialForce
 from mckibben.blocks.force.multistate_friction import (
     MultistateFriction,
@@ -88,6 +88,7 @@ class ForceFeedforward(Block):
     """
 
     kind = "force-feedforward"
+    ports = ("law.output",), ("law.input",), ("law.pressure",)
     parameters = ("law", "friction")
     typical = (PolynomialForce((50.0, 5.0), (-10.0, 5.0)), MultistateFriction.example())
     notation = Notation(
@@ -136,19 +137,6 @@ class ForceFeedforward(Block):
     def rate_dependent(self) -> bool:  # type: ignore[override]
         """Whether there is friction."""
         return self.friction is not None
-
-    @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Desired force, then length."""
-        return (self.law.output, self.law.input)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        return (self.law.input.name,)
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        return (self.law.pressure,)
 
     @property
     def kernel(self) -> Kernel:  # type: ignore[override]

@@ -190,7 +190,7 @@ class MultistateFriction(Block):
     )
 
     elements: Annotated[tuple[Direction, ...], BeforeValidator(fields.plain_sequence)]
-    values: fields.Vector
+    values: fields.PositiveVector
     pressure_gain: FiniteFloat = 0.0
     reference_pressure: FiniteFloat = 0.0
     initial: fields.StoredInitial = "first_sample"
@@ -200,7 +200,7 @@ class MultistateFriction(Block):
 
     def __post_init__(self) -> None:
         wanted = sum(SIZES[element] for element in self.elements)
-        if not self.elements or len(self.values) != wanted or min(self.values) <= 0:
+        if not self.elements or len(self.values) != wanted:
             raise ModelError(
                 f"{self.kind!r} with the elements {', '.join(self.elements) or 'none'} has "
                 f"{len(self.values)} values. Remedy: give {wanted} positive ones."

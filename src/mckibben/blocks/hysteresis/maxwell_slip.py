@@ -25,7 +25,6 @@ from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solve_input, solved_start
-from mckibben.errors import ModelError
 
 
 @kernel
@@ -179,7 +178,7 @@ class MaxwellSlip(Invertible):
         scale="s [{u}]",
     )
 
-    breakaways: fields.Vector
+    breakaways: fields.PositiveVector
     weights: fields.Vector
     polynomial: Reversible
     stiffness_ratio: fields.Positive = 1.0
@@ -193,8 +192,6 @@ class MaxwellSlip(Invertible):
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.breakaways, self.weights)
-        if self.breakaways[0] == 0:
-            raise ModelError(f"{self.kind!r} wants limits above 0. Remedy: give positive limits.")
 
     def least_slope(self) -> float:
         softening = float(np.minimum(self.weights, 0.0).sum()) * max(1.0, self.stiffness_ratio)

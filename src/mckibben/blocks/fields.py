@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, MaxLen
+from annotated_types import Ge, Gt, MaxLen, MinLen
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
@@ -41,6 +41,9 @@ Coefficients = Annotated[
     tuple[FiniteFloat, ...], MaxLen(MOST_COEFFICIENTS), BeforeValidator(plain_sequence)
 ]
 """Those of a polynomial."""
+
+PolynomialField = Annotated[Coefficients, MinLen(1)]
+"""A polynomial's ascending coefficients, at least one."""
 
 
 def rows(value: Any) -> Any:

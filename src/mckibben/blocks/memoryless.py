@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated
 
 import numpy as np
-from annotated_types import MinLen
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
@@ -191,10 +189,6 @@ class PiecewiseLinear(Block):
 # -- polynomials -----------------------------------------------------------------------------
 
 
-Reversible = Annotated[fields.Coefficients, MinLen(1)]
-"""Ascending coefficients of a polynomial that increases, as a field of a block."""
-
-
 @kernel
 def horner(x: float, c: Array) -> float:
     """Return the polynomial with ascending coefficients ``c`` at ``x``."""
@@ -298,16 +292,12 @@ class Polynomial(Invertible):
         scale="s [{u}]",
     )
 
-    polynomial: fields.Coefficients
+    polynomial: fields.PolynomialField
     centre: FiniteFloat = 0.0
     scale: fields.Positive = 1.0
     input_range: fields.InputRange | None = None
     input: fields.ChannelField = fields.DISPLACEMENT
     output: fields.ChannelField = fields.DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        if not self.polynomial:
-            raise ModelError("a polynomial without coefficients. Remedy: give at least one.")
 
     def check_invertible(self) -> None:
         if self.input_range is None:

@@ -109,7 +109,7 @@ class TransferFunction(Block):
         noise_deviation=r"\sigma_e [{y}]",
     )
 
-    numerator: fields.Coefficients
+    numerator: fields.PolynomialField
     denominator: fields.Coefficients
     sample_time: fields.Positive
     input_offset: FiniteFloat = 0.0
@@ -120,12 +120,6 @@ class TransferFunction(Block):
     noise_numerator: fields.Coefficients = ()
     noise_denominator: fields.Coefficients = ()
     noise_deviation: fields.NotNegative | None = None
-
-    def __post_init__(self) -> None:
-        if not self.numerator:
-            raise ModelError(
-                f"{self.kind!r} has no numerator. Remedy: give one coefficient or more."
-            )
 
     @property
     def n_states(self) -> int:

@@ -121,19 +121,13 @@ class PolynomialForce(ForceLaw):
         output="f",
     )
 
-    per_bar: fields.Vector
-    elastic: fields.Vector
+    per_bar: fields.PolynomialField
+    elastic: fields.PolynomialField
     centre: FiniteFloat = 0.0
     scale: fields.Positive = 1.0
     input: fields.ChannelField = fields.LENGTH
     pressure: fields.ChannelField = fields.PRESSURE
     output: fields.ChannelField = fields.FORCE
-
-    def __post_init__(self) -> None:
-        if not self.per_bar or not self.elastic:
-            raise ModelError(
-                f"{self.kind!r} has an empty polynomial. Remedy: give one coefficient or more to each."
-            )
 
     def coefficients(self, sample_time: float | None) -> Array:
         return np.array([self.centre, self.scale, len(self.per_bar), *self.per_bar, *self.elastic])

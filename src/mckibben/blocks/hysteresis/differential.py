@@ -40,7 +40,7 @@ from mckibben.blocks import fields
 from mckibben.blocks.base import Start
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import Step, kernel, step
-from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
+from mckibben.blocks.memoryless import least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_inverse
 from mckibben.errors import ModelError
@@ -207,7 +207,7 @@ class BoucWen(Loop):
         scale="s [{u}]",
     )
 
-    polynomial: Reversible
+    polynomial: fields.PolynomialField
     weight: FiniteFloat
     rate: fields.Positive
     sigma: Annotated[FiniteFloat, Ge(0.5)]
@@ -295,7 +295,7 @@ class GeneralizedBoucWen(Loop):
         scale="s [{u}]",
     )
 
-    polynomial: Reversible
+    polynomial: fields.PolynomialField
     weight: FiniteFloat
     rate: fields.Positive
     shape: fields.Vector
@@ -404,8 +404,8 @@ class Duhem(Loop):
         scale="s [{u}]",
     )
 
-    target: Reversible
-    slope: Reversible
+    target: fields.PolynomialField
+    slope: fields.PolynomialField
     alpha: fields.Positive
     centre: FiniteFloat = 0.0
     scale: fields.Positive = 1.0

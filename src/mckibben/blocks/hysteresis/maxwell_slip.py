@@ -22,7 +22,7 @@ from mckibben.blocks.base import one_per
 from mckibben.blocks.hysteresis.play_operators import check_thresholds
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import accumulate, kernel, step
-from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
+from mckibben.blocks.memoryless import least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solve_input, solved_start
 
@@ -180,7 +180,7 @@ class MaxwellSlip(Invertible):
 
     breakaways: fields.PositiveVector
     weights: fields.Vector
-    polynomial: Reversible
+    polynomial: fields.PolynomialField
     stiffness_ratio: fields.Positive = 1.0
     limit_ratio: fields.Positive = 1.0
     centre: FiniteFloat = 0.0

@@ -149,8 +149,12 @@ def move_to(target: float, way: float, limit: float, r: Array, w: Array, s: Arra
         z = (target - still + way * moving) / slope
         if i + 1 == n or way * z <= way * s[i + 1] + r[i + 1]:
             break
-    for i in range(n):
-        s[i] = max(s[i], min(z, limit) - r[i]) if way > 0.0 else min(s[i], max(z, limit) + r[i])
+    if way > 0.0:
+        for i in range(n):
+            s[i] = max(s[i], min(z, limit) - r[i])
+    else:
+        for i in range(n):
+            s[i] = min(s[i], max(z, limit) + r[i])
     return z
 
 

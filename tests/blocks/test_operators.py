@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from mckibben import EUPI, GPI, PiecewiseLinear, Play
 from mckibben.blocks.hysteresis.eupi import eupi_matrix
-from mckibben.blocks.hysteresis.gpi import gpi_matrix
 from mckibben.blocks.hysteresis.maxwell_slip import slip_matrix
 from mckibben.blocks.hysteresis.play_operators import play_matrix
 from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach
@@ -43,7 +42,7 @@ def test_starts() -> None:
 def test_play_operators_side_by_side_are_single_operators(u: Array, steps: list[float]) -> None:
     r = np.cumsum(steps)
     operators = np.empty((u.size, r.size))
-    play_matrix(u, r, u[0] - r, operators)
+    play_matrix(u, u, u, r, u[0] - r, operators)
     for column, threshold in zip(operators.T, r.tolist(), strict=True):
         np.testing.assert_array_equal(column, Play(threshold).simulate(u))
 
@@ -53,7 +52,7 @@ def test_play_operators_side_by_side_are_single_operators(u: Array, steps: list[
 def test_generalised_operators_side_by_side_are_the_model(model: GPI, u: Array) -> None:
     r, rising, falling = np.array(model.thresholds), model.rising(u), model.falling(u)
     operators = np.empty((u.size, r.size))
-    gpi_matrix(u, rising, falling, r, rising[0] - r, operators)
+    play_matrix(u, rising, falling, r, rising[0] - r, operators)
     np.testing.assert_allclose(operators @ model.weights, model.simulate(u), atol=1e-10)
 
 

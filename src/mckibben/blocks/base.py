@@ -7,11 +7,12 @@ else here is built on that.
 
 from __future__ import annotations
 
-from abc import abstractmethod
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, overload
+from typing import Any, ClassVar, Protocol, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +22,7 @@ from mckibben.blocks import saving
 from mckibben.blocks.fields import Channel, Initial
 from mckibben.blocks.kernels import Step, in_scratch
 from mckibben.blocks.linear import LinearSystem, Polynomials, as_control, as_scipy
-from mckibben.blocks.parameters import Parametrised
+from mckibben.blocks.parameters import Parametrised, gathered
 from mckibben.blocks.running import Stream, refuse_time, run_many
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
@@ -101,6 +102,12 @@ class Block(DrawsItself, Parametrised):
     ports: ClassVar[Ports] = ("input",), (), ("output",)
     """Fields of the channels driven, of those that schedule, and of those given."""
 
+    layout: ClassVar[tuple[str, ...]] = ()
+    """Attributes whose numbers the kernel reads, in order; its parameters where none are named."""
+
+    typical: ClassVar[tuple[Any, ...]]
+    """Arguments of `example`."""
+
     rate_dependent: ClassVar[bool] = False
     """Whether the sample time matters to any block of this class."""
 
@@ -171,7 +178,7 @@ class Block(DrawsItself, Parametrised):
     def _channels(self, *fields: str) -> tuple[Channel, ...]:
         found: list[Channel] = []
         for field in fields:
-            value = getattr(self, field)
+            value = attrgetter(field)(self)
             found += value if isinstance(value, tuple) else [value]
         return tuple(found)
 
@@ -262,13 +269,20 @@ class Block(DrawsItself, Parametrised):
     # -- its kernel --------------------------------------------------------------------------
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the numbers that the kernel reads, one-dimensional; by default the parameters."""
+        """Return the numbers that the kernel reads, one-dimensional; by default those of `layout`.
+
+        Raises
+        ------
+        ModelError
+            If the block has no kernel: it is composed of others, each of which has its own.
+        """
+        del sample_time
         if getattr(self, "kernel", None) is None:
             raise ModelError(
                 f"{self.kind!r} is neither one kernel nor a composition, so it cannot be exported. "
                 "Remedy: compose it of blocks."
             )
-        return self.pack()
+        return gathered(self, self.layout) if self.layout else self.pack()
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs the block over ``inputs`` into ``outputs``, changing ``state``.
@@ -351,9 +365,9 @@ class Block(DrawsItself, Parametrised):
     to_control = as_control
 
     @classmethod
-    @abstractmethod
-    def example(cls) -> Block:
+    def example(cls) -> Self:
         """Return a small, typical block of this class, for documentation and contract tests."""
+        return cls(*cls.typical)
 
     # -- running -----------------------------------------------------------------------------
 
@@ -525,6 +539,15 @@ class Block(DrawsItself, Parametrised):
         saving.save(self, path)
 
 
+def one_per(field: str, more: int = 0) -> Any:
+    """Return a property: how many numbers a field has, and ``more``."""
+
+    def size(block: Block) -> int:
+        return len(getattr(block, field)) + more
+
+    return property(size)
+
+
 def explicit_state(block: Block, initial: Initial) -> Array:
     """Return an explicit initial state after checking its length."""
     if isinstance(initial, str):
@@ -554,6 +577,12 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
             "Remedy: read the recording with a time column or --rate, or give sample_time."
         )
     return sample_time
+
+
+def rate_filter(time_constant: float, step: float) -> tuple[float, float]:
+    """Return what a first-order filter of a rate keeps over a step, and its gain of the change."""
+    smoothing = math.exp(-step / time_constant) if time_constant > 0 else 0.0
+    return smoothing, (1 - smoothing) / step
 
 
 def own_sample_time(kind: str, own: float, sample_time: float | None) -> float:

@@ -222,17 +222,17 @@ class Composition(Block):
             )
 
     @cached_property
-    def layout(self) -> Layout:
+    def wiring(self) -> Layout:
         """What the parts do, in order."""
         return Layout(self)
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the parts' states, each started from the first sample that reaches it."""
-        return self.layout.initial_state(first, initial)
+        return self.wiring.initial_state(first, initial)
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs the parts in order."""
-        return self.layout.bind(sample_time, state, inputs, outputs)
+        return self.wiring.bind(sample_time, state, inputs, outputs)
 
 
 @dataclass(frozen=True, config=STRICT)

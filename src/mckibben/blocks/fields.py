@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, MaxLen
+from annotated_types import Ge, Gt, MaxLen, MinLen
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
@@ -38,6 +38,9 @@ Coefficients = Annotated[
 ]
 """Those of a polynomial."""
 
+PolynomialField = Annotated[Coefficients, MinLen(1)]
+"""A polynomial's ascending coefficients, at least one."""
+
 
 def rows(value: Any) -> Any:
     """Return a table of numbers as a field of a block holds it."""
@@ -53,6 +56,14 @@ LONGEST_DELAY = 254
 
 Positive = Annotated[FiniteFloat, Gt(0)]
 NotNegative = Annotated[FiniteFloat, Ge(0)]
+
+PositiveVector = Annotated[
+    tuple[Positive, ...], MaxLen(MOST_NUMBERS), BeforeValidator(plain_sequence)
+]
+PositiveRows = Annotated[tuple[PositiveVector, ...], BeforeValidator(rows)]
+
+Scale = tuple[FiniteFloat, Positive]
+"""Centre of a quantity, and half its range."""
 
 NARROWEST_SHARE = 1e-9
 """Least width of an input range as a share of the sizes of its ends."""

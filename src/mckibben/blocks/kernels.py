@@ -59,6 +59,15 @@ def accumulate(total: float, change: float, lost: Array, place: int) -> float:
     return total + change
 
 
+@kernel
+def remember(latest: float, past: Array) -> None:
+    """Put a number before past ones, of which the last is forgotten."""
+    for k in range(past.size - 1, 0, -1):
+        past[k] = past[k - 1]
+    if past.size > 0:
+        past[0] = latest
+
+
 DERIVED = False
 """Whether derivatives are taken: true in the twins of `mckibben.blocks.complex_step` alone. What
 ``if DERIVED:`` guards is neither compiled nor translated to C."""

@@ -80,20 +80,9 @@ def examples() -> dict[str, Block]:
 
 @dataclass
 class Trial:
-    """A block, inputs to try it on, and what it makes of them.
+    """A block, inputs to try it on, shape (n, n_inputs), and its outputs.
 
-    Parameters
-    ----------
-    block : Block
-        What is tried.
-    sample_time : float
-        Time between samples [s].
-    inputs : array, shape (n, n_inputs)
-        A path with minor loops and holds.
-    rng : Generator
-        Where chance comes from.
-    pace : int
-        Samples from one turning point to the next, on average.
+    Turning points of inputs are ``pace`` samples from each other, on average.
     """
 
     block: Block
@@ -181,11 +170,7 @@ def narrowed(lowest: Array, highest: Array) -> tuple[Array, Array]:
 def wander(
     lowest: Array, highest: Array, rng: np.random.Generator, pace: int, n_turns: int = 24
 ) -> Array:
-    """Return a path between random turning points, shape (n, n_channels), with a hold at each.
-
-    Turning points are within ``lowest`` and ``highest``, shape (n_channels,), ``pace`` samples from each
-    other on average.
-    """
+    """Return a path between random turning points in a range, shape (n, n_channels), holding at each."""
     turns = rng.uniform(lowest, highest, (n_turns, lowest.size))
     return through(turns, rng.integers(pace // 2, pace * 3 // 2 + 1, n_turns - 1))
 

@@ -37,7 +37,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.hysteresis.play_operators import follow
-from mckibben.blocks.kernels import Step, kernel
+from mckibben.blocks.kernels import Step, kernel, step
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block, Start
@@ -441,6 +441,39 @@ def follow_learning(
         last[1] += 1.0
     last[0] = y
     return way
+
+
+def learning_kernels(
+    inverse_start: Start, take: Callable[..., float], before: int
+) -> tuple[Step, Start]:
+    """Return step and start of an inverse that learns its weights and an offset.
+
+    ``take(way, c, state, n)`` takes, and returns, the input of the operators' edge where the reference
+    goes a way, by the inverse's coefficients, whose thresholds are from 3 on; between operators and
+    previous reference its state has ``before`` numbers.
+    """
+
+    def adaptive_step(
+        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+    ) -> None:
+        """Invert, and learn the weights and an offset from what is measured."""
+        n = int(coefficients[0]) - 1
+        own = coefficients[inverse_at(coefficients) :]
+        last, learnt = state[n + before : n + before + 3], state[n + before + 3 :]
+        way = follow_learning(
+            coefficients, own[3 : n + 3], state[:n], last, learnt, scratch, inputs[0], inputs[1]
+        )
+        outputs[0] = take(way, own, state, n)
+
+    def adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start as the inverse does, with the weights as fitted."""
+        last = int(coefficients[0]) - 1 + before
+        own = coefficients[inverse_at(coefficients) :]
+        inverse_start(own, state[: last + 2], inputs, virgin)
+        state[last + 2] = 0.0
+        start_learning(coefficients, state[last + 3 :])
+
+    return step(adaptive_step), kernel(adaptive_start)
 
 
 @kernel

@@ -7,26 +7,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from annotated_types import Ge, Gt, MinLen
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Start
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    Coefficients,
-    InputRange,
-    Vector,
-)
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block
 from mckibben.blocks.inverse import Invertible, nothing_clipped
-from mckibben.blocks.kernels import DERIVED, SLACK, Step, improved, inlined, kernel, step
+from mckibben.blocks.kernels import DERIVED, SLACK, improved, inlined, kernel, step
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation, summed
 from mckibben.blocks.solving import newton
@@ -41,7 +31,7 @@ def affine_step(coefficients: Array, state: Array, inputs: Array, outputs: Array
     outputs[0] = coefficients[0] * inputs[0] + coefficients[1]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Affine(Block):
     """Gain and offset, y = gain u + offset.
 
@@ -58,15 +48,16 @@ class Affine(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "affine"
-    kernel: ClassVar[Step] = affine_step
-    parameters: ClassVar[tuple[str, ...]] = ("gain", "offset")
-    notation: ClassVar[Notation] = Notation("y = K u + y_0", gain="K [{y}/{u}]", offset="y_0 [{y}]")
+    kind = "affine"
+    kernel = affine_step
+    parameters = ("gain", "offset")
+    typical = (6.8, -1.5)
+    notation = Notation("y = K u + y_0", gain="K [{y}/{u}]", offset="y_0 [{y}]")
 
     gain: FiniteFloat
     offset: FiniteFloat = 0.0
-    input: ChannelField = DISPLACEMENT
-    output: ChannelField = DISPLACEMENT
+    input: fields.ChannelField = fields.DISPLACEMENT
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def inverse(self) -> Affine:
         if self.gain == 0:
@@ -81,10 +72,6 @@ class Affine(Block):
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         return LinearSystem.gain(self.gain, self.offset)
 
-    @classmethod
-    def example(cls) -> Self:
-        return cls(6.8, -1.5)
-
 
 @step
 def negative_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
@@ -92,7 +79,7 @@ def negative_step(coefficients: Array, state: Array, inputs: Array, outputs: Arr
     outputs[0] = -inputs[0]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Negative(Block):
     """y = -u, for outputs that fall while the input rises, such as a muscle's length.
 
@@ -102,22 +89,19 @@ class Negative(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "negative"
-    kernel: ClassVar[Step] = negative_step
-    notation: ClassVar[Notation] = Notation("y = -u")
+    kind = "negative"
+    kernel = negative_step
+    typical = ()
+    notation = Notation("y = -u")
 
-    input: ChannelField = DISPLACEMENT
-    output: ChannelField = DISPLACEMENT
+    input: fields.ChannelField = fields.DISPLACEMENT
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def inverse(self) -> Negative:
         return Negative(self.output, self.input)
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         return LinearSystem.gain(-1.0)
-
-    @classmethod
-    def example(cls) -> Self:
-        return cls()
 
 
 # -- straight pieces -------------------------------------------------------------------------
@@ -161,12 +145,11 @@ def piecewise_linear_step(coefficients: Array, state: Array, inputs: Array, outp
     outputs[0] = interpolate(inputs[0], coefficients[:n], coefficients[n:])
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class PiecewiseLinear(Block):
     """Straight lines between knots, continued beyond the first and the last.
 
-    A superposition of dead zones: after a Prandtl-Ishlinskii model it makes the modified one (MPI), with
-    an inverse of the same form.
+    After a Prandtl-Ishlinskii model it makes the modified one (MPI).
 
     Parameters
     ----------
@@ -178,41 +161,32 @@ class PiecewiseLinear(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "piecewise-linear"
-    kernel: ClassVar[Step] = piecewise_linear_step
+    kind = "piecewise-linear"
+    kernel = piecewise_linear_step
     increasing = ("knots", "values")
-    parameters: ClassVar[tuple[str, ...]] = ("values",)
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("values",)
+    layout = ("knots", "values")
+    typical = ((0.0, 5.0, 15.0, 25.0), (0.0, 8.0, 20.0, 24.0))
+    notation = Notation(
         r"y = v_k + (v_{k+1} - v_k) \frac{u - \xi_k}{\xi_{k+1} - \xi_k},\quad \xi_k \le u "
         r"\le \xi_{k+1}",
         knots=r"\xi_k [{u}]",
         values="v_k [{y}]",
     )
 
-    knots: Vector
-    values: Vector
-    input: ChannelField = DISPLACEMENT
-    output: ChannelField = DISPLACEMENT
+    knots: fields.Vector
+    values: fields.Vector
+    input: fields.ChannelField = fields.DISPLACEMENT
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_increasing(f"{self.kind} block", self.knots, self.values)
 
-    def coefficients(self, sample_time: float | None) -> Array:
-        return np.array([*self.knots, *self.values])
-
     def inverse(self) -> PiecewiseLinear:
         return PiecewiseLinear(self.values, self.knots, self.output, self.input)
 
-    @classmethod
-    def example(cls) -> Self:
-        return cls((0.0, 5.0, 15.0, 25.0), (0.0, 8.0, 20.0, 24.0))
-
 
 # -- polynomials -----------------------------------------------------------------------------
-
-
-Reversible = Annotated[Coefficients, MinLen(1)]
-"""Ascending coefficients of a polynomial that increases, as a field of a block."""
 
 
 @kernel
@@ -243,11 +217,17 @@ def least_slope(
     polynomial: Sequence[float], centre: float, scale: float, limits: tuple[float, float]
 ) -> float:
     """Return the least derivative by the input over a range of inputs."""
-    slope = np.polynomial.Polynomial(polynomial).deriv()
     low, high = ((end - centre) / scale for end in limits)
+    return float(np.min(slopes_at(polynomial, low, high))) / scale
+
+
+def slopes_at(polynomial: Sequence[float], low: float, high: float) -> Array:
+    """Return a polynomial's slopes at both ends of a range, and where they turn in it."""
+    slope = np.polynomial.Polynomial(polynomial).deriv()
     turns = np.asarray(slope.deriv().roots(), dtype=np.complex128)
-    at = np.array([low, high, *turns.real[np.abs(turns.imag) < 1e-9].clip(low, high)])
-    return float(np.min(slope(at))) / scale
+    return np.asarray(
+        slope(np.array([low, high, *turns.real[np.abs(turns.imag) < 1e-9].clip(low, high)]))
+    )
 
 
 @step
@@ -257,9 +237,7 @@ def polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: A
 
 
 @step
-def polynomial_inverse_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def undo_polynomial(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Invert an increasing polynomial; the state is the count of samples clipped.
 
     Coefficients are [centre, scale, lowest, highest argument, ascending coefficients].
@@ -278,7 +256,7 @@ def polynomial_inverse_step(
     outputs[0] = coefficients[0] + coefficients[1] * x
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Polynomial(Invertible):
     """Polynomial of a centred and scaled input.
 
@@ -300,41 +278,33 @@ class Polynomial(Invertible):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "polynomial"
-    kernel: ClassVar[Step] = polynomial_step
-    inverse_kernel: ClassVar[Step] = polynomial_inverse_step
-    inverse_start_kernel: ClassVar[Start] = nothing_clipped
-    parameters: ClassVar[tuple[str, ...]] = ("polynomial",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "polynomial"
+    kernel = polynomial_step
+    inverse_kernel = undo_polynomial
+    inverse_start_kernel = nothing_clipped
+    parameters = ("polynomial",)
+    layout = ("centre", "scale", "polynomial")
+    typical = ((12.0, 20.0, 3.0, -4.0), 5.0, 5.0, (0.0, 10.0))
+    notation = Notation(
         r"y = \sum_{k} c_k x^k,\quad x = \frac{u - m}{s}",
         polynomial="c_k from 0 [{y}]",
         centre="m [{u}]",
         scale="s [{u}]",
     )
 
-    polynomial: Coefficients
+    polynomial: fields.PolynomialField
     centre: FiniteFloat = 0.0
-    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: InputRange | None = None
-    input: ChannelField = DISPLACEMENT
-    output: ChannelField = DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        if not self.polynomial:
-            raise ModelError("a polynomial without coefficients. Remedy: give at least one.")
-
-    def coefficients(self, sample_time: float | None) -> Array:
-        return np.array([self.centre, self.scale, *self.polynomial])
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    input: fields.ChannelField = fields.DISPLACEMENT
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def check_invertible(self) -> None:
         if self.input_range is None:
             raise ModelError(
                 "'polynomial' has no inverse without an input range. Remedy: give input_range."
             )
-        low, high = self._arguments()
-        slope = np.polynomial.Polynomial(self.polynomial).deriv()
-        turns = np.asarray(slope.deriv().roots(), dtype=np.complex128)
-        slopes = slope(np.array([low, high, *turns.real[turns.imag == 0].clip(low, high)]))
+        slopes = slopes_at(self.polynomial, *self._arguments())
         if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:
             raise ModelError(
                 "'polynomial' has no inverse: it does not increase over its whole input range. Remedy: "
@@ -353,16 +323,11 @@ class Polynomial(Invertible):
         powers = ["", "x", *(f"x^{{{k}}}" for k in range(2, len(self.polynomial)))]
         return (f"y = {summed(list(zip(self.polynomial, powers, strict=False)))}",)
 
-    @classmethod
-    def example(cls) -> Self:
-        """Return a cubic that increases over 0 to 10."""
-        return cls((12.0, 20.0, 3.0, -4.0), 5.0, 5.0, (0.0, 10.0))
-
 
 # -- logarithm and exponential ---------------------------------------------------------------
 
 FLOOR = 0.05
-"""Of u + offset, where the logarithm turns into its tangent, so that every input has an output."""
+"""Of u + offset, where the logarithm turns into its tangent."""
 
 
 @step
@@ -381,8 +346,20 @@ def exponential_step(coefficients: Array, state: Array, inputs: Array, outputs: 
     outputs[0] = x - coefficients[0]
 
 
-@dataclass(frozen=True, config=STRICT)
-class Logarithm(Block):
+@dataclass(frozen=True, config=fields.STRICT)
+class Raised(Block):
+    """A logarithm of a raised input, or what undoes it."""
+
+    parameters = ("offset",)
+    typical = (0.5,)
+
+    offset: fields.NotNegative = 0.0
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.PRESSURE
+
+
+@dataclass(frozen=True, config=fields.STRICT)
+class Logarithm(Raised):
     """Logarithm of a raised input.
 
     Friction in a muscle grows in proportion to pressure, so play operators of constant threshold belong
@@ -397,25 +374,16 @@ class Logarithm(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "logarithm"
-    kernel: ClassVar[Step] = logarithm_step
-    parameters: ClassVar[tuple[str, ...]] = ("offset",)
-    notation: ClassVar[Notation] = Notation(r"y = \ln(u + c)", offset="c [{u}]")
-
-    offset: Annotated[FiniteFloat, Ge(0)] = 0.0
-    input: ChannelField = PRESSURE
-    output: ChannelField = PRESSURE
+    kind = "logarithm"
+    kernel = logarithm_step
+    notation = Notation(r"y = \ln(u + c)", offset="c [{u}]")
 
     def inverse(self) -> Block:
         return Exponential(self.offset, self.output, self.input)
 
-    @classmethod
-    def example(cls) -> Self:
-        return cls(0.5)
 
-
-@dataclass(frozen=True, config=STRICT)
-class Exponential(Block):
+@dataclass(frozen=True, config=fields.STRICT)
+class Exponential(Raised):
     """What undoes a `Logarithm`.
 
     Parameters
@@ -426,21 +394,12 @@ class Exponential(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "exponential"
-    kernel: ClassVar[Step] = exponential_step
-    parameters: ClassVar[tuple[str, ...]] = ("offset",)
-    notation: ClassVar[Notation] = Notation("y = e^{u} - c", offset="c [{y}]")
-
-    offset: Annotated[FiniteFloat, Ge(0)] = 0.0
-    input: ChannelField = PRESSURE
-    output: ChannelField = PRESSURE
+    kind = "exponential"
+    kernel = exponential_step
+    notation = Notation("y = e^{u} - c", offset="c [{y}]")
 
     def inverse(self) -> Block:
         return Logarithm(self.offset, self.output, self.input)
-
-    @classmethod
-    def example(cls) -> Self:
-        return cls(0.5)
 
 
 # -- contact ---------------------------------------------------------------------------------
@@ -482,7 +441,7 @@ def contact_inverse_step(coefficients: Array, state: Array, inputs: Array, outpu
     outputs[0] = u if inputs[0] >= 0.0 else -u
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Contact(Invertible):
     """Dead zone of small pressures, which only fill the bladder towards the braid.
 
@@ -496,22 +455,19 @@ class Contact(Invertible):
         Channel driven, and what of it acts.
     """
 
-    kind: ClassVar[str] = "contact"
-    kernel: ClassVar[Step] = contact_step
-    inverse_kernel: ClassVar[Step] = contact_inverse_step
-    counts_clipped: ClassVar[bool] = False
-    parameters: ClassVar[tuple[str, ...]] = ("pressure",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "contact"
+    kernel = contact_step
+    inverse_kernel = contact_inverse_step
+    counts_clipped = False
+    parameters = ("pressure",)
+    typical = (0.125,)
+    notation = Notation(
         r"y = u - \frac{19}{20}\, c \left(1 - e^{-|u| / c}\right) \operatorname{sgn} u",
         pressure="c [{u}]",
         output="y",
         input="u",
     )
 
-    pressure: Annotated[FiniteFloat, Gt(0)]
-    input: ChannelField = PRESSURE
-    output: ChannelField = PRESSURE
-
-    @classmethod
-    def example(cls) -> Self:
-        return cls(0.125)
+    pressure: fields.Positive
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.PRESSURE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABCMeta
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, replace
 from functools import wraps
 from inspect import isfunction
@@ -129,10 +129,7 @@ class Parametrised(metaclass=Checked):
 
     def pack(self) -> Array:
         """Return the parameters as a vector, shape (n_parameters,); structure stays outside."""
-        numbers: list[float] = []
-        for name in self.parameters:
-            _gather(getattr(self, name), numbers)
-        return np.array(numbers, dtype=np.float64)
+        return gathered(self, self.parameters)
 
     def unpack(self, parameters: ArrayLike) -> Self:
         """Return the same structure with other parameters, shape (n_parameters,).
@@ -152,6 +149,14 @@ def same_as(path: str) -> Any:
     return property(attrgetter(path), doc=f"``{path}``")
 
 
+def gathered(part: Parametrised, names: Iterable[str]) -> Array:
+    """Return the numbers of attributes in one vector."""
+    numbers: list[float] = []
+    for name in names:
+        _gather(getattr(part, name), numbers)
+    return np.array(numbers, dtype=np.float64)
+
+
 def parameter_vector(part: Parametrised, parameters: ArrayLike) -> Array:
     """Return a parameter vector after checking its length."""
     vector = np.asarray(parameters, dtype=np.float64)
@@ -164,7 +169,7 @@ def parameter_vector(part: Parametrised, parameters: ArrayLike) -> Array:
 
 
 def _gather(value: Any, numbers: list[float]) -> None:
-    if type(value) is float:
+    if isinstance(value, float | int):
         numbers.append(value)
     elif type(value) is not tuple:
         numbers.extend(() if value is None else value.pack().tolist())

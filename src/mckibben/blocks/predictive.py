@@ -127,7 +127,7 @@ def gpi_resume(coefficients: Array, memory: Array, state: Array) -> None:
     n, y = memory.size - 1, 0.0
     for i in range(n):
         state[i] = memory[i]
-        y += coefficients[4 + n + i] * memory[i]
+        y += coefficients[1 + n + i] * memory[i]
     state[n], state[n + 1], state[n + 2] = memory[n], y, 0.0
 
 

@@ -13,16 +13,16 @@ from __future__ import annotations
 
 import math
 from itertools import combinations_with_replacement
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
 from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Ports, Start, needs_sample_time
-from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.base import SEVERAL, Block, needs_sample_time
+from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -111,12 +111,16 @@ class CoupledMemory(Block):
         Whether there are products of inputs with other lags and plays.
     """
 
-    kind: ClassVar[str] = "coupled-memory"
-    ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Step] = coupled_memory_step
-    start_kernel: ClassVar[Start] = coupled_memory_start
-    parameters: ClassVar[tuple[str, ...]] = ("readout",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "coupled-memory"
+    ports = SEVERAL
+    kernel = coupled_memory_step
+    start_kernel = coupled_memory_start
+    parameters = ("readout",)
+    no_inverse = (
+        "has no inverse: its lags cannot be undone within a sample. "
+        "Remedy: invert balance or sdchm, or close a loop."
+    )
+    notation = Notation(
         r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
         r"y_j = R_j \cdot \left(1,\; x,\; z,\; x_{1i} x_{1k},\; x_{1i} x_{1k} x_{1q},\; "
         r"x_{1i} x_{lk},\; x_{1i} z_{lkm}\right)",
@@ -128,7 +132,7 @@ class CoupledMemory(Block):
     )
 
     lags: Vector
-    thresholds: Rows
+    thresholds: PositiveRows
     readout: Rows
     degree: Annotated[int, Interval(ge=1, le=3)]
     driven: Channels
@@ -148,8 +152,6 @@ class CoupledMemory(Block):
                 f"{self.kind!r} of {n} inputs has thresholds of "
                 f"{[len(row) for row in self.thresholds]}. Remedy: give as many for each input."
             )
-        if any(not r > 0 for row in self.thresholds for r in row):
-            raise ModelError(f"thresholds of {self.kind!r} are not positive. Remedy: correct them.")
         width = readout_width(n, len(self.lags), len(self.thresholds[0]), self.degree, self.crossed)
         if len(self.readout) != len(self.given) or any(len(row) != width for row in self.readout):
             raise ModelError(
@@ -174,19 +176,6 @@ class CoupledMemory(Block):
         decays = [math.exp(-step / tau) if tau else 0.0 for tau in self.lags]
         radii = np.array(self.thresholds).ravel()
         return np.concatenate([head, decays, radii, self.pack()])
-
-    def inverse(self) -> Block:
-        """Refuse: lags cannot be undone at once, and outputs need not be as many as inputs.
-
-        Raises
-        ------
-        ModelError
-            Always.
-        """
-        raise ModelError(
-            f"{self.kind!r} has no inverse: its lags cannot be undone within a sample. "
-            "Remedy: invert balance or sdchm, or close a loop."
-        )
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a number: a readout is the output per inputs multiplied."""

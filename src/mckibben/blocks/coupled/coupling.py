@@ -8,15 +8,15 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (8) and (14).
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Ports
+from mckibben.blocks.base import Block
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, rows
-from mckibben.blocks.kernels import Step, step
+from mckibben.blocks.kernels import step
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -49,11 +49,11 @@ class Coupling(Block):
         Channels driven and channels given.
     """
 
-    kind: ClassVar[str] = "coupling"
-    ports: ClassVar[Ports] = ("driven",), (), ("given",)
-    kernel: ClassVar[Step] = coupling_step
-    parameters: ClassVar[tuple[str, ...]] = ("gains",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "coupling"
+    ports = ("driven",), (), ("given",)
+    kernel = coupling_step
+    parameters = ("gains",)
+    notation = Notation(
         r"h_j = \sum_i G_{ij} v_i",
         gains="G_{ij} [{out1}/{in0}]",
         driven="v_i",
@@ -80,7 +80,6 @@ class Coupling(Block):
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return G^T, row after row."""
-        del sample_time
         return np.ascontiguousarray(self.matrix.T).ravel()
 
     @property
@@ -117,7 +116,6 @@ class Coupling(Block):
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the gains."""
-        del sample_time
         return LinearSystem.gain(np.array(self.gains).T)
 
     @classmethod

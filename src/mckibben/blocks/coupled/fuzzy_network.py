@@ -3,12 +3,11 @@
 Every input has Gaussian sets; a rule is one set of each input, fires by their product, and answers
 with a linear function of all inputs; answers are weighted by normalised firing. Since there is a rule
 for every combination, the normalised firing of a rule is the product of memberships normalised input
-by input, which is how it is computed: in the log domain, where nothing underflows far from all centres.
+by input, which are computed in the log domain, where nothing underflows far from all centres.
 
-The inverse needs the answer and its slopes again and again for the same scheduling inputs. So these are
-contracted away once a sample: what is left are rules of the driven inputs alone, each the mean of those
-it stands for, weighted by their firing. Slopes are exact: with mu_s the normalised memberships of an
-input x_i, of Gaussian sets at c_s of width w_s,
+For the inverse, known scheduling inputs are contracted away once a sample: what is left are rules of the
+driven inputs alone, each the mean of those it stands for, weighted by their firing. Slopes are exact:
+with mu_s the normalised memberships of an input x_i, of Gaussian sets at c_s of width w_s,
 
     d ln mu_s / d x_i = sum_r mu_r (x_i - c_r) / w_r^2 - (x_i - c_s) / w_s^2.
 
@@ -20,16 +19,16 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Cost, Ports, Start
-from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
+from mckibben.blocks.base import SEVERAL, Cost
+from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, Step, kernel, step
+from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import eliminate, newton_cost
 from mckibben.errors import ModelError
@@ -65,15 +64,12 @@ def fill_memberships(x: float, centres: Array, widths: Array, memberships: Array
 def fill_between(c: Array, first: int, last: int, x: Array, memberships: Array) -> int:
     """Fill the memberships of inputs ``first`` to ``last`` alone; return the combinations of their sets.
 
-    ``c`` is what `answer` reads; ``x`` begins at the first of these inputs, memberships at that of all.
+    ``c`` is what `contract` reads; ``x`` begins at the first of these inputs.
     """
-    n, most = int(c[0]), int(c[4])
-    at, n_sets, combinations = 5 + n, 0, 1
-    for i in range(n):
-        sets = int(c[5 + i])
-        n_sets += sets
-        if i < first:
-            at += sets
+    n, n_sets, most = int(c[0]), int(c[2]), int(c[4])
+    at, combinations = 5 + n, 1
+    for i in range(first):
+        at += int(c[5 + i])
     for i in range(first, last):
         sets = int(c[5 + i])
         fill_memberships(
@@ -88,71 +84,35 @@ def fill_between(c: Array, first: int, last: int, x: Array, memberships: Array) 
 
 
 @kernel
-def consequents_at(c: Array) -> int:
-    """Return where the consequents begin, behind the sets."""
-    n, n_sets = int(c[0]), 0
-    for i in range(n):
-        n_sets += int(c[5 + i])
-    return 5 + n + 2 * n_sets
-
-
-@kernel
-def answer(c: Array, x: Array, memberships: Array, y: Array) -> None:
-    """Fill the outputs at one input sample.
-
-    ``c`` is [inputs, outputs, driven, constants, most sets, sets of every input, centres, widths,
-    consequents]; a rule's consequents are one row an output: a coefficient for every input, and the
-    constant if there are constants.
-    """
-    n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
-    n_rules = fill_between(c, 0, n, x, memberships)
-    rows = c[consequents_at(c) :]
-    at, width = 0, n + constant
-    for j in range(n_out):
-        y[j] = 0.0
-    for rule in range(n_rules):
-        firing, rest = 1.0, rule
-        for i in range(n - 1, -1, -1):
-            sets = int(c[5 + i])
-            firing *= memberships[i * most + rest % sets]
-            rest //= sets
-        if firing > NOTHING:
-            for j in range(n_out):
-                total = rows[at + n] if constant else 0.0
-                for i in range(n):
-                    total += rows[at + i] * x[i]
-                y[j] += firing * total
-                at += width
-        else:
-            at += n_out * width
-
-
-@kernel
-def contract(c: Array, m: int, scheduling: Array, memberships: Array, left: Array) -> None:
+def contract(c: Array, m: int, known: Array, memberships: Array, left: Array) -> None:
     """Fill the rules that are left of the first m inputs where the others are known.
 
-    ``left`` has, rule after rule, one row an output: m coefficients and a constant.
+    ``c`` is [inputs, outputs, all sets, constants, most sets, sets of every input, centres, widths,
+    consequents]; a rule's consequents are one row an output: a coefficient for every input, and the
+    constant if there are constants. ``left`` has, rule after rule, one row an output: m coefficients and
+    a constant; of no inputs, the outputs themselves.
     """
     n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
-    n_known = fill_between(c, m, n, scheduling, memberships)
-    rows, width = c[consequents_at(c) :], n + constant
+    n_known = fill_between(c, m, n, known, memberships)
+    rows, width = c[5 + n + 2 * int(c[2]) :], n + constant
     for place in range(left.size):
         left[place] = 0.0
-    for known in range(n_known):
-        firing, rest = 1.0, known
+    for k in range(n_known):
+        firing, rest = 1.0, k
         for i in range(n - 1, m - 1, -1):
             sets = int(c[5 + i])
             firing *= memberships[i * most + rest % sets]
             rest //= sets
-        for row in range(left.size // (m + 1)):
-            rule, j = row // n_out, row % n_out
-            at = ((rule * n_known + known) * n_out + j) * width
-            total = rows[at + n] if constant else 0.0
-            for i in range(m, n):
-                total += rows[at + i] * scheduling[i - m]
-            for i in range(m):
-                left[row * (m + 1) + i] += firing * rows[at + i]
-            left[row * (m + 1) + m] += firing * total
+        if firing > NOTHING:
+            for row in range(left.size // (m + 1)):
+                rule, j = row // n_out, row % n_out
+                at = ((rule * n_known + k) * n_out + j) * width
+                total = rows[at + n] if constant else 0.0
+                for i in range(m, n):
+                    total += rows[at + i] * known[i - m]
+                for i in range(m):
+                    left[row * (m + 1) + i] += firing * rows[at + i]
+                left[row * (m + 1) + m] += firing * total
 
 
 @kernel
@@ -164,13 +124,11 @@ def sloped_answer(
     ``left`` is what `contract` fills; scratch are the memberships, and beside them their relative
     slopes, with one more for each driven input.
     """
-    m, n, most = x.size, int(c[0]), int(c[4])
+    m, n, n_sets, most = x.size, int(c[0]), int(c[2]), int(c[4])
     n_out = y.size
     n_rules = fill_between(c, 0, m, x, memberships)
     tilt = tilts[m * most :]
-    at, n_sets = 5 + n, 0
-    for i in range(n):
-        n_sets += int(c[5 + i])
+    at = 5 + n
     for i in range(m):
         mean = 0.0
         for s in range(int(c[5 + i])):
@@ -211,19 +169,19 @@ def fuzzy_network_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Answer a sample; scratch are the memberships."""
-    answer(coefficients, inputs, scratch, outputs)
+    contract(coefficients, 0, inputs, scratch, outputs)
 
 
-@step
-def fuzzy_network_inverse_step(
-    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
-) -> None:
-    """Solve for the driven inputs by Newton's method within their limits, from the last ones.
+@kernel
+def solve_driven(
+    coefficients: Array, start: Array, scratch: Array, inputs: Array, best: Array
+) -> float:
+    """Fill the best driven inputs within their limits, by Newton's method from a start.
 
-    Coefficients are the limits, lowest then highest, then the network's; the state is [last driven
-    inputs, samples clipped].
+    Coefficients are the limits, lowest then highest, then the network's. Returns the largest error by
+    the size of the outputs.
     """
-    m = state.size - 1
+    m = start.size
     low, high, c = coefficients[:m], coefficients[m : 2 * m], coefficients[2 * m :]
     n, most, n_rules = int(c[0]), int(c[4]), 1
     for i in range(m):
@@ -232,12 +190,12 @@ def fuzzy_network_inverse_step(
     memberships, tilts = scratch[: n * most], scratch[n * most : n * most + m * most + m]
     left = scratch[n * most + m * most + m : n * most + m * most + m + n_left]
     rest = scratch[n * most + m * most + m + n_left :]
-    x, y, best, change = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m], rest[3 * m : 4 * m]
-    slopes = rest[4 * m : m * (m + 4)].reshape((m, m))
+    x, y, change = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m]
+    slopes = rest[3 * m : m * (m + 3)].reshape((m, m))
     contract(c, m, inputs[m:], memberships, left)
     size = 1.0
     for j in range(m):
-        x[j] = state[j]
+        x[j] = start[j]
         size = max(size, abs(inputs[j]))
     least, share = np.inf, 1.0
     for _ in range(MOST_STEPS):
@@ -274,11 +232,18 @@ def fuzzy_network_inverse_step(
         for i in range(m):
             if low[i] < best[i] < high[i]:
                 best[i] -= y[i]
-    for i in range(m):
-        state[i] = best[i]
-        outputs[i] = best[i]
-    if least > SLACK * size:
+    return least / size
+
+
+@step
+def fuzzy_network_inverse_step(
+    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
+) -> None:
+    """Solve for the driven inputs from the last ones; the state is these, and samples clipped."""
+    m = state.size - 1
+    if solve_driven(coefficients, state[:m], scratch, inputs, outputs) > SLACK:
         state[m] += 1.0
+    state[:m] = outputs
 
 
 @kernel
@@ -287,29 +252,18 @@ def fuzzy_network_inverse_start(
 ) -> None:
     """Start at the best solution for the first sample that is found from several places."""
     m = state.size - 1
-    low, high, c = coefficients[:m], coefficients[m : 2 * m], coefficients[2 * m :]
-    n = int(c[0])
-    trial, driven, y = scratch[: m + 1], scratch[m + 1 : 2 * m + 1], scratch[2 * m + 1 : 3 * m + 1]
-    x, rest = scratch[3 * m + 1 : 3 * m + 1 + n], scratch[3 * m + 1 + n :]
-    for i in range(m):
-        state[i] = 0.5 * (low[i] + high[i])
-    state[m] = 0.0
+    low, high = coefficients[:m], coefficients[m : 2 * m]
+    trial, driven = scratch[:m], scratch[m : 2 * m]
     least = np.inf
+    state[m] = 0.0
     for k in range(STARTS):
         share = min(max(k / (STARTS - 1), 0.02), 0.98)
         for i in range(m):
             trial[i] = low[i] + share * (high[i] - low[i])
-        trial[m] = 0.0
-        fuzzy_network_inverse_step(coefficients, trial, rest, inputs, driven)
-        for i in range(n):
-            x[i] = driven[i] if i < m else inputs[i]
-        answer(c, x, rest, y)
-        error = 0.0
-        for j in range(m):
-            error = max(error, abs(y[j] - inputs[j]))
-        if error < least:
+        error = solve_driven(coefficients, trial, scratch[2 * m :], inputs, driven)
+        if error < least or k == 0:
             least = error
-            state[:m] = trial[:m]
+            state[:m] = driven
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -331,15 +285,16 @@ class FuzzyNetwork(Invertible):
         Lowest and highest value of every driven input; needed for an inverse.
     """
 
-    kind: ClassVar[str] = "fuzzy-network"
-    ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Step] = fuzzy_network_step
-    inverse_kernel: ClassVar[Step] = fuzzy_network_inverse_step
-    inverse_start_kernel: ClassVar[Start] = fuzzy_network_inverse_start
-    inverse_path_dependent: ClassVar[bool] = True
-    of_local_rules: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "consequents")
-    notation: ClassVar[Notation] = Notation(
+    kind = "fuzzy-network"
+    ports = SEVERAL
+    kernel = fuzzy_network_step
+    inverse_kernel = fuzzy_network_inverse_step
+    inverse_start_kernel = fuzzy_network_inverse_start
+    inverse_path_dependent = True
+    solved = True
+    of_local_rules = True
+    parameters = ("centres", "widths", "consequents")
+    notation = Notation(
         r"y_k = \frac{\sum_r \omega_r\, (P_{rk} \cdot x + c_{rk})}{\sum_r \omega_r},\quad "
         r"\omega_r = \prod_i \exp\left(-\frac{(x_i - m_{ir})^2}{2 \sigma_{ir}^2}\right)",
         centres="m_{ij} [{in0}]",
@@ -350,7 +305,7 @@ class FuzzyNetwork(Invertible):
     )
 
     centres: Rows
-    widths: Rows
+    widths: PositiveRows
     consequents: Vector
     driven: Channels
     given: Channels
@@ -365,10 +320,6 @@ class FuzzyNetwork(Invertible):
             raise ModelError(
                 f"{self.kind!r} of {len(self.inputs)} inputs has centres of {sets} and widths of "
                 f"{[len(row) for row in self.widths]} sets. Remedy: give each input as many of both."
-            )
-        if any(not width > 0 for row in self.widths for width in row):
-            raise ModelError(
-                f"widths of {self.kind!r} are not positive. Remedy: give positive ones."
             )
         wanted = int(np.prod(sets)) * len(self.given) * (len(sets) + self.constants)
         if len(self.consequents) != wanted:
@@ -391,35 +342,27 @@ class FuzzyNetwork(Invertible):
         return len(self.centres) * max(map(len, self.centres))
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return sizes, then `pack`."""
-        del sample_time
         sets = [len(row) for row in self.centres]
-        sizes = [len(sets), len(self.given), len(self.driven), int(self.constants), max(sets)]
+        sizes = [len(sets), len(self.given), sum(sets), int(self.constants), max(sets)]
         return np.concatenate([[*sizes, *sets], self.pack()])
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what memberships and all rules cost."""
-        del sample_time
-        n, rules = len(self.centres), int(np.prod([len(row) for row in self.centres]))
+        n = len(self.centres)
         each = n + len(self.given) * (2 * n + 2)
-        operations = rules * each + 10 * sum(map(len, self.centres))
+        operations = self._n_rules(n) * each + 10 * sum(map(len, self.centres))
         return Cost(operations, operations)
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
         """Return what contracting what schedules costs, then steps of Newton's method with slopes."""
-        del sample_time
         m, n = len(self.driven), len(self.centres)
-        rules = int(np.prod([len(row) for row in self.centres]))
-        once = rules * m * (2 * n + 2) + 10 * sum(map(len, self.centres[m:]))
-        step = self._n_rules_driven * (2 * m + m * (6 * m + 2)) + 16 * sum(
-            map(len, self.centres[:m])
-        )
+        once = self._n_rules(n) * m * (2 * n + 2) + 10 * sum(map(len, self.centres[m:]))
+        step = self._n_rules(m) * (2 * m + m * (6 * m + 2)) + 16 * sum(map(len, self.centres[:m]))
         return Cost(once, once) + newton_cost(step + m**3)
 
-    @property
-    def _n_rules_driven(self) -> int:
-        """Combinations of the driven inputs' sets."""
-        return int(np.prod([len(row) for row in self.centres[: len(self.driven)]]))
+    def _n_rules(self, n: int) -> int:
+        """Return the combinations of the first inputs' sets."""
+        return math.prod(map(len, self.centres[:n]))
 
     def check_invertible(self) -> None:
         """Demand as many outputs as driven inputs, and limits."""
@@ -438,14 +381,12 @@ class FuzzyNetwork(Invertible):
     def n_inverse_scratch(self) -> int:
         """Memberships, their slopes, contracted rules, vectors of inputs, and a matrix."""
         m, most = len(self.driven), max(map(len, self.centres))
-        solving = m * most + self._n_rules_driven * m * (m + 1) + m * (m + 6)
-        return self.n_scratch + solving + 3 * m + 1 + len(self.centres)
+        solving = m * most + self._n_rules(m) * m * (m + 1) + m * (m + 6)
+        return self.n_scratch + solving
 
     def inverse_numbers(self, own: Array) -> Array:
         """Return the limits, lowest then highest, and the network's."""
         return np.concatenate([*np.array(self.limits).T, own])
-
-    solved: ClassVar[bool] = True
 
     def inverse_complaint(self, state: Array) -> str:
         """Tell of references that the network cannot give."""

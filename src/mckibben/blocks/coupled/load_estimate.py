@@ -12,23 +12,24 @@ must be measured, not those that a compensator asks for.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar, Self
+from typing import Annotated
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Start
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.blocks.coupled.balance_law import begin, keep, unbalanced
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.blocks.fields import STRICT, Channel
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
@@ -108,11 +109,15 @@ class LoadEstimate(Block):
         The muscles.
     """
 
-    kind: ClassVar[str] = "load-estimate"
-    kernel: ClassVar[Step] = load_estimate_step
-    start_kernel: ClassVar[Start] = load_estimate_start
-    parameters: ClassVar[tuple[str, ...]] = ("forward",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "load-estimate"
+    ports = ("forward.driven", "forward.given"), ("scheduled",), ("loads",)
+    rate_dependent = same_as("forward.rate_dependent")
+    n_states = same_as("forward.n_states")
+    kernel = load_estimate_step
+    start_kernel = load_estimate_start
+    parameters = ("forward",)
+    typical = (Balance.example(),)
+    notation = Notation(
         r"F = C^{+} \left(p A(y) - \text{springs} - \text{elasticity} - \text{friction} - "
         r"\text{relaxation} - \text{damping} - \text{inertia}\right)",
     )
@@ -140,33 +145,14 @@ class LoadEstimate(Block):
             )
 
     @property
-    def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether the balance is."""
-        return self.forward.rate_dependent
+    def loads(self) -> tuple[Channel, ...]:
+        """What schedules the balance last."""
+        return self.forward.scheduled[len(self.scheduled) :]
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Displacements, pressures, then what schedules but the loads."""
-        return (*self.forward.driven, *self.forward.given, *self._scheduled)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """What schedules, but the loads."""
-        return tuple(channel.name for channel in self._scheduled)
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Loads."""
-        return self.forward.scheduled[len(self._scheduled) :]
-
-    @property
-    def _scheduled(self) -> tuple[Channel, ...]:
+    def scheduled(self) -> tuple[Channel, ...]:
+        """What else schedules it."""
         return self.forward.scheduled[: len(self.forward.scheduled) - self.forward.n_loads]
-
-    @property
-    def n_states(self) -> int:
-        """The balance's."""
-        return self.forward.n_states
 
     @property
     def n_scratch(self) -> int:
@@ -181,11 +167,6 @@ class LoadEstimate(Block):
         """Return the balance's, and the pseudo-inverse of its shares of loads."""
         solving = np.linalg.pinv(np.array(self.forward.loads))
         return np.concatenate([self.forward.coefficients(sample_time), solving.ravel()])
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return the load of the example of a balance."""
-        return cls(Balance.example())
 
 
 def parts_of(model: Block) -> tuple[Balance, Block | None, Block | None]:

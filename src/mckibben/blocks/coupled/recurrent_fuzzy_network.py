@@ -18,18 +18,18 @@ PI-NARMAX Model", Section 3.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Self
+from typing import Annotated
 
 import numpy as np
-from annotated_types import Gt, Interval
-from pydantic import FiniteFloat
+from annotated_types import Interval
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Cost, Ports, Start, own_sample_time
-from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.base import SEVERAL, Block, Cost, own_sample_time
+from mckibben.blocks.fields import STRICT, Channel, Channels, Positive, PositiveRows, Rows, Vector
+from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import same_as
 from mckibben.errors import ModelError
 
 LEAST_FIRING = 1e-290
@@ -88,26 +88,15 @@ def recurrent_fuzzy_network_step(
         y += firing * answer
     y = y / total if total > LEAST_FIRING else (state[0] if n_a > 0 else 0.0)
     outputs[0] = y
-    for k in range(n_a - 1, 0, -1):
-        state[k] = state[k - 1]
-    if n_a > 0:
-        state[0] = y
-    for k in range(n_b - 1, 0, -1):
-        state[n_a + k] = state[n_a + k - 1]
-    if n_b > 0:
-        state[n_a] = inputs[0]
+    remember(y, state[:n_a])
+    remember(inputs[0], state[n_a : n_a + n_b])
     for s in range(n_scheduled):
         at = n_a + n_b + s * n_c
-        for k in range(n_c - 1, 0, -1):
-            state[at + k] = state[at + k - 1]
-        if n_c > 0:
-            state[at] = inputs[1 + s]
+        remember(inputs[1 + s], state[at : at + n_c])
 
 
 @kernel
-def recurrent_fuzzy_network_start(
-    coefficients: Array, state: Array, inputs: Array, virgin: bool
-) -> None:
+def recurrent_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start where inputs always were the first ones, and outputs at the driven one."""
     n_a, n_b, n_c = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
     state[:] = 0.0
@@ -138,14 +127,34 @@ class RecurrentFuzzyNetwork(Block):
         One driven input, those that schedule, one output.
     """
 
-    kind: ClassVar[str] = "recurrent-fuzzy-network"
-    ports: ClassVar[Ports] = SEVERAL
-    kernel: ClassVar[Step] = recurrent_fuzzy_network_step
-    start_kernel: ClassVar[Start] = recurrent_fuzzy_network_start
-    rate_dependent: ClassVar[bool] = True
-    of_local_rules: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "feedbacks", "consequents")
-    notation: ClassVar[Notation] = Notation(
+    kind = "recurrent-fuzzy-network"
+    sample_time = same_as("own_time")
+    n_scratch = same_as("n_regressors")
+    ports = SEVERAL
+    kernel = recurrent_fuzzy_network_step
+    start_kernel = recurrent_start
+    rate_dependent = True
+    of_local_rules = True
+    typical = (
+        ((0.0, 40.0), (0.0, 40.0), (0.0, 150.0)),
+        ((30.0, 30.0), (30.0, 30.0), (100.0, 100.0)),
+        ((0.5, -0.5), (0.3, 0.2), (2.0, -1.0)),
+        tuple(
+            number
+            for rule in range(8)
+            for number in (0.6 + 0.02 * (rule & 1), 0.3 - 0.02 * (rule >> 2), -0.01, 0.5)
+        ),
+        0.01,
+        (Channel("displacement_free", "mm"),),
+        (Channel("force", "N"),),
+        (Channel("displacement", "mm"),),
+    )
+    no_inverse = (
+        "has no inverse: a sample of its input moves its output by next to nothing. "
+        "Remedy: invert balance, or close a loop."
+    )
+    parameters = ("centres", "widths", "feedbacks", "consequents")
+    notation = Notation(
         r"y_t = \frac{\sum_r \omega_r\, (P_r \cdot x_t + c_r)}{\sum_r \omega_r},\quad "
         r"\omega_r = \prod_i O_{ir,t}",
         r"O_{ij,t} = \exp\left(-\frac{(x_{i,t} - m_{ij} + \theta_{ij} O_{ij,t-1})^2}{2 "
@@ -162,10 +171,10 @@ class RecurrentFuzzyNetwork(Block):
     )
 
     centres: Rows
-    widths: Rows
+    widths: PositiveRows
     feedbacks: Rows
     consequents: Vector
-    own_time: Annotated[FiniteFloat, Gt(0)]
+    own_time: Positive
     driven: Channels
     scheduled: Channels
     given: Channels
@@ -187,19 +196,12 @@ class RecurrentFuzzyNetwork(Block):
                 f"{self.kind!r} wants centres, widths and feedbacks of {self.n_regressors} inputs, as "
                 "many sets for each. Remedy: give them."
             )
-        if any(not width > 0 for row in self.widths for width in row):
-            raise ModelError(f"widths of {self.kind!r} are not positive. Remedy: correct them.")
         wanted = self.n_sets**self.n_regressors * (self.n_regressors + 1)
         if len(self.consequents) != wanted:
             raise ModelError(
                 f"{self.kind!r} of this structure has {wanted} consequents, got "
                 f"{len(self.consequents)}. Remedy: give {wanted}."
             )
-
-    @property
-    def sample_time(self) -> float:  # type: ignore[override]
-        """What the network holds for [s]."""
-        return self.own_time
 
     @property
     def n_sets(self) -> int:
@@ -218,11 +220,6 @@ class RecurrentFuzzyNetwork(Block):
         past = self.n_regressors - 1 - len(self.scheduled)
         return past + self.n_regressors * self.n_sets
 
-    @property
-    def n_scratch(self) -> int:
-        """The regressors."""
-        return self.n_regressors
-
     def state_at(self, first: Array, output: Array) -> Array:
         """Return the state at rest at the first inputs, where the output is known."""
         state = self.initial_state(first)
@@ -237,23 +234,9 @@ class RecurrentFuzzyNetwork(Block):
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what memberships and all rules cost."""
-        del sample_time
         n, sets = self.n_regressors, self.n_sets
         operations = sets**n * (3 * n + 3) + 10 * n * sets
         return Cost(operations, operations)
-
-    def inverse(self) -> Block:
-        """Refuse: what the output is now depends mostly on what it was.
-
-        Raises
-        ------
-        ModelError
-            Always.
-        """
-        raise ModelError(
-            f"{self.kind!r} has no inverse: a sample of its input moves its output by next to nothing. "
-            "Remedy: invert balance, or close a loop."
-        )
 
     @property
     def _regressor_units(self) -> list[str]:
@@ -274,22 +257,3 @@ class RecurrentFuzzyNetwork(Block):
         place = index[-1] % (len(per) + 1)
         given = self.outputs[0].unit
         return f"{given or '1'}/{per[place]}" if place < len(per) and per[place] else given
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a small, stable network of a muscle under a load."""
-        centres, widths = (0.0, 40.0), (30.0, 30.0)
-        loads, spans = (0.0, 150.0), (100.0, 100.0)
-        consequents = []
-        for rule in range(8):
-            consequents += [0.6 + 0.02 * (rule & 1), 0.3 - 0.02 * (rule >> 2), -0.01, 0.5]
-        return cls(
-            (centres, centres, loads),
-            (widths, widths, spans),
-            ((0.5, -0.5), (0.3, 0.2), (2.0, -1.0)),
-            tuple(consequents),
-            0.01,
-            (Channel("displacement_free", "mm"),),
-            (Channel("force", "N"),),
-            (Channel("displacement", "mm"),),
-        )

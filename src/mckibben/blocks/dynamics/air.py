@@ -19,26 +19,18 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Le
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Start, needs_sample_time
-from mckibben.blocks.fields import (
-    LONGEST_DELAY,
-    PRESSURE,
-    STRICT,
-    Channel,
-    ChannelField,
-    InputRange,
-    StoredInitial,
-)
+from mckibben.blocks import fields
+from mckibben.blocks.base import needs_sample_time
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import ROUNDING, SLACK, Step, kernel, step
+from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, remember, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError, ModelWarning
 
@@ -88,8 +80,7 @@ def air_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -
     late = int(coefficients[7])
     state[0] = _moved(coefficients, state[0], inputs[0])
     outputs[0] = state[late]
-    for k in range(late, 0, -1):
-        state[k] = state[k - 1]
+    remember(state[0], state[1 : late + 1])
 
 
 @kernel
@@ -135,7 +126,7 @@ def air_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: 
     state[0], state[1] = _resting(c, u, virgin), 0.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class Air(Invertible):
     """Valve or regulator, and the air behind it, from command to measured pressure.
 
@@ -164,16 +155,16 @@ class Air(Invertible):
         Command, and pressure.
     """
 
-    kind: ClassVar[str] = "air"
-    kernel: ClassVar[Step] = air_step
-    start_kernel: ClassVar[Start] = air_start
-    inverse_kernel: ClassVar[Step] = air_inverse_step
-    inverse_start_kernel: ClassVar[Start] = air_inverse_start
-    rate_dependent: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = (
-        *("gain", "offset", "hysteresis", "filling_time", "venting_time"),
-    )
-    notation: ClassVar[Notation] = Notation(
+    kind = "air"
+    n_inverse_states = 2  # the pressure, and samples clipped
+    kernel = air_step
+    start_kernel = air_start
+    inverse_kernel = air_inverse_step
+    inverse_start_kernel = air_inverse_start
+    rate_dependent = True
+    parameters = (*("gain", "offset", "hysteresis", "filling_time", "venting_time"),)
+    typical = (0.6, 0.1, 0.06, 0.03, 0.05, 0.02, 0.0, 6.0, (0.0, 10.0))
+    notation = Notation(
         r"\begin{cases} T_f \dot{x} = g_f - x & \text{filling, } g_f = K (u - u_0 - h/2) "
         r"> x \\ T_v \dot{x} = g_v - x & \text{venting, } g_v = K (u - u_0 + h/2) < x "
         r"\end{cases}",
@@ -188,18 +179,18 @@ class Air(Invertible):
         supply=r"p_{\max} [{y}]",
     )
 
-    gain: Annotated[FiniteFloat, Gt(0)]
+    gain: fields.Positive
     offset: FiniteFloat
-    hysteresis: Annotated[FiniteFloat, Ge(0)]
+    hysteresis: fields.NotNegative
     filling_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
     venting_time: Annotated[FiniteFloat, Ge(0), Le(LONGEST_LAG)]
-    dead_time: Annotated[FiniteFloat, Ge(0)] = 0.0
+    dead_time: fields.NotNegative = 0.0
     ambient: FiniteFloat | None = 0.0
     supply: FiniteFloat | None = None
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = Channel("voltage", "V")
-    output: ChannelField = PRESSURE
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.Channel("voltage", "V")
+    output: fields.ChannelField = fields.PRESSURE
 
     def __post_init__(self) -> None:
         lowest, highest = self.pressures
@@ -223,7 +214,7 @@ class Air(Invertible):
     @property
     def n_states(self) -> int:
         """The pressure and, with a dead time, past ones."""
-        return 1 + (LONGEST_DELAY if self.dead_time > 0 else 0)
+        return 1 + (fields.LONGEST_DELAY if self.dead_time > 0 else 0)
 
     def goal(self, command: float, way: Literal[-1, 1]) -> float:
         """Return the pressure where a held command leads: in filling, 1, or in venting, -1."""
@@ -244,19 +235,13 @@ class Air(Invertible):
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [gain, offsets, shares of the way, pressures, dead time], for a sample time.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or where the dead time is more than 254 samples.
-        """
+        """Return [gain, offsets, shares of the way, pressures, dead time], for a sample time."""
         step = needs_sample_time(self.kind, sample_time)
         late = self.dead_time / step
-        if not late <= LONGEST_DELAY + 0.5:
+        if not late <= fields.LONGEST_DELAY + 0.5:
             raise ModelError(
                 f"a dead time of {self.dead_time:g} s is {late:.0f} samples. Remedy: a dead time "
-                f"of at most {LONGEST_DELAY} samples, or a longer sample time."
+                f"of at most {fields.LONGEST_DELAY} samples, or a longer sample time."
             )
         times = (self.filling_time, self.venting_time)
         shares = [-math.expm1(-step / time) if time > 0 else 1.0 for time in times]
@@ -265,11 +250,6 @@ class Air(Invertible):
     def start_numbers(self) -> Array:
         """Return the coefficients at a sample time that its dead time allows."""
         return self.coefficients(self.dead_time or 1.0)
-
-    @property
-    def n_inverse_states(self) -> int:
-        """The pressure, and the count of samples clipped; past pressures do not matter."""
-        return 2
 
     def inverse_state(self, state: Array) -> Array:
         """Return the pressure, and no samples clipped."""
@@ -296,8 +276,3 @@ class Air(Invertible):
             f"beyond supply or surroundings, or change faster than {self.input.name} within its limits "
             f"makes the air flow. Reachable in time is {low[0]:.6g} to {high[0]:.6g} {self.output.unit}"
         )
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a regulator of 0.6 bar/V that vents more slowly than it fills."""
-        return cls(0.6, 0.1, 0.06, 0.03, 0.05, 0.02, 0.0, 6.0, (0.0, 10.0))

@@ -8,16 +8,16 @@ a_k = exp(-T / tau_k), so the output answers at once and the inverse is in close
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, Self
+from typing import Literal
 
 import numpy as np
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Start, needs_sample_time
-from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Vector
+from mckibben.blocks.base import needs_sample_time, one_per
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, PositiveVector, Vector
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -83,22 +83,25 @@ class Creep(Invertible):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "creep"
-    kernel: ClassVar[Step] = creep_step
-    start_kernel: ClassVar[Start] = creep_start
-    inverse_kernel: ClassVar[Step] = creep_inverse_step
-    inverse_start_kernel: ClassVar[Start] = creep_inverse_start
-    rate_dependent: ClassVar[bool] = True
-    counts_clipped: ClassVar[bool] = False
-    parameters: ClassVar[tuple[str, ...]] = ("compliances", "time_constants")
-    notation: ClassVar[Notation] = Notation(
+    kind = "creep"
+    kernel = creep_step
+    start_kernel = creep_start
+    inverse_kernel = creep_inverse_step
+    inverse_start_kernel = creep_inverse_start
+    rate_dependent = True
+    counts_clipped = False
+    parameters = ("compliances", "time_constants")
+    n_states = one_per("compliances")  # one to every Kelvin-Voigt element
+    n_fitted = n_states
+    typical = ((0.08, 0.05), (1.5, 40.0))
+    notation = Notation(
         r"y = u + \sum_k c_k x_k,\quad \tau_k \dot{x}_k = u - x_k",
         compliances="c_k",
         time_constants=r"\tau_k [s]",
     )
 
     compliances: Vector
-    time_constants: Vector
+    time_constants: PositiveVector
     initial: Literal["first_sample", "virgin", "fitted"] = "first_sample"
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT
@@ -109,30 +112,13 @@ class Creep(Invertible):
                 f"{self.kind!r} has {len(self.compliances)} compliances and "
                 f"{len(self.time_constants)} time constants. Remedy: give one to each."
             )
-        if min(self.compliances, default=0.0) < 0 or min(self.time_constants, default=1.0) <= 0:
+        if min(self.compliances, default=0.0) < 0:
             raise ModelError(
-                f"{self.kind!r} has a negative compliance, or a time constant that is not positive. "
-                "Remedy: give compliances of 0 or more, and positive times in seconds."
+                f"{self.kind!r} has a negative compliance. Remedy: give compliances of 0 or more."
             )
 
-    @property
-    def n_states(self) -> int:
-        """One to every Kelvin-Voigt element."""
-        return len(self.compliances)
-
-    @property
-    def n_fitted(self) -> int:
-        """All of them."""
-        return self.n_states
-
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [decays over a sample, compliances].
-
-        Raises
-        ------
-        ModelError
-            Without a sample time.
-        """
+        """Return [decays over a sample, compliances]."""
         step = needs_sample_time(self.kind, sample_time)
         return np.array([*np.exp(-step / np.array(self.time_constants)), *self.compliances])
 
@@ -147,8 +133,3 @@ class Creep(Invertible):
         matrices = (np.diag(decays), (1 - decays)[:, np.newaxis], (c * decays)[np.newaxis])
         at_once = np.array([[1.0 + c @ (1 - decays)]])
         return LinearSystem(*matrices, at_once, sample_time, np.zeros(1), np.zeros(1))
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a fast and a slow element."""
-        return cls((0.08, 0.05), (1.5, 40.0))

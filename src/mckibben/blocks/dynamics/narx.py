@@ -14,26 +14,19 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Callable
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from annotated_types import Gt, Interval, MaxLen
+from annotated_types import Interval, MaxLen
 from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Start, own_sample_time
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    StoredInitial,
-    Vector,
-    rows,
-)
-from mckibben.blocks.hysteresis.play_operators import start_operators
-from mckibben.blocks.kernels import Step, inlined, kernel, step
+from mckibben.blocks.hysteresis.play_operators import check_order, start_operators
+from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -47,7 +40,7 @@ the other."""
 HIGHEST_DEGREE, MOST_TERMS = 20, 10_000
 
 Term = Annotated[tuple[int, ...], MaxLen(HIGHEST_DEGREE)]
-Terms = Annotated[tuple[Term, ...], MaxLen(MOST_TERMS), BeforeValidator(rows)]
+Terms = Annotated[tuple[Term, ...], MaxLen(MOST_TERMS), BeforeValidator(fields.rows)]
 
 Lags = Annotated[int, Interval(ge=0, le=50)]
 
@@ -69,10 +62,7 @@ def take_input(u: float, coefficients: Array, state: Array) -> None:
     """Put a new input among the past ones, and move the play operators."""
     n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
     x = (u - coefficients[3]) / coefficients[4]
-    for i in range(n + m - 1, n, -1):
-        state[i] = state[i - 1]
-    if m > 0:
-        state[n] = x
+    remember(x, state[n : n + m])
     for i in range(k):
         r = coefficients[HEAD + i]
         place = n + m + i
@@ -82,43 +72,50 @@ def take_input(u: float, coefficients: Array, state: Array) -> None:
 @kernel
 def give_output(y: float, coefficients: Array, state: Array) -> float:
     """Put a new output among the past ones, and return it in its own unit."""
-    n = int(coefficients[0])
-    for i in range(n - 1, 0, -1):
-        state[i] = state[i - 1]
-    if n > 0:
-        state[0] = y
+    remember(y, state[: int(coefficients[0])])
     return coefficients[5] + coefficients[6] * y
 
 
-@inlined
-def start_resting(
-    regression: Any, coefficients: Array, state: Array, inputs: Array, virgin: bool
-) -> None:
-    """Start at rest at the first input: where the regression gives back the output it is given.
+def narx_kernels(regression: Callable[[Array, Array], float]) -> tuple[Step, Start]:
+    """Return the step and the start of a model by its scaled output of the regressors in the state."""
 
-    Of several such outputs within the data's range, the lowest for an input that has risen, the middle
-    one for a virgin start; where there is none, the output that changes least.
-    """
-    n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
-    x = (inputs[0] - coefficients[3]) / coefficients[4]
-    state[n : n + m] = x
-    start_operators(coefficients[HEAD : HEAD + k], x, x, virgin, state[n + m :])
-    found, rests = 0.0, 0
-    for _ in range(2 if virgin else 1):
-        wanted = rests // 2
-        rests, least, before, last = 0, math.inf, 0.0, 0.0
-        for place in range(PLACES):
-            y = place * SPACING - FARTHEST
-            state[:n] = y
-            change = regression(coefficients, state) - y
-            if rests == 0 and abs(change) < least:
-                found, least = y, abs(change)
-            if place > 0 and ((before > 0.0) != (change > 0.0) or (before < 0.0) != (change < 0.0)):
-                if rests == wanted:
-                    found = last - SPACING * before / (change - before)
-                rests += 1
-            before, last = change, y
-    state[:n] = found
+    def narx_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+        """Run the model."""
+        take_input(inputs[0], coefficients, state)
+        outputs[0] = give_output(regression(coefficients, state), coefficients, state)
+
+    def narx_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+        """Start at rest at the first input: where the regression gives back the output it is given.
+
+        Of several such outputs within the data's range, the lowest for an input that has risen, the
+        middle one for a virgin start; where there is none, the output that changes least.
+        """
+        n, m, k = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
+        x = (inputs[0] - coefficients[3]) / coefficients[4]
+        state[n : n + m] = x
+        start_operators(coefficients[HEAD : HEAD + k], x, x, virgin, state[n + m :])
+        found, rests = 0.0, 0
+        for _ in range(2 if virgin else 1):
+            wanted = rests // 2
+            rests, least, before, last = 0, math.inf, 0.0, 0.0
+            for place in range(PLACES):
+                y = place * SPACING - FARTHEST
+                state[:n] = y
+                change = regression(coefficients, state) - y
+                if rests == 0 and abs(change) < least:
+                    found, least = y, abs(change)
+                if place > 0 and (
+                    (before > 0.0) != (change > 0.0) or (before < 0.0) != (change < 0.0)
+                ):
+                    if rests == wanted:
+                        found = last - SPACING * before / (change - before)
+                    rests += 1
+                before, last = change, y
+        state[:n] = found
+
+    narx_step.__qualname__ = f"{regression.__qualname__}.step"
+    narx_start.__qualname__ = f"{regression.__qualname__}.start"
+    return step(narx_step), kernel(narx_start)
 
 
 @kernel
@@ -142,19 +139,6 @@ def sum_of_terms(coefficients: Array, state: Array) -> float:
             product *= state[place]
         y += product
     return y
-
-
-@step
-def narx_polynomial_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model."""
-    take_input(inputs[0], coefficients, state)
-    outputs[0] = give_output(sum_of_terms(coefficients, state), coefficients, state)
-
-
-@kernel
-def narx_polynomial_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start the model at rest."""
-    start_resting(sum_of_terms, coefficients, state, inputs, virgin)
 
 
 @kernel
@@ -183,20 +167,7 @@ def network(coefficients: Array, state: Array) -> float:
     return y
 
 
-@step
-def narx_network_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run the model."""
-    take_input(inputs[0], coefficients, state)
-    outputs[0] = give_output(network(coefficients, state), coefficients, state)
-
-
-@kernel
-def narx_network_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start the model at rest."""
-    start_resting(network, coefficients, state, inputs, virgin)
-
-
-@dataclass(frozen=True, kw_only=True, config=STRICT)
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class Narx(Block):
     """Fields and states of NARX models.
 
@@ -220,30 +191,25 @@ class Narx(Block):
         Channel driven and channel given.
     """
 
-    rate_dependent: ClassVar[bool] = True
+    rate_dependent = True
+    no_inverse = (
+        "has no exact inverse: nothing keeps its output rising with its input. "
+        "Remedy: invert a hysteresis model (cpi, gpi, mpi)."
+    )
 
     output_lags: Lags
     input_lags: Lags
     delay: Lags = 0
-    thresholds: Vector = ()
-    input_scale: tuple[FiniteFloat, FiniteFloat]
-    output_scale: tuple[FiniteFloat, FiniteFloat]
-    sample_time: Annotated[FiniteFloat, Gt(0)]
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    thresholds: fields.Vector = ()
+    input_scale: fields.Scale
+    output_scale: fields.Scale
+    sample_time: fields.Positive
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
-        if not (self.input_scale[1] > 0 and self.output_scale[1] > 0):
-            raise ModelError(
-                f"{self.kind!r} has a scale that is not positive. Remedy: give (centre, half range)."
-            )
-        r = np.array(self.thresholds)
-        if r.size and (r[0] < 0 or np.any(np.diff(r) <= 0)):
-            raise ModelError(
-                f"the thresholds of {self.kind!r} are not 0 <= r_0 < r_1 < ... "
-                "Remedy: sort them and drop repeated ones."
-            )
+        check_order(self.kind, self.thresholds)
         if not self.places:
             raise ModelError(f"{self.kind!r} has no regressors. Remedy: give a lag or an operator.")
 
@@ -283,15 +249,8 @@ class Narx(Block):
         state[: self.output_lags] = (float(output[0]) - centre) / half
         return state
 
-    def inverse(self) -> Block:
-        """Refuse: nothing keeps the output of a NARX model rising with its input."""
-        raise ModelError(
-            f"{self.kind!r} has no exact inverse: nothing keeps its output rising with its input. "
-            "Remedy: invert a hysteresis model (cpi, gpi, mpi)."
-        )
 
-
-@dataclass(frozen=True, kw_only=True, config=STRICT)
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class NarxPolynomial(Narx):
     """Polynomial NARX model: f is a sum of products of regressors.
 
@@ -306,16 +265,15 @@ class NarxPolynomial(Narx):
         As of `Narx`.
     """
 
-    kind: ClassVar[str] = "narx-polynomial"
-    kernel: ClassVar[Step] = narx_polynomial_step
-    start_kernel: ClassVar[Start] = narx_polynomial_start
-    parameters: ClassVar[tuple[str, ...]] = ("weights",)
-    notation: ClassVar[Notation] = Notation(
+    kind = "narx-polynomial"
+    kernel, start_kernel = narx_kernels(sum_of_terms)
+    parameters = ("weights",)
+    notation = Notation(
         r"\bar{y}_t = \sum_i w_i \prod_{j \in P_i} x_{j,t}", *REGRESSORS, weights="w_i", **SYMBOLS
     )
 
     terms: Terms
-    weights: Vector
+    weights: fields.Vector
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -329,7 +287,6 @@ class NarxPolynomial(Narx):
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads."""
         degree = max((len(term) for term in self.terms), default=0)
         places = self.places
         padded = [
@@ -372,7 +329,7 @@ def products(regressors: Array, terms: Terms) -> Array:
     return found
 
 
-@dataclass(frozen=True, kw_only=True, config=STRICT)
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class NarxNetwork(Narx):
     """NARX model with a network: f(x) = bias + linear . x + sum_h out_h a(hidden_h . x + shift_h).
 
@@ -390,11 +347,10 @@ class NarxNetwork(Narx):
         As of `Narx`.
     """
 
-    kind: ClassVar[str] = "narx-network"
-    kernel: ClassVar[Step] = narx_network_step
-    start_kernel: ClassVar[Start] = narx_network_start
-    parameters: ClassVar[tuple[str, ...]] = ("bias", "linear", "hidden")
-    notation: ClassVar[Notation] = Notation(
+    kind = "narx-network"
+    kernel, start_kernel = narx_kernels(network)
+    parameters = ("bias", "linear", "hidden")
+    notation = Notation(
         r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)",
         *REGRESSORS,
         bias="b",
@@ -404,8 +360,8 @@ class NarxNetwork(Narx):
     )
 
     bias: FiniteFloat
-    linear: Vector
-    hidden: Vector
+    linear: fields.Vector
+    hidden: fields.Vector
     activation: Literal["tanh", "wavelet"] = "tanh"
 
     def __post_init__(self) -> None:
@@ -418,7 +374,6 @@ class NarxNetwork(Narx):
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads."""
         units = len(self.hidden) // (len(self.linear) + 2)
         shape = [len(self.linear), units, float(self.activation == "wavelet")]
         return np.array([*self.head(sample_time), *shape, *self.places, *self.pack()])

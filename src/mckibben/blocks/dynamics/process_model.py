@@ -13,31 +13,20 @@ corner of the delayed input by matrix exponentials.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Literal
 
 import numpy as np
-from annotated_types import Ge, Gt
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Start, needs_sample_time
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block, needs_sample_time
 from mckibben.blocks.dynamics.starts import start_on
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    LONGEST_DELAY,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    FittedInitial,
-    Initial,
-    Vector,
-)
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.kernels import kernel, remember, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import Notation, tex
 from mckibben.errors import ModelError
-from mckibben.recording import Recording
 
 
 @step
@@ -52,9 +41,7 @@ def process_model_step(coefficients: Array, state: Array, inputs: Array, outputs
     now, before = coefficients[4], coefficients[5]
     c = coefficients[6:]
     kept = state.size - 2 * n
-    for k in range(kept - 1, 0, -1):
-        state[n + k] = state[n + k - 1]
-    state[n] = inputs[0] - u0
+    remember(inputs[0] - u0, state[n : n + kept])
     first, second, third = state[n + m], state[n + m + 1], state[n + m + 2]
     y = now * first + before * second
     for i in range(n):
@@ -78,7 +65,7 @@ def process_model_start(coefficients: Array, state: Array, inputs: Array, virgin
     state[n : state.size - n] = u
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class ProcessModel(Block):
     """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
 
@@ -106,12 +93,19 @@ class ProcessModel(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "process-model"
-    kernel: ClassVar[Step] = process_model_step
-    start_kernel: ClassVar[Start] = process_model_start
-    rate_dependent: ClassVar[bool] = True
-    filters: ClassVar[bool] = True
-    notation: ClassVar[Notation] = Notation(
+    kind = "process-model"
+    kernel = process_model_step
+    start_kernel = process_model_start
+    rate_dependent = True
+    filters = True
+    start_on = start_on
+    no_inverse = (
+        "has no exact inverse: its output lags its input, so following a reference would take "
+        "derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, mpi), or a transfer-function "
+        "identified with delay=0."
+    )
+    typical = (6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
+    notation = Notation(
         gain="K [{y}/{u}]",
         time_constants="T_{p,i} [s]",
         damping=r"\zeta",
@@ -122,27 +116,23 @@ class ProcessModel(Block):
     )
 
     gain: FiniteFloat
-    time_constants: Vector
-    damping: Annotated[FiniteFloat, Gt(0)] | None = None
+    time_constants: fields.PositiveVector
+    damping: fields.Positive | None = None
     zero_time: FiniteFloat | None = None
-    delay: Annotated[FiniteFloat, Ge(0)] = 0.0
+    delay: fields.NotNegative = 0.0
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
     hold: Literal["first", "zero"] = "first"
-    initial: FittedInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    initial: fields.FittedInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n = len(self.time_constants)
-        if (
-            not 1 <= n <= 3
-            or min(self.time_constants) <= 0
-            or (self.damping is not None and n != 1)
-        ):
+        if not 1 <= n <= 3 or (self.damping is not None and n != 1):
             raise ModelError(
                 f"{self.kind!r} has the time constants {self.time_constants}. Remedy: give one to three "
-                "positive ones [s], and one alone with a damping."
+                "[s], and one alone with a damping."
             )
 
     @property
@@ -163,19 +153,12 @@ class ProcessModel(Block):
         under = "U" if self.damping is not None else ""
         return f"P{self.order}{'D' * (self.delay > 0)}{under}{'Z' * (self.zero_time is not None)}"
 
-    @property
-    def n_fitted(self) -> int:
-        """As many as there are lags."""
-        return self.order
+    n_fitted = order
 
     @property
     def n_states(self) -> int:
         """Of the lags, past inputs, and as many for the lags again, to compute in."""
-        return 2 * self.order + (3 if self.delay == 0 else LONGEST_DELAY + 3)
-
-    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        """Return the state that explains the recording's outputs best, where that is the rule."""
-        return start_on(self, recording, initial)
+        return 2 * self.order + (3 if self.delay == 0 else fields.LONGEST_DELAY + 3)
 
     def denominator(self) -> Array:
         """Return D(s), descending powers."""
@@ -188,26 +171,12 @@ class ProcessModel(Block):
         return found
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads, for a sample time.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or where the delay is more than 254 samples.
-        """
+        """Return what the kernel reads; refuse delays of more than 254 samples."""
         return _discretised(self, sample_time).copy()
 
     def start_numbers(self) -> Array:
         """Return [n, 0, u_0], which is what the start reads."""
         return np.array([self.order, 0.0, self.input_offset])
-
-    def inverse(self) -> Block:
-        """Refuse: the output lags the input, and the inverse would have to differentiate."""
-        raise ModelError(
-            f"{self.kind!r} ({self.name}) has no exact inverse: its output lags its input, so following "
-            "a reference would take derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, "
-            "mpi), or a transfer-function identified with delay=0."
-        )
 
     def equations(self) -> tuple[str, ...]:
         """Return the transfer function of this structure."""
@@ -240,9 +209,8 @@ class ProcessModel(Block):
         # [x, u of the last m + 2 samples, latest first]
         size = n + m + 2
         driven = np.zeros((n, m + 3))  # by the input now, a sample ago and so on
-        driven[:, m], driven[:, m + 1], driven[:, m + 2] = first, second, third
-        at_once = np.zeros(m + 3)
-        at_once[m], at_once[m + 1] = now, before
+        driven[:, m:] = np.transpose([first, second, third])
+        at_once = np.array([*np.zeros(m), now, before, 0.0])
         a, b = np.zeros((size, size)), np.zeros((size, 1))
         a[:n, :n], a[:n, n:], b[:n, 0] = lags, driven[:, 1:], driven[:, 0]
         a[n + 1 :, n:-1], b[n, 0] = np.eye(m + 1), 1.0
@@ -267,11 +235,6 @@ class ProcessModel(Block):
         zero = [] if self.zero_time is None else [self.gain * self.zero_time]
         return Polynomials((*zero, self.gain), tuple(self.denominator().tolist()))
 
-    @classmethod
-    def example(cls) -> Self:
-        """Return the P2UZ model that the paper prints."""
-        return cls(6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
-
 
 @lru_cache(maxsize=8)  # once for many runs of one model
 def _discretised(model: ProcessModel, sample_time: float | None) -> Array:
@@ -279,10 +242,10 @@ def _discretised(model: ProcessModel, sample_time: float | None) -> Array:
     step = needs_sample_time(model.kind, sample_time)
     samples = model.delay / step
     m = int(np.floor(samples + 1e-9))
-    if m > LONGEST_DELAY:
+    if m > fields.LONGEST_DELAY:
         raise ModelError(
             f"a delay of {model.delay:g} s is {m} samples. Remedy: a delay of at most "
-            f"{LONGEST_DELAY} samples, or a longer sample time."
+            f"{fields.LONGEST_DELAY} samples, or a longer sample time."
         )
     part = min(max(samples - m, 0.0), 1.0)
     a, b, c, through = _state_space(model)

@@ -36,7 +36,7 @@ def fitted_places(block: Block, rule: Initial | None = None) -> list[int]:
     return places
 
 
-def start_on(block: Block, recording: Recording, initial: Initial | None) -> Initial | None:
+def start_on(block: Block, recording: Recording, initial: Initial | None = None) -> Initial | None:
     """Return the start to use on a recording: the state solved for, where that is the rule."""
     output = block.outputs[0]
     known = output.name in recording and recording.units[output.name] == output.unit

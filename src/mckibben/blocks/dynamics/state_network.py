@@ -14,25 +14,17 @@ models", 1995; in continuous time, as neural ordinary differential equations.
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Cost, Start, needs_sample_time
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block, Cost, needs_sample_time, one_per
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    FORCE,
-    STRICT,
-    ChannelField,
-    Positive,
-    Rows,
-    StoredInitial,
-)
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -123,7 +115,7 @@ def state_network_start(
         state[n] = inputs[0]
 
 
-@dataclass(frozen=True, kw_only=True, config=STRICT)
+@dataclass(frozen=True, kw_only=True, config=fields.STRICT)
 class StateNetwork(Block):
     """State-space model of a linear part and tanh units.
 
@@ -150,13 +142,14 @@ class StateNetwork(Block):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "state-network"
-    kernel: ClassVar[Step] = state_network_step
-    start_kernel: ClassVar[Start] = state_network_start
-    rate_dependent: ClassVar[bool] = True
+    kind = "state-network"
+    kernel = state_network_step
+    start_kernel = state_network_start
+    rate_dependent = True
     steady_state = steady_state
-    parameters: ClassVar[tuple[str, ...]] = ("linear", "hidden", "readout")
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("linear", "hidden", "readout")
+    n_states = one_per("linear", 1)  # states, and the last input
+    notation = Notation(
         r"\dot{x} = \lambda \left(L v + R \tanh(H v)\right),\quad v = \left(x,\, \frac{u "
         r"- u_0}{u_s},\, 1\right)",
         "y = y_0 + y_s x_1",
@@ -170,19 +163,19 @@ class StateNetwork(Block):
         output_scale="y_s [{y}]",
     )
 
-    linear: Rows
-    hidden: Rows
-    readout: Rows
-    rate: Positive
+    linear: fields.Rows
+    hidden: fields.Rows
+    readout: fields.Rows
+    rate: fields.Positive
     input_offset: FiniteFloat = 0.0
-    input_scale: Positive = 1.0
+    input_scale: fields.Positive = 1.0
     output_offset: FiniteFloat = 0.0
-    output_scale: Positive = 1.0
+    output_scale: fields.Positive = 1.0
     substeps: Substeps = 1
     hold: Hold = "first"
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = FORCE
-    output: ChannelField = DISPLACEMENT
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n, units = len(self.linear), len(self.hidden)
@@ -196,23 +189,12 @@ class StateNetwork(Block):
             )
 
     @property
-    def n_states(self) -> int:
-        """States, and the last input."""
-        return len(self.linear) + 1
-
-    @property
     def n_scratch(self) -> int:
         """A place, slopes there, and their sum."""
         return 3 * len(self.linear)
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads, for a sample time.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or where substeps are too few for it.
-        """
+        """Return what the kernel reads, for a sample time."""
         step = self.rate * needs_sample_time(self.kind, sample_time) / self.substeps
         if not step <= FASTEST:
             raise ModelError(
@@ -226,7 +208,6 @@ class StateNetwork(Block):
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what a step costs: every weight four times a substep, and sigmoids."""
-        del sample_time
         operations = self.substeps * 4 * (2 * self.n_parameters + 20 * len(self.hidden))
         return Cost(operations, operations)
 

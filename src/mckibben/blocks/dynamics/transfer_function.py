@@ -10,27 +10,17 @@ output answers at once (b_0 is not zero) and all zeros of B lie within the unit 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Start, own_sample_time
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block, one_per, own_sample_time
 from mckibben.blocks.dynamics.starts import free_responses, start_on
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    Coefficients,
-    FittedInitial,
-    Initial,
-)
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import FEW, Notation, summed
 from mckibben.errors import ModelError
@@ -38,9 +28,7 @@ from mckibben.recording import Recording
 
 
 @step
-def transfer_function_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def filter_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the filter in transposed direct form; coefficients are [u_0, y_0, b, f, gain]."""
     n = state.size
     b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
@@ -56,7 +44,7 @@ def transfer_function_step(
 
 
 @kernel
-def transfer_function_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+def filter_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start the filter at rest: at the first input, or at the operating point."""
     n = state.size
     b, f = coefficients[2 : 3 + n], coefficients[3 + n : 4 + 2 * n]
@@ -68,7 +56,7 @@ def transfer_function_start(coefficients: Array, state: Array, inputs: Array, vi
         state[i - 1] = coming
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class TransferFunction(Block):
     """Discrete transfer function about an operating point.
 
@@ -94,18 +82,21 @@ class TransferFunction(Block):
         Standard deviation of the white noise that drives it; None where it is not known.
     """
 
-    kind: ClassVar[str] = "transfer-function"
-    kernel: ClassVar[Step] = transfer_function_step
-    start_kernel: ClassVar[Start] = transfer_function_start
-    rate_dependent: ClassVar[bool] = True
-    filters: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = (
+    kind = "transfer-function"
+    kernel = filter_step
+    start_kernel = filter_start
+    rate_dependent = True
+    filters = True
+    start_on = start_on
+    parameters = (
         "numerator",
         "denominator",
         "input_offset",
         "output_offset",
     )
-    notation: ClassVar[Notation] = Notation(
+    n_fitted = one_per("denominator")  # as many states as there are poles
+    typical = ((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)
+    notation = Notation(
         r"y_t - y_0 = \frac{B(q)}{F(q)} (u_t - u_0) + \frac{C(q)}{D(q)} e_t",
         r"B(q) = \sum_k b_k q^{-k},\quad F(q) = 1 + \sum_k f_k q^{-k}",
         numerator="b_k from 0 [{y}/{u}]",
@@ -118,33 +109,22 @@ class TransferFunction(Block):
         noise_deviation=r"\sigma_e [{y}]",
     )
 
-    numerator: Coefficients
-    denominator: Coefficients
-    sample_time: Annotated[FiniteFloat, Gt(0)]
+    numerator: fields.PolynomialField
+    denominator: fields.Coefficients
+    sample_time: fields.Positive
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
-    initial: FittedInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
-    noise_numerator: Coefficients = ()
-    noise_denominator: Coefficients = ()
-    noise_deviation: Annotated[FiniteFloat, Ge(0)] | None = None
-
-    def __post_init__(self) -> None:
-        if not self.numerator:
-            raise ModelError(
-                f"{self.kind!r} has no numerator. Remedy: give one coefficient or more."
-            )
+    initial: fields.FittedInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
+    noise_numerator: fields.Coefficients = ()
+    noise_denominator: fields.Coefficients = ()
+    noise_deviation: fields.NotNegative | None = None
 
     @property
     def n_states(self) -> int:
         """The order."""
         return max(len(self.numerator) - 1, len(self.denominator))
-
-    @property
-    def n_fitted(self) -> int:
-        """As many states as there are poles."""
-        return len(self.denominator)
 
     @property
     def poles(self) -> NDArray[np.complex128]:
@@ -168,18 +148,8 @@ class TransferFunction(Block):
         f = np.pad(np.array([1.0, *self.denominator]), (0, n - len(self.denominator)))
         return b, f
 
-    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        """Return the state that explains the recording's outputs best, where that is the rule."""
-        return start_on(self, recording, initial)
-
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [u_0, y_0, b, f, gain], with no gain where that is infinite.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or at another than the model's own.
-        """
+        """Return [u_0, y_0, b, f, gain], with no gain where that is infinite."""
         own_sample_time(self.kind, self.sample_time, sample_time)
         gain = self.gain if np.isfinite(self.gain) else 0.0
         b, f = self._padded()
@@ -293,11 +263,6 @@ class TransferFunction(Block):
         if max(map(len, noise)) > 1:
             text += rf" + \frac{{{_powers(noise[0])}}}{{{_powers(noise[1])}}}\,e_t"
         return (text,)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a second-order lag with a gain of 6.8 mm/bar, sampled at 100 Hz."""
-        return cls((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)
 
 
 def _powers(coefficients: Sequence[float]) -> str:

@@ -8,26 +8,18 @@ none.
 
 from __future__ import annotations
 
-import math
-from typing import Annotated, ClassVar, Self
+from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge, Interval
+from annotated_types import Interval
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Ports, Start, needs_sample_time
-from mckibben.blocks.fields import (
-    CONTRACTION,
-    FORCE,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    StoredInitial,
-    Vector,
-)
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block, Ports, needs_sample_time, rate_filter
+from mckibben.blocks.hysteresis.play_operators import check_order
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
@@ -37,12 +29,6 @@ UNDOES_A_MUSCLE = (
     "has no inverse here: it already gives the pressure for a contraction. Remedy: use it as the "
     "compensator, or fit pressure to contraction by another model."
 )
-
-
-def rate_filter(time_constant: float, step: float) -> tuple[float, float]:
-    """Return what the filter of the rate keeps over a step, and its gain of the input's change."""
-    smoothing = math.exp(-step / time_constant) if time_constant > 0 else 0.0
-    return smoothing, (1 - smoothing) / step
 
 
 # -- the published model ---------------------------------------------------------------------
@@ -65,9 +51,7 @@ def lagrange(e: float, own: float, one: float, two: float, three: float) -> floa
 
 
 @step
-def activation_pressure_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def published_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; the state is [previous contraction, filtered rate].
 
     Coefficients are [smoothing, gain of the rate, gamma, phi (4), contractions (16), pressures
@@ -86,14 +70,12 @@ def activation_pressure_step(
 
 
 @kernel
-def activation_pressure_start(
-    coefficients: Array, state: Array, inputs: Array, virgin: bool
-) -> None:
+def published_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start at rest at the first contraction."""
     state[0], state[1] = inputs[0], 0.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class ActivationPressure(Block):
     """Pressure that gives a contraction under a force, at one frequency of excitation.
 
@@ -121,14 +103,25 @@ class ActivationPressure(Block):
         Contraction, force and pressure.
     """
 
-    kind: ClassVar[str] = "activation-pressure"
-    ports: ClassVar[Ports] = PORTS
-    kernel: ClassVar[Step] = activation_pressure_step
-    start_kernel: ClassVar[Start] = activation_pressure_start
-    rate_dependent: ClassVar[bool] = True
-    no_inverse: ClassVar[str] = UNDOES_A_MUSCLE
-    parameters: ClassVar[tuple[str, ...]] = ("contractions", "pressures", "phi", "gamma")
-    notation: ClassVar[Notation] = Notation(
+    kind = "activation-pressure"
+    ports = PORTS
+    kernel = published_step
+    start_kernel = published_start
+    rate_dependent = True
+    no_inverse = UNDOES_A_MUSCLE
+    parameters = ("contractions", "pressures", "phi", "gamma")
+    typical = (
+        (*[0.0] * 3, -1.0, *[0.0] * 2, 0.01, 6.0, *[0.0] * 3, 2.0, 0.0, 0.001, 0.0, 4.0),
+        (
+            *(0.0, 0.0, 0.1, 0.2),
+            *(0.0, 0.0, 0.1, 4.0),
+            *(0.0, 0.0, 0.1, 1.0),
+            *(0.0, 0.0, 0.1, 2.0),
+        ),
+        *((0.0, 0.0, 0.01, 0.3), (0.27, 0.67), 1.0),
+    )
+    n_states = 2  # previous contraction and filtered rate
+    notation = Notation(
         r"p = \sum_{k=0}^{3} b_k(F)\, \epsilon^k + \gamma\, \phi(F)\, \dot{\epsilon}",
         r"\text{the cubic goes through } (\epsilon_j(F),\, y_j(F)),\; j = 1, \ldots, 4,\; "
         r"\text{each coordinate a cubic of } F",
@@ -145,16 +138,16 @@ class ActivationPressure(Block):
         output="p",
     )
 
-    contractions: Vector
-    pressures: Vector
-    phi: Vector
+    contractions: fields.Vector
+    pressures: fields.Vector
+    phi: fields.Vector
     gamma: tuple[FiniteFloat, FiniteFloat]
-    frequency: Annotated[FiniteFloat, Ge(0)]
-    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = CONTRACTION
-    force: ChannelField = FORCE
-    output: ChannelField = PRESSURE
+    frequency: fields.NotNegative
+    rate_time_constant: fields.NotNegative = 0.0
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.CONTRACTION
+    force: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.PRESSURE
 
     def __post_init__(self) -> None:
         sizes = (len(self.contractions), len(self.pressures), len(self.phi))
@@ -164,41 +157,18 @@ class ActivationPressure(Block):
                 f"give {4 * POINTS}, {4 * POINTS} and 4."
             )
 
-    @property
-    def n_states(self) -> int:
-        """Previous contraction and filtered rate."""
-        return 2
-
     def coefficients(self, sample_time: float | None) -> Array:
         step = needs_sample_time(self.kind, sample_time)
         rate = rate_filter(self.rate_time_constant, step)
         gamma = self.gamma[0] * self.frequency + self.gamma[1]
         return np.array([*rate, gamma, *self.phi, *self.contractions, *self.pressures])
 
-    @classmethod
-    def example(cls) -> Self:
-        """Return a model for contractions and forces of a few units."""
-        return cls(
-            (
-                *(0.0, 0.0, 0.0, -1.0),
-                *(0.0, 0.0, 0.01, 6.0),
-                *(0.0, 0, 0, 2.0),
-                *(0, 0.001, 0, 4.0),
-            ),
-            (*(0.0, 0.0, 0.1, 0.2), *(0.0, 0.0, 0.1, 4.0), *(0.0, 0, 0.1, 1.0), *(0, 0, 0.1, 2.0)),
-            (0.0, 0.0, 0.01, 0.3),
-            (0.27, 0.67),
-            1.0,
-        )
-
 
 # -- the model with memory -------------------------------------------------------------------
 
 
 @step
-def activation_memory_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def remembering_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; the state is [play operators, previous contraction, filtered rate, x_m].
 
     Coefficients are [smoothing, gain of the rate, contraction's centre and scale, force's centre
@@ -236,7 +206,7 @@ def activation_memory_step(
 
 
 @kernel
-def activation_memory_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+def remembering_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start where the contraction has only risen to the first one, or has never moved."""
     m = int(coefficients[8])
     n = state.size - 2 - m
@@ -248,7 +218,7 @@ def activation_memory_start(coefficients: Array, state: Array, inputs: Array, vi
     state[n + 2 :] = (e - coefficients[2]) / coefficients[3]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class ActivationMemory(Block):
     """Pressure that gives a contraction under a force, whatever the frequency.
 
@@ -281,14 +251,18 @@ class ActivationMemory(Block):
         Contraction, force and pressure.
     """
 
-    kind: ClassVar[str] = "activation-memory"
-    ports: ClassVar[Ports] = PORTS
-    kernel: ClassVar[Step] = activation_memory_step
-    start_kernel: ClassVar[Start] = activation_memory_start
-    rate_dependent: ClassVar[bool] = True
-    no_inverse: ClassVar[str] = UNDOES_A_MUSCLE
-    parameters: ClassVar[tuple[str, ...]] = ("surface", "friction", "viscosity", "relaxation")
-    notation: ClassVar[Notation] = Notation(
+    kind = "activation-memory"
+    ports = PORTS
+    kernel = remembering_step
+    start_kernel = remembering_start
+    rate_dependent = True
+    no_inverse = UNDOES_A_MUSCLE
+    parameters = ("surface", "friction", "viscosity", "relaxation")
+    typical = (
+        *((2.0, 0.5, 1.5, 0.1, 0.2, 0.0), (0.2, 0.8), (0.3, 0.2, 0.1, 0.0), (0.05, 0.01)),
+        *((0.1, 0.02), (0.5,), 2, 1, (2.5, 2.5), (2.5, 2.5)),
+    )
+    notation = Notation(
         r"p = \sum_{ij} c_{ij} x^i f^j + \sum_k (a_k + b_k f) S_k[\epsilon] + (d_0 + d_1 "
         r"f) \dot{\epsilon} + \sum_m (g_m + h_m f)(x_m - x)",
         r"x = (\epsilon - \epsilon_1) / \epsilon_2,\quad f = (F - F_1) / F_2,\quad "
@@ -307,44 +281,35 @@ class ActivationMemory(Block):
         output="p",
     )
 
-    surface: Vector
-    thresholds: Vector
-    friction: Vector
+    surface: fields.Vector
+    thresholds: fields.PositiveVector
+    friction: fields.Vector
     viscosity: tuple[FiniteFloat, FiniteFloat]
-    relaxation: Vector
-    time_constants: Vector
+    relaxation: fields.Vector
+    time_constants: fields.PositiveVector
     degree: Annotated[int, Interval(ge=0, le=9)]
     force_degree: Annotated[int, Interval(ge=0, le=9)]
-    input_scale: tuple[FiniteFloat, FiniteFloat]
-    force_scale: tuple[FiniteFloat, FiniteFloat]
-    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = CONTRACTION
-    force: ChannelField = FORCE
-    output: ChannelField = PRESSURE
+    input_scale: fields.Scale
+    force_scale: fields.Scale
+    rate_time_constant: fields.NotNegative = 0.0
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.CONTRACTION
+    force: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.PRESSURE
 
     def __post_init__(self) -> None:
         size = (self.degree + 1) * (self.force_degree + 1)
-        r = np.array(self.thresholds)
-        if len(self.surface) != size or len(self.friction) != 2 * r.size:
+        n = 2 * len(self.thresholds)
+        if len(self.surface) != size or len(self.friction) != n:
             raise ModelError(
                 f"{self.kind!r} has {len(self.surface)} numbers in its surface and "
-                f"{len(self.friction)} of friction. Remedy: give {size} and {2 * r.size}."
+                f"{len(self.friction)} of friction. Remedy: give {size} and {n}."
             )
-        if np.any(np.diff(r, prepend=0.0) <= 0):
-            raise ModelError(
-                f"the thresholds of {self.kind!r} are not 0 < r_0 < r_1 < ... "
-                "Remedy: sort them and drop repeated ones."
-            )
-        taus = self.time_constants
-        if len(self.relaxation) != 2 * len(taus) or min(taus, default=1.0) <= 0:
+        check_order(self.kind, self.thresholds)
+        if len(self.relaxation) != 2 * len(self.time_constants):
             raise ModelError(
                 f"{self.kind!r} has {len(self.relaxation)} numbers of relaxation and the time constants "
-                f"{taus}. Remedy: give two to every positive time constant."
-            )
-        if not (self.input_scale[1] > 0 and self.force_scale[1] > 0):
-            raise ModelError(
-                f"{self.kind!r} has a scale that is not positive. Remedy: give (centre, half range)."
+                f"{self.time_constants}. Remedy: give two to every time constant."
             )
 
     @property
@@ -361,19 +326,3 @@ class ActivationMemory(Block):
         decays = np.exp(-step / np.array(self.time_constants))
         slow = [*self.viscosity, *self.relaxation, *decays]
         return np.array([*rate, *scales, *counts, *self.surface, *operators, *slow])
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a model for contractions and forces of a few units."""
-        return cls(
-            surface=(2.0, 0.5, 1.5, 0.1, 0.2, 0.0),
-            thresholds=(0.2, 0.8),
-            friction=(0.3, 0.2, 0.1, 0.0),
-            viscosity=(0.05, 0.01),
-            relaxation=(0.1, 0.02),
-            time_constants=(0.5,),
-            degree=2,
-            force_degree=1,
-            input_scale=(2.5, 2.5),
-            force_scale=(2.5, 2.5),
-        )

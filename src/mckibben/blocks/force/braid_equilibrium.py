@@ -11,19 +11,18 @@ so it is the inverse that is explicit; forward it is solved for every sample.
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Self
+from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge, Gt, Interval
+from annotated_types import Interval
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Start
-from mckibben.blocks.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField
+from mckibben.blocks import fields
 from mckibben.blocks.force.laws import braid
 from mckibben.blocks.inverse import Invertible, nothing_clipped
-from mckibben.blocks.kernels import DERIVED, SLACK, Step, improved, kernel, step
+from mckibben.blocks.kernels import DERIVED, SLACK, improved, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 
@@ -53,9 +52,7 @@ def balance_slope(e: float, p: float, c: Array) -> float:
 
 
 @step
-def braid_equilibrium_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def braid_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Find the displacement.
 
     Coefficients are [load, stiffness, hardening, force per bar, a, b, least and largest
@@ -77,9 +74,7 @@ def braid_equilibrium_step(
 
 
 @step
-def braid_equilibrium_inverse_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def braid_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Give the pressure of a displacement; the state is the count of samples clipped."""
     c = coefficients
     e = (inputs[0] - c[9]) / c[8]
@@ -89,7 +84,7 @@ def braid_equilibrium_inverse_step(
     outputs[0] = balance(inside, c)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class BraidEquilibrium(Invertible):
     """Displacement at which a loaded, braided muscle rests under a pressure.
 
@@ -113,11 +108,11 @@ class BraidEquilibrium(Invertible):
         Channel driven and channel given.
     """
 
-    kind: ClassVar[str] = "braid-equilibrium"
-    kernel: ClassVar[Step] = braid_equilibrium_step
-    inverse_kernel: ClassVar[Step] = braid_equilibrium_inverse_step
-    inverse_start_kernel: ClassVar[Start] = nothing_clipped
-    parameters: ClassVar[tuple[str, ...]] = (
+    kind = "braid-equilibrium"
+    kernel = braid_step
+    inverse_kernel = braid_inverse_step
+    inverse_start_kernel = nothing_clipped
+    parameters = (
         "load",
         "stiffness",
         "hardening",
@@ -125,7 +120,8 @@ class BraidEquilibrium(Invertible):
         "rest_length",
         "offset",
     )
-    notation: ClassVar[Notation] = Notation(
+    typical = (196.0, 150.0, 900.0, 0.45, 200.0)
+    notation = Notation(
         r"p A \left(a (1 - \epsilon)^2 - b\right) = F + k \epsilon + h \epsilon^3,\quad A "
         r"= \frac{\pi d^2}{4}",
         r"a = \frac{3}{\tan^2 \alpha},\quad b = \frac{1}{\sin^2 \alpha},\quad y = l_0 "
@@ -140,15 +136,15 @@ class BraidEquilibrium(Invertible):
         input="p",
     )
 
-    load: Annotated[FiniteFloat, Gt(0)]
-    stiffness: Annotated[FiniteFloat, Ge(0)]
-    hardening: Annotated[FiniteFloat, Ge(0)]
+    load: fields.Positive
+    stiffness: fields.NotNegative
+    hardening: fields.NotNegative
     braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95)]
-    rest_length: Annotated[FiniteFloat, Gt(0)]
+    rest_length: fields.Positive
     offset: FiniteFloat = 0.0
-    diameter: Annotated[FiniteFloat, Gt(0)] = 20.0
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    diameter: fields.Positive = 20.0
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     @property
     def input_range(self) -> tuple[float, float]:
@@ -172,8 +168,3 @@ class BraidEquilibrium(Invertible):
 
     def inverse_numbers(self, own: Array) -> Array:
         return own
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a 20 mm muscle of 200 mm under 20 kg."""
-        return cls(196.0, 150.0, 900.0, 0.45, 200.0)

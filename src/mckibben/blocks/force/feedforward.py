@@ -9,7 +9,7 @@ of Pneumatic Artificial Muscles", Section 4.
 from __future__ import annotations
 
 from functools import cache
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
@@ -18,7 +18,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Start
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.fields import STRICT, Initial
 from mckibben.blocks.force.laws import ForceLaw, PolynomialForce
 from mckibben.blocks.force.multistate_friction import (
     MultistateFriction,
@@ -87,9 +87,11 @@ class ForceFeedforward(Block):
         What hysteresis adds.
     """
 
-    kind: ClassVar[str] = "force-feedforward"
-    parameters: ClassVar[tuple[str, ...]] = ("law", "friction")
-    notation: ClassVar[Notation] = Notation(
+    kind = "force-feedforward"
+    ports = ("law.output",), ("law.input",), ("law.pressure",)
+    parameters = ("law", "friction")
+    typical = (PolynomialForce((50.0, 5.0), (-10.0, 5.0)), MultistateFriction.example())
+    notation = Notation(
         r"p = \frac{f - h(l) - f_h (1 - g_p p_r)}{g(l) + g_p f_h}",
         r"f = p\, g(l) + h(l) + \left(1 + g_p (p - p_r)\right) f_h[l]",
     )
@@ -137,19 +139,6 @@ class ForceFeedforward(Block):
         return self.friction is not None
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Desired force, then length."""
-        return (self.law.output, self.law.input)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        return (self.law.input.name,)
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        return (self.law.pressure,)
-
-    @property
     def kernel(self) -> Step:  # type: ignore[override]
         return law_kernels(type(self.law))[0]
 
@@ -176,11 +165,6 @@ class ForceFeedforward(Block):
         if self.friction is None:
             return own
         return np.append(own, self.friction.coefficients(sample_time))
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a feedforward with a law that pulls at all lengths of 0 to 5 mm."""
-        return cls(PolynomialForce((50.0, 5.0), (-10.0, 5.0)), MultistateFriction.example())
 
 
 def compensator(model: Block) -> Block:

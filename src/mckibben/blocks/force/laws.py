@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, ClassVar
 
 import numpy as np
-from annotated_types import Gt, Interval
+from annotated_types import Interval
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Ports
-from mckibben.blocks.fields import FORCE, LENGTH, PRESSURE, STRICT, Channel, ChannelField, Vector
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block
+from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.memoryless import polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -35,15 +35,15 @@ def braid(angle: float, diameter: float) -> tuple[float, float, float]:
 class ForceLaw(Block):
     """A static force law: driven by length [mm], scheduled by pressure [bar], giving force [N]."""
 
-    ports: ClassVar[Ports] = ("input",), ("pressure",), ("output",)
-    no_inverse: ClassVar[str] = (
+    ports = ("input",), ("pressure",), ("output",)
+    no_inverse = (
         "has no inverse by length, since more than one may give a force. Remedy: for the pressure that "
         "gives a force at a length, use ForceFeedforward(law)."
     )
 
-    input: Channel
-    pressure: Channel
-    output: Channel
+    input: fields.Channel
+    pressure: fields.Channel
+    output: fields.Channel
 
     terms_kernel: ClassVar[Callable[[float, Array], tuple[float, float]]]
     """Force per pressure [N/bar], and force without any [N], from a length and `coefficients`."""
@@ -84,7 +84,7 @@ def polynomial_force_step(coefficients: Array, state: Array, inputs: Array, outp
     outputs[0] = inputs[1] * per_bar + rest
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class PolynomialForce(ForceLaw):
     """Force linear in pressure, polynomial in length.
 
@@ -105,11 +105,12 @@ class PolynomialForce(ForceLaw):
         Length, pressure and force.
     """
 
-    kind: ClassVar[str] = "polynomial-force"
-    kernel: ClassVar[Step] = polynomial_force_step
+    kind = "polynomial-force"
+    kernel = polynomial_force_step
     terms_kernel = polynomial_force_terms
-    parameters: ClassVar[tuple[str, ...]] = ("per_bar", "elastic")
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("per_bar", "elastic")
+    typical = ((50.0, 20.0), (-10.0, 5.0, 8.0), 3.0, 2.0)
+    notation = Notation(
         r"f = p \sum_i g_i x^i + \sum_j h_j x^j,\quad x = \frac{l - m}{s}",
         per_bar="g_i from 0 [N/bar]",
         elastic="h_j from 0 [N]",
@@ -120,27 +121,16 @@ class PolynomialForce(ForceLaw):
         output="f",
     )
 
-    per_bar: Vector
-    elastic: Vector
+    per_bar: fields.PolynomialField
+    elastic: fields.PolynomialField
     centre: FiniteFloat = 0.0
-    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input: ChannelField = LENGTH
-    pressure: ChannelField = PRESSURE
-    output: ChannelField = FORCE
-
-    def __post_init__(self) -> None:
-        if not self.per_bar or not self.elastic:
-            raise ModelError(
-                f"{self.kind!r} has an empty polynomial. Remedy: give one coefficient or more to each."
-            )
+    scale: fields.Positive = 1.0
+    input: fields.ChannelField = fields.LENGTH
+    pressure: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.FORCE
 
     def coefficients(self, sample_time: float | None) -> Array:
         return np.array([self.centre, self.scale, len(self.per_bar), *self.per_bar, *self.elastic])
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a bilinear-quadratic law around 3 mm."""
-        return cls((50.0, 20.0), (-10.0, 5.0, 8.0), 3.0, 2.0)
 
 
 # -- an inextensible braid -------------------------------------------------------------------
@@ -159,7 +149,7 @@ def chou_hannaford_terms(length: float, c: Array) -> tuple[float, float]:
     return c[0] * (length * length - c[1]), c[2]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class ChouHannaford(ForceLaw):
     """Force of an inextensible braid, with friction or elasticity as a constant.
 
@@ -178,11 +168,12 @@ class ChouHannaford(ForceLaw):
         Length, pressure and force.
     """
 
-    kind: ClassVar[str] = "chou-hannaford"
-    kernel: ClassVar[Step] = chou_hannaford_step
+    kind = "chou-hannaford"
+    kernel = chou_hannaford_step
     terms_kernel = chou_hannaford_terms
-    parameters: ClassVar[tuple[str, ...]] = ("thread_length", "turns", "constant")
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("thread_length", "turns", "constant")
+    typical = (6.0, 0.5, -1.0)
+    notation = Notation(
         r"f = p\, \frac{3 l^2 - b^2}{4 \pi n^2} + c",
         thread_length="b [mm]",
         turns="n",
@@ -192,21 +183,16 @@ class ChouHannaford(ForceLaw):
         output="f",
     )
 
-    thread_length: Annotated[FiniteFloat, Gt(0)]
-    turns: Annotated[FiniteFloat, Gt(0)]
+    thread_length: fields.Positive
+    turns: fields.Positive
     constant: FiniteFloat = 0.0
-    input: ChannelField = LENGTH
-    pressure: ChannelField = PRESSURE
-    output: ChannelField = FORCE
+    input: fields.ChannelField = fields.LENGTH
+    pressure: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.FORCE
 
     def coefficients(self, sample_time: float | None) -> Array:
         per_bar = 3 * NEWTONS_PER_BAR / (4 * math.pi * self.turns**2)
         return np.array([per_bar, self.thread_length**2 / 3, self.constant])
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a law for lengths of a few millimetres."""
-        return cls(6.0, 0.5, -1.0)
 
 
 # -- a braided cylinder with corrections -----------------------------------------------------
@@ -234,7 +220,7 @@ def tondu_lopez_terms(length: float, c: Array) -> tuple[float, float]:
     return mu * c[1] * (c[2] * short * short - c[3]), c[8]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class TonduLopez(ForceLaw):
     """Force of a braided cylinder, with corrections for end caps and low pressure.
 
@@ -258,11 +244,12 @@ class TonduLopez(ForceLaw):
         Length, pressure and force.
     """
 
-    kind: ClassVar[str] = "tondu-lopez"
-    kernel: ClassVar[Step] = tondu_lopez_step
+    kind = "tondu-lopez"
+    kernel = tondu_lopez_step
     terms_kernel = tondu_lopez_terms
-    parameters: ClassVar[tuple[str, ...]] = ("braid_angle", "mu", "kappa", "constant")
-    notation: ClassVar[Notation] = Notation(
+    parameters = ("braid_angle", "mu", "kappa", "constant")
+    typical = (5.0, 3.0, 0.45, (0.05, 0.9), (0.2, 1.1), -2.0)
+    notation = Notation(
         r"f = \mu(\epsilon)\, A\, p \left(a (1 - \kappa(p) \epsilon)^2 - b\right) + "
         r"c,\quad \epsilon = 1 - \frac{l}{l_0},\quad A = \frac{\pi d^2}{4}",
         r"a = \frac{3}{\tan^2 \alpha},\quad b = \frac{1}{\sin^2 \alpha},\quad "
@@ -279,15 +266,15 @@ class TonduLopez(ForceLaw):
         output="f",
     )
 
-    rest_length: Annotated[FiniteFloat, Gt(0)]
-    diameter: Annotated[FiniteFloat, Gt(0)]
+    rest_length: fields.Positive
+    diameter: fields.Positive
     braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95)]
     mu: tuple[FiniteFloat, FiniteFloat] = (0.0, 1.0)
     kappa: tuple[FiniteFloat, FiniteFloat] = (0.0, 1.0)
     constant: FiniteFloat = 0.0
-    input: ChannelField = LENGTH
-    pressure: ChannelField = PRESSURE
-    output: ChannelField = FORCE
+    input: fields.ChannelField = fields.LENGTH
+    pressure: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.FORCE
 
     def coefficients(self, sample_time: float | None) -> Array:
         cylinder = braid(self.braid_angle, self.diameter)
@@ -299,8 +286,3 @@ class TonduLopez(ForceLaw):
                 f"{self.kind!r} with kappa_1 = {self.kappa[0]:g} is not linear in pressure. Remedy: use "
                 "a polynomial force law for feedforward."
             )
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a law for lengths of a few millimetres."""
-        return cls(5.0, 3.0, 0.45, (0.05, 0.9), (0.2, 1.1), -2.0)

@@ -22,25 +22,16 @@ pressure_gain 0 is the paper's model.
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Ports, Start, needs_sample_time
-from mckibben.blocks.fields import (
-    FORCE,
-    LENGTH,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    StoredInitial,
-    Vector,
-    plain_sequence,
-)
-from mckibben.blocks.kernels import Step, accumulate, kernel, step
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block, needs_sample_time, one_per
+from mckibben.blocks.kernels import accumulate, kernel, step
 from mckibben.blocks.notation import Notation, tex, with_unit
 from mckibben.errors import ModelError
 
@@ -144,7 +135,7 @@ def multistate_friction_start(
     state[n] = inputs[0]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class MultistateFriction(Block):
     """Friction force by length, with elements that switch with the direction of motion.
 
@@ -167,16 +158,25 @@ class MultistateFriction(Block):
         Length, pressure and force.
     """
 
-    kind: ClassVar[str] = "multistate-friction"
-    ports: ClassVar[Ports] = ("input",), ("pressure",), ("output",)
-    kernel: ClassVar[Step] = multistate_friction_step
-    start_kernel: ClassVar[Start] = multistate_friction_start
-    rate_dependent: ClassVar[bool] = True
-    no_inverse: ClassVar[str] = (
+    kind = "multistate-friction"
+    ports = ("input",), ("pressure",), ("output",)
+    kernel = multistate_friction_step
+    start_kernel = multistate_friction_start
+    rate_dependent = True
+    typical = (  # of eleven parameters, as the paper prints it
+        ELEVEN,
+        (
+            *(18.214, 4.987e-3, 128.795, 3.982e-3, 103.096),
+            *(34.738, 1.006e-3, 13.431, 1e-4, 0.988e-3, 1.256),
+        ),
+    )
+    no_inverse = (
         "has no inverse: while it slips, one force belongs to many lengths. Remedy: compensate it by "
         "ForceFeedforward(law, friction), in closed form."
     )
-    notation: ClassVar[Notation] = Notation(
+    n_states = one_per("elements", 1)  # deflections, and the previous length
+    n_scratch = one_per("elements")  # what single precision loses of the deflections
+    notation = Notation(
         r"f = \left(1 + g_p (p - p_r)\right) \sum_i \operatorname{sat}(F_{c,i},\, k_i x_i "
         r"+ \sigma_i \dot{l})",
         r"\dot{x}_i = \frac{\operatorname{sat}(F_{c,i},\, k_i x_i + \sigma_i \dot{l}) - "
@@ -189,18 +189,18 @@ class MultistateFriction(Block):
         output="f",
     )
 
-    elements: Annotated[tuple[Direction, ...], BeforeValidator(plain_sequence)]
-    values: Vector
+    elements: Annotated[tuple[Direction, ...], BeforeValidator(fields.plain_sequence)]
+    values: fields.PositiveVector
     pressure_gain: FiniteFloat = 0.0
     reference_pressure: FiniteFloat = 0.0
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = LENGTH
-    pressure: ChannelField = PRESSURE
-    output: ChannelField = FORCE
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.LENGTH
+    pressure: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.FORCE
 
     def __post_init__(self) -> None:
         wanted = sum(SIZES[element] for element in self.elements)
-        if not self.elements or len(self.values) != wanted or min(self.values) <= 0:
+        if not self.elements or len(self.values) != wanted:
             raise ModelError(
                 f"{self.kind!r} with the elements {', '.join(self.elements) or 'none'} has "
                 f"{len(self.values)} values. Remedy: give {wanted} positive ones."
@@ -222,11 +222,6 @@ class MultistateFriction(Block):
                 names.append(f"element {number}{way}: {QUANTITIES[place % 3]}")
         return (*names, "pressure gain [1/bar]") if self.pressure_gain != 0 else tuple(names)
 
-    @property
-    def n_states(self) -> int:
-        """Deflections, and the previous length."""
-        return len(self.elements) + 1
-
     def table(self) -> Array:
         """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where inactive."""
         table, values = np.full((len(self.elements), 6), np.nan), iter(self.values)
@@ -236,11 +231,6 @@ class MultistateFriction(Block):
         other = np.roll(table, 3, axis=1)
         other[:, [2, 5]] = 0.0
         return np.where(np.isnan(table), other, table)
-
-    @property
-    def n_scratch(self) -> int:
-        """What single precision loses of the deflections."""
-        return len(self.elements)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [sample time, pressure gain, reference pressure, table]."""
@@ -256,14 +246,3 @@ class MultistateFriction(Block):
             letter = {"sigma": r"\sigma", "F_c": "F_c"}.get(symbol, symbol)
             told.setdefault(where, []).append(f"{letter} = {with_unit(tex(value), unit)}")
         return tuple(rf"\text{{{at}: }}" + r",\quad ".join(lines) for at, lines in told.items())
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return the model of eleven parameters that the paper prints."""
-        return cls(
-            ELEVEN,
-            (
-                *(18.214, 4.987e-3, 128.795, 3.982e-3, 103.096),
-                *(34.738, 1.006e-3, 13.431, 1e-4, 0.988e-3, 1.256),
-            ),
-        )

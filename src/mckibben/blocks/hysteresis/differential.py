@@ -5,15 +5,15 @@ All are rate-independent and integrated in closed form, and their inverses are s
 Bouc-Wen in its normalised form, with a reversible polynomial P of x = (u - centre) / scale:
 y = P(x) + weight z, dz/du = rate (1 - |z|^n [sigma sgn(z du) + 1 - sigma]). z lies within -1 and 1. In
 the common form, z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n, it is A = rate D, beta = sigma rate
-D^(1-n), gamma = (1 - sigma) rate D^(1-n) with z scaled by D: one number less, and none that the data
-cannot tell. Sources: Bouc 1967; Wen, "Method of random vibration of hysteretic systems", 1976; the
-normalised form is that of Ikhouane and Rodellar, "Systems with Hysteresis", 2007.
+D^(1-n), gamma = (1 - sigma) rate D^(1-n) with z scaled by D, a number that data cannot identify.
+Sources: Bouc 1967; Wen, "Method of random vibration of hysteretic systems", 1976; the normalised form is
+that of Ikhouane and Rodellar, "Systems with Hysteresis", 2007.
 
 Generalised, for asymmetric loops: dz/du = rate (1 - |z|^n psi),
 psi = sgn(z du) + b2 sgn(x du) + b3 sgn(x z) + b4 sgn(du) + b5 sgn(z) + b6 sgn(x). The first of the six
-shape numbers is 1: it only sets the size of z, which the weight sets too. Each of the eight combinations
-of signs has a psi of its own. Sources: Song and Der Kiureghian, "Generalized Bouc-Wen model for highly
-asymmetric hysteresis", 2006; of pneumatic muscles: Schindele and Aschemann 2012.
+shape numbers is 1, as the weight sets the size of z. Sources: Song and Der Kiureghian, "Generalized
+Bouc-Wen model for highly asymmetric hysteresis", 2006; of pneumatic muscles: Schindele and Aschemann
+2012.
 
 Duhem in Coleman and Hodgdon's form, with polynomials: dy/dx = alpha sgn(dx) (f(x) - y) + g(x); f is the
 curve that the output tends to, and g its slope right after a reversal. While the input goes one way the
@@ -27,28 +27,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt
+from annotated_types import Ge
 from numpy.typing import ArrayLike
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Start
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    StoredInitial,
-    Vector,
-)
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import Step, kernel, step
-from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
+from mckibben.blocks.memoryless import least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solved_inverse
 from mckibben.errors import ModelError
@@ -80,6 +72,36 @@ def loop_kernels(
 
     trial.__qualname__, loop_step.__qualname__ = f"{place}.trial", f"{place}.step"
     return step(loop_step), *solved_inverse(kernel(trial), advance, start)
+
+
+class Loop(Invertible):
+    """A model of one memory beside the input, whose output rises with it.
+
+    Parameters
+    ----------
+    polynomial : sequence of float
+        Ascending coefficients of the reversible part, at least one; two for the classical model.
+    weight : float
+        Output per z; negative where the output lags the input, as a muscle's displacement lags
+        pressure.
+    rate : float
+        How fast z moves with the input, per input; positive.
+    exponent : {1, 2}
+        n; how sharply z saturates.
+    centre, scale : float
+        Of the input in polynomials; scale positive.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial, input, output
+        Default memory before the first sample, z = 1 or virgin z = 0, and the channels driven and given.
+    """
+
+    solved = True
+    inverse_remembers = "input"
+    n_states = 2
+
+    def peaks(self) -> Array:
+        return np.linspace(*self.input_limits, 33)
 
 
 @kernel
@@ -153,42 +175,26 @@ def _bouc_wen_output(u: float, z: float, c: Array) -> float:
     return polynomial_at((u - c[4]) / c[5], c, 6, c.size - 6) + c[3] * z
 
 
-@dataclass(frozen=True, config=STRICT)
-class BoucWen(Invertible):
+@dataclass(frozen=True, config=fields.STRICT)
+class BoucWen(Loop):
     """Normalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
     ----------
-    polynomial : sequence of float
-        Ascending coefficients of the reversible part, at least one; two for the classical model.
-    weight : float
-        Output per z; negative where the output lags the input, as a muscle's displacement lags
-        pressure.
-    rate : float
-        How fast z moves with the input, per input; positive.
     sigma : float
         Shape of the loop, at least 0.5: the part of the decay that changes sign with the direction.
-    exponent : {1, 2}
-        n; how sharply z saturates.
-    centre, scale : float
-        Of the input in the polynomial; scale positive.
-    input_range : (float, float), optional
-        Lowest and highest input; the inverse needs it and clips there.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample: z = 1, or z = 0.
-    input, output : Channel
-        Channel driven and channel given.
+    **others
+        As of `Loop`.
     """
 
     kind = "bouc-wen"
-    solved = True
-    inverse_remembers = "input"
-    n_states = 2
     start_kernel = bouc_wen_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
         _bouc_wen_moved, _bouc_wen_output, bouc_wen_start
     )
     parameters = ("polynomial", "weight", "rate", "sigma")
+    layout = ("rate", "sigma", "exponent", "weight", "centre", "scale", "polynomial")
+    typical = ((14.0, 16.0, -1.0, -1.0), -2.5, 1.2, 0.7, 1, 2.5, 2.5, (0.0, 5.0))
     notation = Notation(
         r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
         r"\frac{dz}{du} = \rho \left(1 - |z|^n \left[\sigma \operatorname{sgn}(z\, du) + "
@@ -201,42 +207,27 @@ class BoucWen(Invertible):
         scale="s [{u}]",
     )
 
-    polynomial: Reversible
+    polynomial: fields.PolynomialField
     weight: FiniteFloat
-    rate: Annotated[FiniteFloat, Gt(0)]
+    rate: fields.Positive
     sigma: Annotated[FiniteFloat, Ge(0.5)]
     exponent: Literal[1, 2] = 1
     centre: FiniteFloat = 0.0
-    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
-
-    def coefficients(self, sample_time: float | None) -> Array:
-        """Return [rate, sigma, exponent, weight, centre, scale, polynomial]."""
-        head = [self.rate, self.sigma, self.exponent, self.weight, self.centre, self.scale]
-        return np.array([*head, *self.polynomial])
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def least_slope(self) -> float:
         steepest = self.rate * max(1.0, 2.0 * self.sigma)
         reversible = least_slope(self.polynomial, self.centre, self.scale, self.input_limits)
         return reversible + min(0.0, self.weight * steepest)
 
-    def peaks(self) -> Array:
-        return np.linspace(*self.input_limits, 33)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a saturating loop over 0 to 5 bar."""
-        return cls((14.0, 16.0, -1.0, -1.0), -2.5, 1.2, 0.7, 1, 2.5, 2.5, (0.0, 5.0))
-
 
 @kernel
 def _psi(going: float, z: float, side: float, c: Array) -> float:
-    return (
-        going * z + c[6] * side * going + c[7] * side * z + c[8] * going + c[9] * z + c[10] * side
-    )
+    return going * z + c[5] * side * going + c[6] * side * z + c[7] * going + c[8] * z + c[9] * side
 
 
 @kernel
@@ -253,7 +244,7 @@ def _stretch(z: float, du: float, side: float, c: Array) -> float:
 def _generalized_moved(u: float, c: Array, state: Array) -> float:
     """Return z after the input has gone on to ``u``.
 
-    Coefficients are [rate, n, weight, centre, scale, 1, b2 to b6, polynomial].
+    Coefficients are [rate, n, weight, centre, scale, b2 to b6, polynomial].
     """
     z, before, centre = state[0], state[1], c[3]
     if (before - centre) * (u - centre) < 0.0:
@@ -264,45 +255,32 @@ def _generalized_moved(u: float, c: Array, state: Array) -> float:
 
 @kernel
 def _generalized_output(u: float, z: float, c: Array) -> float:
-    return polynomial_at((u - c[3]) / c[4], c, 11, c.size - 11) + c[2] * z
+    return polynomial_at((u - c[3]) / c[4], c, 10, c.size - 10) + c[2] * z
 
 
-@dataclass(frozen=True, config=STRICT)
-class GeneralizedBoucWen(Invertible):
+@dataclass(frozen=True, config=fields.STRICT)
+class GeneralizedBoucWen(Loop):
     """Generalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
     ----------
-    polynomial : sequence of float
-        Ascending coefficients of the reversible part, at least one; two for the classical model.
-    weight : float
-        Output per z; negative where the output lags the input, as a muscle's displacement lags
-        pressure.
-    rate : float
-        How fast z moves with the input, per input; positive.
     shape : sequence of float, length 5
         b2 to b6; their sizes may add up to less than 1, which keeps z bounded and lets it return.
-    exponent : {1, 2}
-        n; how sharply z saturates.
-    centre, scale : float
-        Of the input in the polynomial; scale positive.
-    input_range : (float, float), optional
-        Lowest and highest input; the inverse needs it and clips there.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample: z = 1, or z = 0.
-    input, output : Channel
-        Channel driven and channel given.
+    **others
+        As of `Loop`.
     """
 
     kind = "generalized-bouc-wen"
-    solved = True
-    inverse_remembers = "input"
-    n_states = 2
     start_kernel = bouc_wen_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
         _generalized_moved, _generalized_output, bouc_wen_start
     )
     parameters = ("polynomial", "weight", "rate", "shape")
+    layout = ("rate", "exponent", "weight", "centre", "scale", "shape", "polynomial")
+    typical = (
+        *((14.0, 16.0, -1.0, -1.0), -0.9, 1.2, (0.1, -0.1, 0.15, 0.05, -0.1)),
+        *(1, 2.5, 2.5, (0.0, 5.0)),
+    )
     notation = Notation(
         r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
         r"\frac{dz}{du} = \rho \left(1 - |z|^n \psi\right)",
@@ -317,17 +295,17 @@ class GeneralizedBoucWen(Invertible):
         scale="s [{u}]",
     )
 
-    polynomial: Reversible
+    polynomial: fields.PolynomialField
     weight: FiniteFloat
-    rate: Annotated[FiniteFloat, Gt(0)]
-    shape: Vector
+    rate: fields.Positive
+    shape: fields.Vector
     exponent: Literal[1, 2] = 1
     centre: FiniteFloat = 0.0
-    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
@@ -336,42 +314,17 @@ class GeneralizedBoucWen(Invertible):
                 "up to less than 1."
             )
 
-    def coefficients(self, sample_time: float | None) -> Array:
-        """Return [rate, exponent, weight, centre, scale, 1, shape, polynomial]."""
-        head = [self.rate, self.exponent, self.weight, self.centre, self.scale, 1.0]
-        return np.array([*head, *self.shape, *self.polynomial])
-
-    def least_slope(self) -> float:
-        away = (1.0 + self.asymmetry) * self.bound**self.exponent - 1.0
-        shallowest = -self.rate * away
-        reversible = least_slope(self.polynomial, self.centre, self.scale, self.input_limits)
-        return reversible + min(self.weight * shallowest, self.weight * self.steepest, 0.0)
-
-    @property
-    def asymmetry(self) -> float:
-        """Sum of the sizes of the shape numbers."""
-        return float(np.abs(self.shape).sum())
-
     @property
     def steepest(self) -> float:
-        """Largest slope of z by the input."""
-        return self.rate * (1.0 + (1.0 + self.asymmetry) * self.bound**self.exponent)
-
-    @property
-    def bound(self) -> float:
-        """Largest size of z: where it ends with the smallest psi of loading."""
+        """Largest slope of z by the input; |z|^n is at most 1 by the smallest psi of loading."""
         signs = [(s * g, s * g, g, g, s) for s in (1, -1) for g in (1, -1)]
         smallest = 1.0 + min(float(np.dot(self.shape, sign)) for sign in signs)
-        return float(smallest ** (-1.0 / self.exponent))
+        return self.rate * (1.0 + (1.0 + float(np.abs(self.shape).sum())) / smallest)
 
-    def peaks(self) -> Array:
-        return np.linspace(*self.input_limits, 33)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a saturating loop over 0 to 5 bar."""
-        polynomial, shape = (14.0, 16.0, -1.0, -1.0), (0.1, -0.1, 0.15, 0.05, -0.1)
-        return cls(polynomial, -0.9, 1.2, shape, 1, 2.5, 2.5, (0.0, 5.0))
+    def least_slope(self) -> float:
+        reversible = least_slope(self.polynomial, self.centre, self.scale, self.input_limits)
+        slopes = 2.0 * self.rate - self.steepest, self.steepest
+        return reversible + min(*(self.weight * slope for slope in slopes), 0.0)
 
 
 @kernel
@@ -416,8 +369,8 @@ def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: flo
     return found[:size]
 
 
-@dataclass(frozen=True, config=STRICT)
-class Duhem(Invertible):
+@dataclass(frozen=True, config=fields.STRICT)
+class Duhem(Loop):
     """Duhem model with a polynomial to tend to and a polynomial slope.
 
     Parameters
@@ -428,26 +381,18 @@ class Duhem(Invertible):
         Ascending coefficients of g, output per scaled input; at least one.
     alpha : float
         How fast the output tends to f, per scaled input; positive.
-    centre, scale : float
-        Of the input; scale positive.
-    input_range : (float, float), optional
-        Lowest and highest input; the inverse needs it and clips there.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample: on the curve of inputs that have only risen, or on
-        f.
-    input, output : Channel
-        Channel driven and channel given.
+    **others
+        As of `Loop`; the memory is the output, which starts on the curve of inputs that have only risen,
+        or virgin on f.
     """
 
     kind = "duhem"
-    solved = True
-    inverse_remembers = "input"
-    n_states = 2
     start_kernel = duhem_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
         _duhem_moved, _duhem_output, duhem_start
     )
     parameters = ("target", "slope", "alpha")
+    typical = ((14.0, 16.0, -1.0), (12.0, -1.0), 1.5, 2.5, 2.5, (0.0, 5.0))
     notation = Notation(
         r"\frac{dy}{dx} = \alpha \operatorname{sgn}(dx) \left(f(x) - y\right) + "
         r"g(x),\quad x = \frac{u - m}{s}",
@@ -459,15 +404,15 @@ class Duhem(Invertible):
         scale="s [{u}]",
     )
 
-    target: Reversible
-    slope: Reversible
-    alpha: Annotated[FiniteFloat, Gt(0)]
+    target: fields.PolynomialField
+    slope: fields.PolynomialField
+    alpha: fields.Positive
     centre: FiniteFloat = 0.0
-    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [alpha, centre, scale, P rising, P falling, f], filled up to as many numbers as P."""
@@ -487,11 +432,3 @@ class Duhem(Invertible):
         low, high = np.minimum(*ends), np.maximum(*ends)
         rising, falling = self.alpha * (f - high) + g, -self.alpha * (f - low) + g
         return float(min(rising.min(), falling.min())) / self.scale
-
-    def peaks(self) -> Array:
-        return np.linspace(*self.input_limits, 33)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a loop over 0 to 5 bar that saturates."""
-        return cls((14.0, 16.0, -1.0), (12.0, -1.0), 1.5, 2.5, 2.5, (0.0, 5.0))

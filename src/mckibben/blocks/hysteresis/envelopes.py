@@ -1,7 +1,6 @@
 """Envelopes of generalised play operators: strictly increasing functions of the input.
 
-Each has two kernels, ``value`` and ``inverse``, and the frozen class that names their parameters. Adding
-one is a class here, its test, and one line in the registry.
+Each has two kernels, ``value`` and ``inverse``, and the frozen class that names their parameters.
 
 Source of the hyperbolic tangent: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling
 Behavior for Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator", Eq. (4).
@@ -13,16 +12,15 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Protocol, Self, cast
+from typing import Any, ClassVar, Protocol, Self, cast
 
 import numpy as np
-from annotated_types import Gt
 from numpy.typing import ArrayLike
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.fields import STRICT, Vector
+from mckibben.blocks.fields import STRICT, Positive, Vector
 from mckibben.blocks.kernels import inlined, kernel
 from mckibben.blocks.memoryless import check_increasing, interpolate
 from mckibben.blocks.notation import Notation
@@ -32,13 +30,7 @@ from mckibben.errors import ModelError
 
 
 class EnvelopeKernel(Protocol):
-    """A function of one number, ``kernel(argument, coefficients)``, compiled.
-
-    Attributes
-    ----------
-    batch : callable
-        ``batch(coefficients, arguments, values)``, which fills ``values``, shape (n,).
-    """
+    """A compiled function of one number; ``batch(coefficients, arguments, values)`` is that of many."""
 
     batch: Callable[[Array, Array, Array], None]
 
@@ -61,9 +53,6 @@ def envelope_kernel(function: Callable[[float, Array], float]) -> EnvelopeKernel
 
 class Envelope(Parametrised):
     """A strictly increasing function of the input, with its inverse."""
-
-    number: ClassVar[int]
-    """What C tells it by."""
 
     increasing: ClassVar[tuple[str, ...]] = ()
     """Fields of numbers in increasing order, which single precision must not make one."""
@@ -93,11 +82,10 @@ class Envelope(Parametrised):
         return self._evaluate(type(self).inverse, values)
 
     def _evaluate(self, function: EnvelopeKernel, arguments: ArrayLike) -> Array:
-        given = np.asarray(arguments, dtype=np.float64)
-        flat = np.ascontiguousarray(given.reshape(-1))
-        values = np.empty_like(flat)
-        function.batch(self.coefficients(), flat, values)
-        return values.reshape(given.shape)
+        given = np.array(arguments, dtype=np.float64, order="C")
+        values = np.empty_like(given)
+        function.batch(self.coefficients(), given.reshape(-1), values.reshape(-1))
+        return values
 
 
 def nested_envelope(content: Any) -> Any:
@@ -132,13 +120,12 @@ class Tanh(Envelope):
     """
 
     kind = "tanh"
-    number = 0
     value = tanh_value
     inverse = tanh_inverse
     parameters = ("slope", "shift", "offset")
     notation = Notation(r"\gamma(u) = \tanh(a u + b) + c", slope="a [1/{u}]", shift="b", offset="c")
 
-    slope: Annotated[FiniteFloat, Gt(0)]
+    slope: Positive
     shift: FiniteFloat
     offset: FiniteFloat = 0.0
 
@@ -180,7 +167,6 @@ class Exponential(Envelope):
     """
 
     kind = "exponential"
-    number = 1
     value = exponential_value
     inverse = exponential_inverse
     parameters = ("rate", "shift", "offset")
@@ -234,7 +220,6 @@ class PiecewiseLinear(Envelope):
     """
 
     kind = "piecewise-linear"
-    number = 2
     value = piecewise_linear_value
     inverse = piecewise_linear_inverse
     increasing = ("knots", "values")

@@ -2,37 +2,25 @@
 
 The unparallel play operator has edges of different slope: with x the input counted from the lower end
 of its range, it follows x - r on the rising edge and alpha x + beta r on the falling one, and holds
-between. Beside the weighted operators stands a polynomial of x without memory:
-y = y_0 + sum_k a_k x^k + sum_i w_i F_i[x]. With alpha = beta = 1 and no polynomial it is the classical
-PI model; with the polynomial alone set to 0, the unparallel (UPI) model.
+between; where the falling edge would run below the rising one they are the same line. Beside the
+operators stands a polynomial of x without memory: y = y_0 + sum_k a_k x^k + sum_i w_i F_i[x]. With
+alpha = beta = 1 and no polynomial it is the classical PI model; with the polynomial alone set to 0, the
+unparallel (UPI) model.
 
 Named among the alternatives in "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling
 Behavior for Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator", Section 3.1. Publications
-differ in how they write the falling edge; this general form contains them. Where the falling edge
-would run below the rising one (small r and alpha < 1) the two are the same line.
-
-The inverse is solved for every sample, until the bracket closes to rounding.
+differ in how they write the falling edge; this general form contains them.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Self
-
 import numpy as np
-from annotated_types import Ge, Gt
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    StoredInitial,
-    Vector,
-)
+from mckibben.blocks import fields
+from mckibben.blocks.base import one_per
 from mckibben.blocks.hysteresis.play_operators import check_thresholds, start_operators
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import inlined, kernel, summing_step
@@ -99,7 +87,7 @@ def eupi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -
     start_operators(coefficients[7 : state.size + 7], x, x, virgin, state)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class EUPI(Invertible):
     """Extended unparallel Prandtl-Ishlinskii model.
 
@@ -119,10 +107,8 @@ class EUPI(Invertible):
         Constant of the output.
     input_range : (float, float)
         Lowest and highest input; x counts from the lowest, and the inverse clips to both.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample.
-    input, output : Channel
-        Channel driven and channel given.
+    initial, input, output
+        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "eupi"
@@ -133,6 +119,11 @@ class EUPI(Invertible):
     inverse_kernel, inverse_start_kernel = solved_inverse(_trial, _advance, eupi_start)
     increasing = ("thresholds",)
     parameters = ("weights", "falling_slope", "falling_threshold", "polynomial", "offset")
+    typical = (
+        *((0.0, 0.3, 0.8, 1.5), (2.0, 1.5, 1.0, 0.5), 1.1, 0.8),
+        *((1.0, 0.2, -0.02), 2.0, (0.0, 5.0)),
+    )
+    n_states = one_per("thresholds")  # one an operator
     notation = Notation(
         r"y = y_0 + \sum_{k} a_k x^k + \sum_i w_i F_i[x],\quad x = u - u_{\min}",
         r"F_{i,t} = \begin{cases} \max(x_t - r_i,\, F_{i,t-1}) & x \text{ rises} \\ "
@@ -145,24 +136,19 @@ class EUPI(Invertible):
         offset="y_0 [{y}]",
     )
 
-    thresholds: Vector
-    weights: Vector
-    falling_slope: Annotated[FiniteFloat, Gt(0)]
-    falling_threshold: Annotated[FiniteFloat, Ge(0)]
+    thresholds: fields.Vector
+    weights: fields.Vector
+    falling_slope: fields.Positive
+    falling_threshold: fields.NotNegative
     polynomial: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
     offset: FiniteFloat
-    input_range: InputRange
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    input_range: fields.InputRange
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
-
-    @property
-    def n_states(self) -> int:
-        """One an operator."""
-        return len(self.thresholds)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights]."""
@@ -193,12 +179,5 @@ class EUPI(Invertible):
         return float(slope + (self.weights[0] if reversible else 0.0))
 
     def remembered(self, state: Array) -> tuple[float, ...]:
-        """Return the lowest input: which one was last, the operators do not tell."""
-        del state
+        """Return the lowest input: operators do not determine which one was last."""
         return (self.input_range[0],)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a loop over 0 to 5 bar that falls more steeply than it rises."""
-        shape = (1.0, 0.2, -0.02)
-        return cls((0.0, 0.3, 0.8, 1.5), (2.0, 1.5, 1.0, 0.5), 1.1, 0.8, shape, 2.0, (0.0, 5.0))

@@ -6,12 +6,10 @@ w_{t-1} when it stands still; the output is y = sum_i x_i w_i.
 
 The inverse finds the common envelope value z at which the weighted sum equals the reference, then
 u = gamma_R^{-1}(z) while the reference rises and gamma_L^{-1}(z) while it falls. At a reversal z is
-continuous while u jumps across the dead zone between the envelopes, where every operator holds, so
-the inverse stays exact through minor loops.
+continuous while u jumps across the dead zone between the envelopes, where every operator holds.
 
-The paper starts operators from f_r(u_0, 0), Eq. (1), without saying which branch a first sample takes.
-Both together leave one meaning: 0, moved no further than into [gamma_R(u_0) - r, gamma_L(u_0) + r],
-which is the rule ``virgin``. ``first_sample`` takes gamma_R(u_0) - r, as if the input had only risen.
+Operators start from f_r(u_0, 0), Eq. (1), with the rule ``virgin``: 0, moved no further than into
+[gamma_R(u_0) - r, gamma_L(u_0) + r]. ``first_sample`` takes gamma_R(u_0) - r.
 
 Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
 Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (1) to (7), the inverse Eqs. (16) to (20).
@@ -22,25 +20,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Start
+from mckibben.blocks import fields
+from mckibben.blocks.base import Block, one_per
 from mckibben.blocks.compose import Series
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    StoredInitial,
-    Vector,
-    vector,
-)
 from mckibben.blocks.hysteresis.envelopes import Envelope, Tanh, nested_envelope
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
@@ -50,14 +39,8 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_sum,
 )
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import Step, kernel, step, summing_step
-from mckibben.blocks.learning import (
-    Learnable,
-    follow_learning,
-    inverse_at,
-    learnable_operators,
-    start_learning,
-)
+from mckibben.blocks.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.learning import Learnable, learnable_operators, learning_kernels
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -65,43 +48,39 @@ from mckibben.errors import ModelError
 EnvelopeField = Annotated[InstanceOf[Envelope], BeforeValidator(nested_envelope)]
 
 
-class Kernels(NamedTuple):
-    """The kernels of models with two kinds of envelopes."""
-
-    step: Step
-    start: Start
-    inverse_step: Step
-    inverse_start: Start
-    adaptive_step: Step
-    adaptive_start: Start
-
-
 @cache
-def gpi_kernels(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
-    """Return the kernels of models with these kinds of envelopes.
+def kernels_of(rising: type[Envelope], falling: type[Envelope]) -> tuple[Any, ...]:
+    """Return step and start of models with two kinds of envelopes, of inverses, and of learning ones.
 
-    Coefficients are [kind and size of rising, of falling, thresholds, weights, rising, falling], and of
-    the inverse [lowest, highest input] before. The state is [operators, previous input], and of the
-    inverse also [previous reference, samples clipped].
+    Coefficients are [size of the rising envelope, thresholds, weights, rising, falling], and of the
+    inverse [lowest, highest input] before. The state is [operators, previous input], and of the inverse
+    also [previous reference, samples clipped].
     """
     rising_at, rising_from = rising.value, rising.inverse
     falling_at, falling_from = falling.value, falling.inverse
+
+    @inlined
+    def rising_edge(u: float, c: Array, n: int) -> float:
+        return rising_at(u, c[2 * n + 1 : 2 * n + 1 + int(c[0])])
+
+    @inlined
+    def falling_edge(u: float, c: Array, n: int) -> float:
+        return falling_at(u, c[2 * n + 1 + int(c[0]) :])
 
     @summing_step
     def gpi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
         """Run a GPI model."""
         n = state.size - 1
-        r, w = coefficients[4 : n + 4], coefficients[n + 4 : 2 * n + 4]
-        first = 2 * n + 4 + int(coefficients[1])
+        r, w = coefficients[1 : n + 1], coefficients[n + 1 : 2 * n + 1]
         u = inputs[0]
         y = 0.0
         if u > state[n]:
-            edge = rising_at(u, coefficients[2 * n + 4 : first])
+            edge = rising_edge(u, coefficients, n)
             for i in range(n):
                 state[i] = max(state[i], edge - r[i])
                 y += w[i] * state[i]
         else:
-            edge = falling_at(u, coefficients[first:]) if u < state[n] else np.inf
+            edge = falling_edge(u, coefficients, n) if u < state[n] else np.inf
             for i in range(n):
                 state[i] = min(state[i], edge + r[i])
                 y += w[i] * state[i]
@@ -112,92 +91,57 @@ def gpi_kernels(rising: type[Envelope], falling: type[Envelope]) -> Kernels:
     def gpi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
         """Start a GPI model before its first sample."""
         n = state.size - 1
-        first = 2 * n + 4 + int(coefficients[1])
-        u = inputs[0]
-        edge = rising_at(u, coefficients[2 * n + 4 : first])
-        other = falling_at(u, coefficients[first:])
-        start_operators(coefficients[4 : n + 4], edge, other, virgin, state[:n])
+        u, c = inputs[0], coefficients
+        up, down = rising_edge(u, c, n), falling_edge(u, c, n)
+        start_operators(c[1 : n + 1], up, down, virgin, state[:n])
         state[n] = u
+
+    @inlined
+    def go(way: float, c: Array, state: Array, n: int) -> float:
+        """Move to the input, within its limits, at which the envelope of a direction has the edge."""
+        first = 2 * n + 3 + int(c[2])
+        if way > 0.0:
+            state[n] = min(max(rising_from(state[0], c[2 * n + 3 : first]), c[0]), c[1])
+        elif way < 0.0:
+            state[n] = min(max(falling_from(state[0], c[first:]), c[0]), c[1])
+        return state[n]
 
     @step
     def gpi_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
         """Invert: find the operators' common edge, and the input from the envelope of the direction."""
-        n = state.size - 3
-        low, high = coefficients[0], coefficients[1]
-        r, w = coefficients[6 : n + 6], coefficients[n + 6 : 2 * n + 6]
-        first = 2 * n + 6 + int(coefficients[3])
-        up, down = coefficients[2 * n + 6 : first], coefficients[first:]
-        lowest, highest = falling_at(low, down), rising_at(high, up)
-        direction, clipped = follow(inputs[0], state[n + 1], lowest, highest, r, w, state[:n])
+        n, c = state.size - 3, coefficients[2:]
+        r, w = c[1 : n + 1], c[n + 1 : 2 * n + 1]
+        lowest = falling_edge(coefficients[0], c, n)
+        highest = rising_edge(coefficients[1], c, n)
+        way, clipped = follow(inputs[0], state[n + 1], lowest, highest, r, w, state[:n])
         if clipped:
             state[n + 2] += 1.0
         state[n + 1] = inputs[0]
-        if direction > 0.0:
-            state[n] = min(max(rising_from(state[0], up), low), high)
-        elif direction < 0.0:
-            state[n] = min(max(falling_from(state[0], down), low), high)
-        outputs[0] = state[n]
+        outputs[0] = go(way, coefficients, state, n)
 
     @kernel
     def gpi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
         """Start the inverse of a GPI model before its first reference."""
-        n = state.size - 3
-        low, high = coefficients[0], coefficients[1]
-        r, w = coefficients[6 : n + 6], coefficients[n + 6 : 2 * n + 6]
-        first = 2 * n + 6 + int(coefficients[3])
-        up, down = coefficients[2 * n + 6 : first], coefficients[first:]
-        y = inputs[0]
-        lowest = falling_at(low, down) if virgin else rising_at(low, up)
-        start_sum(y, lowest, rising_at(high, up), r, w, virgin, state[:n])
-        falls = virgin and y < 0.0
-        u = falling_from(state[0], down) if falls else rising_from(state[0], up)
-        state[n], state[n + 1], state[n + 2] = min(max(u, low), high), y, 0.0
-
-    @step
-    def gpi_adaptive_step(
-        coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
-    ) -> None:
-        """Invert, and learn the weights and an offset from what is measured."""
-        n = int(coefficients[0]) - 1
-        own = coefficients[inverse_at(coefficients) :]
-        first = 2 * n + 6 + int(own[3])
-        s, last, learnt = state[:n], state[n + 1 : n + 4], state[n + 4 :]
-        direction = follow_learning(
-            coefficients, own[6 : n + 6], s, last, learnt, scratch, inputs[0], inputs[1]
-        )
-        if direction > 0.0:
-            state[n] = min(max(rising_from(s[0], own[2 * n + 6 : first]), own[0]), own[1])
-        elif direction < 0.0:
-            state[n] = min(max(falling_from(s[0], own[first:]), own[0]), own[1])
-        outputs[0] = state[n]
-
-    @kernel
-    def gpi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-        """Start as the inverse does, with the weights as fitted."""
-        n = int(coefficients[0]) - 1
-        gpi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 3], inputs, virgin)
-        state[n + 3] = 0.0
-        start_learning(coefficients, state[n + 4 :])
+        n, c = state.size - 3, coefficients[2:]
+        r, w = c[1 : n + 1], c[n + 1 : 2 * n + 1]
+        low, y = coefficients[0], inputs[0]
+        lowest = falling_edge(low, c, n) if virgin else rising_edge(low, c, n)
+        start_sum(y, lowest, rising_edge(coefficients[1], c, n), r, w, virgin, state[:n])
+        go(-1.0 if virgin and y < 0.0 else 1.0, coefficients, state, n)
+        state[n + 1], state[n + 2] = y, 0.0
 
     forward = (gpi_step, gpi_start, gpi_inverse_step, gpi_inverse_start)
-    return Kernels(*forward, gpi_adaptive_step, gpi_adaptive_start)
+    return *forward, *learning_kernels(gpi_inverse_start, go, 1)
 
 
-@kernel
-def gpi_matrix(
-    u: Array, rising: Array, falling: Array, r: Array, s: Array, operators: Array
-) -> None:
-    """Run generalised play operators side by side: ``operators[t, i]`` is operator i after sample t.
+def of_envelopes(place: int) -> Any:
+    """Return a property: one of the kernels for a model's kinds of envelopes."""
 
-    Shapes: u, rising and falling (n,), r and s (N,), operators (n, N). Changes the states ``s``, which
-    are those after the first sample: nothing moves before the second.
-    """
-    for t in range(u.size):
-        lower = rising[t] if u[t] > u[max(t - 1, 0)] else -np.inf
-        upper = falling[t] if u[t] < u[max(t - 1, 0)] else np.inf
-        for i in range(r.size):
-            s[i] = min(max(s[i], lower - r[i]), upper + r[i])
-            operators[t, i] = s[i]
+    def kernel_of(model: GPI) -> Any:
+        kinds: Any = (type(model.rising), type(model.falling))
+        return kernels_of(*kinds)[place]
+
+    return property(kernel_of)
 
 
 def smallest_gap(
@@ -213,17 +157,7 @@ def smallest_gap(
     return float(gaps[best]), float(u[best])
 
 
-def of_envelopes(name: str) -> Any:
-    """Return a property: the kernel of this name for a model's kinds of envelopes."""
-
-    def kernel_of(model: GPI) -> Any:
-        kinds: Any = (type(model.rising), type(model.falling))
-        return getattr(gpi_kernels(*kinds), name)
-
-    return property(kernel_of)
-
-
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class GPI(Invertible):
     """Generalised Prandtl-Ishlinskii model.
 
@@ -238,20 +172,18 @@ class GPI(Invertible):
         gamma_R and gamma_L. The inverse wants gamma_L >= gamma_R over the input range.
     input_range : (float, float)
         Lowest and highest input, over which the conditions hold and to which the inverse clips.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample.
-    input, output : Channel
-        Channel driven and channel given.
+    initial, input, output
+        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "gpi"
-    kernel = of_envelopes("step")
-    start_kernel = of_envelopes("start")
-    inverse_kernel = of_envelopes("inverse_step")
-    inverse_start_kernel = of_envelopes("inverse_start")
+    kernel, start_kernel, inverse_kernel, inverse_start_kernel = map(of_envelopes, range(4))
+    adaptive_step, adaptive_start = map(of_envelopes, (4, 5))
     inverse_remembers = "output"
     increasing = ("thresholds",)
     parameters = ("weights", "rising", "falling")
+    n_states = one_per("thresholds", 1)  # and the previous input
+    typical = ((0.0, 0.1, 0.3, 0.5), (9.0, 4.0, 2.0, 1.0), *Tanh.examples(), (0.0, 5.0))
     notation = Notation(
         r"y = \sum_i x_i w_i",
         r"w_{i,t} = \begin{cases} \max(\gamma_R(u_t) - r_i,\, w_{i,t-1}) & u \text{ "
@@ -260,28 +192,22 @@ class GPI(Invertible):
         weights="x_i [{y}]",
     )
 
-    thresholds: Vector
-    weights: Vector
+    thresholds: fields.Vector
+    weights: fields.Vector
     rising: EnvelopeField
     falling: EnvelopeField
-    input_range: InputRange
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    input_range: fields.InputRange
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
 
-    @property
-    def n_states(self) -> int:
-        """One an operator, and the previous input."""
-        return len(self.thresholds) + 1
-
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [kind and size of rising, of falling, thresholds, weights, rising, falling]."""
+        """Return [size of the rising envelope, thresholds, weights, rising, falling]."""
         up, down = self.rising.coefficients(), self.falling.coefficients()
-        head = [self.rising.number, up.size, self.falling.number, down.size]
-        return np.array([*head, *self.thresholds, *self.weights, *up, *down])
+        return np.array([up.size, *self.thresholds, *self.weights, *up, *down])
 
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Give the thresholds, and the knots of the envelopes that have some."""
@@ -293,8 +219,7 @@ class GPI(Invertible):
         """Return the peaks from which the operators just come back to the lowest input."""
         low, high = self.input_limits
         edges = self.falling(low) + 2 * np.array(self.thresholds)
-        inside = edges[edges < self.rising(high)]
-        return np.asarray(self.rising.solve(inside))
+        return np.asarray(self.rising.solve(edges[edges < self.rising(high)]))
 
     def check_invertible(self) -> None:
         """Demand a first threshold of 0, an increasing sum, and envelopes in order within the limits."""
@@ -308,7 +233,6 @@ class GPI(Invertible):
             )
 
     def inverse_numbers(self, own: Array) -> Array:
-        """Return [lowest, highest input], then this model's."""
         return np.array([*self.input_limits, *own])
 
     def remembered(self, state: Array) -> tuple[float, ...]:
@@ -319,17 +243,11 @@ class GPI(Invertible):
         """Weights, and an offset that the model itself has not."""
         low, high = self.input_range
         limits = float(self.falling(low)), float(self.rising(high))
-        kernels = gpi_kernels(type(self.rising), type(self.falling))
 
         def with_parameters(theta: Array) -> Block:
-            changed, offset = replace(self, weights=vector(theta[:-1])), float(theta[-1])
+            changed, offset = replace(self, weights=fields.vector(theta[:-1])), float(theta[-1])
             shift = Affine(1.0, offset, self.output, self.output)
             return Series((changed, shift)) if offset else changed
 
-        adaptive = kernels.adaptive_step, kernels.adaptive_start
+        adaptive = (self.adaptive_step, self.adaptive_start)
         return learnable_operators(self, limits, 0.0, *adaptive, with_parameters)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a saturating, asymmetric loop over 0 to 5 bar."""
-        return cls((0.0, 0.1, 0.3, 0.5), (9.0, 4.0, 2.0, 1.0), *Tanh.examples(), (0.0, 5.0))

@@ -4,40 +4,27 @@ y = P((u - centre) / scale) + sum_i w_i s_i,
 
 where s_i is the deflection of spring i, whose far end slips once the spring is stretched by its
 limit: rising inputs stretch it, s <- min(s + du, r_i); falling ones press it, s <- max(s + kappa
-du, -lambda r_i). kappa = lambda = 1 is the Maxwell-slip model, whose elements are stop operators;
-other ratios of stiffness and of limits make loops that differ between both directions.
+du, -lambda r_i). kappa = lambda = 1 is the Maxwell-slip model, whose elements are stop operators.
 
 Sources: Goldfarb and Celanovic 1997 (Maxwell-slip); Vo-Minh et al. 2011 (of pneumatic muscles); Liu
-et al. 2016 (the modified model: limits and stiffnesses differ between rising and falling inputs;
-ours has one ratio of each for all elements).
+et al. 2016 (the modified model, here with one ratio of each for all elements).
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Self
-
 import numpy as np
-from annotated_types import Gt
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    StoredInitial,
-    Vector,
-)
+from mckibben.blocks import fields
+from mckibben.blocks.base import one_per
 from mckibben.blocks.hysteresis.play_operators import check_thresholds
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import accumulate, kernel, step
-from mckibben.blocks.memoryless import Reversible, least_slope, polynomial_at
+from mckibben.blocks.memoryless import least_slope, polynomial_at
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import solve_input, solved_start
-from mckibben.errors import ModelError
 
 
 @kernel
@@ -72,24 +59,28 @@ def slip_matrix(
 
 @kernel
 def _advance(u: float, c: Array, state: Array, lost: Array) -> None:
-    n, m = state.size - 1, int(c[0])
+    n = state.size - 1
     du = u - state[n]
-    change = stretch(du, c[1])
+    change = stretch(du, c[0])
     for i in range(n):
-        deflection = accumulate(state[i], change, lost, i)
-        state[i] = slip(deflection, du, c[5 + m + i], c[2])
+        state[i] = slip(accumulate(state[i], change, lost, i), du, c[4 + i], c[1])
     state[n] = u
+
+
+@kernel
+def _reversible(u: float, c: Array, n: int) -> float:
+    return polynomial_at((u - c[2]) / c[3], c, 4 + 2 * n, c.size - 4 - 2 * n)
 
 
 @kernel
 def _trial(u: float, memory: tuple[Array, Array]) -> float:
     c, state = memory
-    n, m = state.size - 1, int(c[0])
+    n = state.size - 1
     du = u - state[n]
-    change = stretch(du, c[1])
-    y = polynomial_at((u - c[3]) / c[4], c, 5, m)
+    change = stretch(du, c[0])
+    y = _reversible(u, c, n)
     for i in range(n):
-        y += c[5 + m + n + i] * slip(state[i] + change, du, c[5 + m + i], c[2])
+        y += c[4 + n + i] * slip(state[i] + change, du, c[4 + i], c[1])
     return y
 
 
@@ -99,16 +90,13 @@ def maxwell_slip_step(
 ) -> None:
     """Run the model; the state is [deflections, previous input].
 
-    Coefficients are [size of the polynomial, kappa, lambda, centre, scale, polynomial, limits,
-    weights].
+    Coefficients are [kappa, lambda, centre, scale, limits, weights, polynomial].
     """
-    n, m = state.size - 1, int(coefficients[0])
-    weights = coefficients[5 + m + n :]
-    u = inputs[0]
-    _advance(u, coefficients, state, scratch)
-    y = polynomial_at((u - coefficients[3]) / coefficients[4], coefficients, 5, m)
+    n = state.size - 1
+    _advance(inputs[0], coefficients, state, scratch)
+    y = _reversible(inputs[0], coefficients, n)
     for i in range(n):
-        y += weights[i] * state[i]
+        y += coefficients[4 + n + i] * state[i]
     outputs[0] = y
 
 
@@ -125,13 +113,13 @@ def maxwell_slip_inverse_step(
 @kernel
 def maxwell_slip_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start with all springs slipping upwards, or none deflected."""
-    n, m = state.size - 1, int(coefficients[0])
+    n = state.size - 1
     for i in range(n):
-        state[i] = 0.0 if virgin else coefficients[5 + m + i]
+        state[i] = 0.0 if virgin else coefficients[4 + i]
     state[n] = inputs[0]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class MaxwellSlip(Invertible):
     """Springs that slip, beside a reversible polynomial.
 
@@ -166,7 +154,17 @@ class MaxwellSlip(Invertible):
     inverse_kernel = maxwell_slip_inverse_step
     inverse_start_kernel = solved_start(_trial, maxwell_slip_start)
     parameters = ("weights", "polynomial", "stiffness_ratio", "limit_ratio")
+    layout = (
+        *("stiffness_ratio", "limit_ratio", "centre", "scale"),
+        *("breakaways", "weights", "polynomial"),
+    )
     increasing = ("breakaways",)
+    typical = (
+        *((0.3, 0.8, 1.6), (-1.0, -0.8, -0.5), (14.0, 17.0, -1.0)),
+        *(1.1, 0.8, 2.5, 2.5, (0.0, 5.0)),
+    )
+    n_states = one_per("breakaways", 1)  # deflections and the previous input
+    n_scratch = one_per("breakaways")  # what single precision loses of the deflections
     notation = Notation(
         r"y = \sum_k c_k x^k + \sum_i w_i s_i,\quad x = \frac{u - m}{s}",
         r"s_{i,t} = \begin{cases} \min(s_{i,t-1} + \Delta u,\, r_i) & u \text{ rises} \\ "
@@ -180,38 +178,20 @@ class MaxwellSlip(Invertible):
         scale="s [{u}]",
     )
 
-    breakaways: Vector
-    weights: Vector
-    polynomial: Reversible
-    stiffness_ratio: Annotated[FiniteFloat, Gt(0)] = 1.0
-    limit_ratio: Annotated[FiniteFloat, Gt(0)] = 1.0
+    breakaways: fields.PositiveVector
+    weights: fields.Vector
+    polynomial: fields.PolynomialField
+    stiffness_ratio: fields.Positive = 1.0
+    limit_ratio: fields.Positive = 1.0
     centre: FiniteFloat = 0.0
-    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    scale: fields.Positive = 1.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.breakaways, self.weights)
-        if self.breakaways[0] == 0:
-            raise ModelError(f"{self.kind!r} wants limits above 0. Remedy: give positive limits.")
-
-    @property
-    def n_states(self) -> int:
-        """Deflections and the previous input."""
-        return len(self.breakaways) + 1
-
-    @property
-    def n_scratch(self) -> int:
-        """What single precision loses of the deflections."""
-        return len(self.breakaways)
-
-    def coefficients(self, sample_time: float | None) -> Array:
-        """Return [size, kappa, lambda, centre, scale, polynomial, limits, weights]."""
-        head = [len(self.polynomial), self.stiffness_ratio, self.limit_ratio]
-        tail = [*self.polynomial, *self.breakaways, *self.weights]
-        return np.array([*head, self.centre, self.scale, *tail])
 
     def least_slope(self) -> float:
         softening = float(np.minimum(self.weights, 0.0).sum()) * max(1.0, self.stiffness_ratio)
@@ -221,9 +201,3 @@ class MaxwellSlip(Invertible):
         """Return the peaks at which one spring more slips."""
         low, _ = self.input_limits
         return low + 2.0 * np.array(self.breakaways)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return an asymmetric loop over 0 to 5 bar."""
-        breakaways, weights, polynomial = (0.3, 0.8, 1.6), (-1.0, -0.8, -0.5), (14.0, 17.0, -1.0)
-        return cls(breakaways, weights, polynomial, 1.1, 0.8, 2.5, 2.5, (0.0, 5.0))

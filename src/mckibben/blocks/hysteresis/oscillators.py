@@ -4,16 +4,14 @@ m y'' + c y' + k y + z = u,
 z' = f(z, y') y'.
 
 The force u drives, the displacement y is given, and the force z of the element moves with y alone, at
-whatever pace: its slope f looks at z and at the direction of y'. Models differ in f.
+whatever pace: its slope f depends on z and on the direction of y'. Models differ in f.
 
-The Bouc-Wen element has f = a - gamma sgn(y') z - delta |z|. In the common form,
-z' = alpha y' - beta (gamma |y'| z + delta y' |z|), beta enters with gamma and delta only: here they are
-its products, one number less, and none that the data cannot tell. Both may have either sign; gamma is
-what makes loops, and where gamma + delta < 0 they harden.
+The Bouc-Wen element has f = a - gamma sgn(y') z - delta |z|; of the common form,
+z' = alpha y' - beta (gamma |y'| z + delta y' |z|), gamma and delta are the products with beta. Both may
+have either sign; gamma makes loops, and where gamma + delta < 0 they harden.
 
-Duhem's element has f = r(z) while y rises, and s(z) while it falls: slopes that follow the force,
-straight between knots of z, and constant beyond them. Nothing is said of a shape but that the element
-has one number to remember. A knot at z = 0 is worth having, for there loading turns into unloading.
+Duhem's element has f = r(z) while y rises, and s(z) while it falls, straight between knots of z, and
+constant beyond them. A knot at z = 0 is useful, where loading turns into unloading.
 
 Sources: Bouc 1967; Wen, "Method of random vibration of hysteretic systems", 1976; as a benchmark of
 identification, Noel and Schoukens, "Hysteretic benchmark with a dynamic nonlinearity", 2016; on Duhem's
@@ -22,37 +20,26 @@ model, Visintin, "Differential models of hysteresis", 1994.
 From sample to sample the input goes in a straight line (first-order hold) or stays (zero-order); the
 equations are integrated by the classic Runge-Kutta method in substeps of equal length. f jumps only
 where y' passes 0, so that z' has corners and no jumps; steps over these leave errors of second order.
-
-Straight lines take (omega T)^2 / 12 off a sine of the input, T being the sample time: where that counts,
-and the input is known beforehand, put samples between by a spline. A period of a recording can be run
-with its input band-limited between samples, `steady_state`.
+Straight lines take (omega T)^2 / 12 off a sine of the input, T being the sample time: `steady_state` has
+the input band-limited between samples.
 """
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks import fields
 from mckibben.blocks.base import Block, Cost, Run, Start, needs_sample_time
 from mckibben.blocks.dynamics.repeating import Hold, Substeps, steady_state
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    FORCE,
-    STRICT,
-    ChannelField,
-    NotNegative,
-    Positive,
-    StoredInitial,
-    Vector,
-)
-from mckibben.blocks.kernels import Step, inlined, kernel, step
+from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import gathered
 from mckibben.errors import ModelError
 
 HEAD = 7
@@ -65,78 +52,65 @@ STABLE = 2.5
 """Radians of the fastest oscillation in a substep beyond which Runge-Kutta steps may grow."""
 
 
-@inlined
-def oscillate(slope: Any, coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Run an oscillator whose element has ``slope(z, velocity, numbers)``.
+def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[Step, Start]:
+    """Return the step and the start of an oscillator whose element has ``slope(z, velocity, numbers)``.
 
     Coefficients are [substep, how many, 1 for zero-order hold, m, c, k, offset, numbers of the
     element]; the state is [y, y', z, last input].
     """
-    h, n, held = coefficients[0], int(coefficients[1]), coefficients[2] > 0.0
-    m, c, k, offset = coefficients[3], coefficients[4], coefficients[5], coefficients[6]
-    own = coefficients[HEAD:]
-    y, v, z = state[0], state[1], state[2]
-    rise = 0.0 if held else (inputs[0] - state[3]) / n
-    for s in range(n):
-        u = state[3] + s * rise
-        v1 = v
-        a1 = (u - c * v1 - k * y - z) / m
-        z1 = v1 * slope(z, v1, own)
-        u += 0.5 * rise
-        v2 = v + 0.5 * h * a1
-        x = z + 0.5 * h * z1
-        a2 = (u - c * v2 - k * (y + 0.5 * h * v1) - x) / m
-        z2 = v2 * slope(x, v2, own)
-        v3 = v + 0.5 * h * a2
-        x = z + 0.5 * h * z2
-        a3 = (u - c * v3 - k * (y + 0.5 * h * v2) - x) / m
-        z3 = v3 * slope(x, v3, own)
-        u += 0.5 * rise
-        v4 = v + h * a3
-        x = z + h * z3
-        a4 = (u - c * v4 - k * (y + h * v3) - x) / m
-        z4 = v4 * slope(x, v4, own)
-        y += h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4)
-        v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-        z += h / 6.0 * (z1 + 2.0 * z2 + 2.0 * z3 + z4)
-    state[3] = inputs[0]
-    outputs[0] = y + offset
-    state[0], state[1], state[2] = y, v, z
-
-
-@inlined
-def settle(slope: Any, coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start at rest: where the first input leads slowly from none, or, virgin, without force."""
-    force = 0.0 if virgin else inputs[0]
-    k, own = coefficients[5], coefficients[HEAD:]
-    step = force / SETTLING
-    z = 0.0
-    for _ in range(SETTLING):
-        share1 = _share(slope, z, force, k, own)
-        share2 = _share(slope, z + 0.5 * step * share1, force, k, own)
-        share3 = _share(slope, z + 0.5 * step * share2, force, k, own)
-        share4 = _share(slope, z + step * share3, force, k, own)
-        z += step / 6.0 * (share1 + 2.0 * share2 + 2.0 * share3 + share4)
-    state[0], state[1], state[2], state[3] = (force - z) / k, 0.0, z, force
-
-
-@inlined
-def _share(slope: Any, z: float, force: float, k: float, own: Array) -> float:
-    """Return the share of a slow input that the element takes."""
-    stiffness = slope(z, force, own)
-    return stiffness / (k + stiffness)
-
-
-def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[Step, Start]:
-    """Return the step and the start of an oscillator by the slope of its element."""
 
     def oscillator_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-        """Run an oscillator in substeps; see `oscillate`."""
-        oscillate(slope, coefficients, state, inputs, outputs)
+        """Run an oscillator in substeps of Runge and Kutta."""
+        h, n, held = coefficients[0], int(coefficients[1]), coefficients[2] > 0.0
+        m, c, k, offset = coefficients[3], coefficients[4], coefficients[5], coefficients[6]
+        own = coefficients[HEAD:]
+        y, v, z = state[0], state[1], state[2]
+        rise = 0.0 if held else (inputs[0] - state[3]) / n
+        for s in range(n):
+            u = state[3] + s * rise
+            v1 = v
+            a1 = (u - c * v1 - k * y - z) / m
+            z1 = v1 * slope(z, v1, own)
+            u += 0.5 * rise
+            v2 = v + 0.5 * h * a1
+            x = z + 0.5 * h * z1
+            a2 = (u - c * v2 - k * (y + 0.5 * h * v1) - x) / m
+            z2 = v2 * slope(x, v2, own)
+            v3 = v + 0.5 * h * a2
+            x = z + 0.5 * h * z2
+            a3 = (u - c * v3 - k * (y + 0.5 * h * v2) - x) / m
+            z3 = v3 * slope(x, v3, own)
+            u += 0.5 * rise
+            v4 = v + h * a3
+            x = z + h * z3
+            a4 = (u - c * v4 - k * (y + h * v3) - x) / m
+            z4 = v4 * slope(x, v4, own)
+            y += h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4)
+            v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+            z += h / 6.0 * (z1 + 2.0 * z2 + 2.0 * z3 + z4)
+        state[3] = inputs[0]
+        outputs[0] = y + offset
+        state[0], state[1], state[2] = y, v, z
+
+    @kernel
+    def share(z: float, force: float, k: float, own: Array) -> float:
+        """Return the share of a slow input that the element takes."""
+        stiffness = slope(z, force, own)
+        return stiffness / (k + stiffness)
 
     def oscillator_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-        """Start an oscillator at rest; see `settle`."""
-        settle(slope, coefficients, state, inputs, virgin)
+        """Start at rest: where the first input leads slowly from none, or, virgin, without force."""
+        force = 0.0 if virgin else inputs[0]
+        k, own = coefficients[5], coefficients[HEAD:]
+        step = force / SETTLING
+        z = 0.0
+        for _ in range(SETTLING):
+            share1 = share(z, force, k, own)
+            share2 = share(z + 0.5 * step * share1, force, k, own)
+            share3 = share(z + 0.5 * step * share2, force, k, own)
+            share4 = share(z + step * share3, force, k, own)
+            z += step / 6.0 * (share1 + 2.0 * share2 + 2.0 * share3 + share4)
+        state[0], state[1], state[2], state[3] = (force - z) / k, 0.0, z, force
 
     oscillator_step.__qualname__ = f"{slope.__qualname__}.step"
     oscillator_start.__qualname__ = f"{slope.__qualname__}.start"
@@ -144,12 +118,37 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
 
 
 class Oscillator(Block):
-    """A block with the fields of an oscillator, whose element a class adds."""
+    """Mass, damper and spring with an element that a class adds, from force to displacement.
+
+    Parameters
+    ----------
+    mass : float
+        m, the moving mass [kg]; positive.
+    damping : float
+        c, force by velocity [N s/mm]; not negative.
+    stiffness : float
+        k, force by displacement [N/mm]; positive.
+    output_offset : float or None
+        Added to the displacement [mm]; None for none.
+    substeps : int
+        Runge-Kutta steps from sample to sample.
+    hold : {"first", "zero"}
+        What the input does between samples: go on in a straight line, or stay.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest where the first input leads slowly, or at rest
+        without any force, from which the input then goes to the first sample within one sample time.
+    input, output : Channel
+        Force and displacement.
+    """
 
     rate_dependent = True
     steady_state = steady_state
+    n_states = 4  # displacement, velocity, force of the element, last input
     slope_by: ClassVar[Any]
     """Slope of the element's force by y, from [force, velocity, `element`]; compiled."""
+
+    elements: ClassVar[tuple[str, ...]]
+    """Fields of the element."""
 
     mass: float
     damping: float
@@ -160,14 +159,9 @@ class Oscillator(Block):
     initial: Any
 
     @property
-    @abstractmethod
     def element(self) -> Array:
         """Numbers of the element, one-dimensional."""
-
-    @property
-    def n_states(self) -> int:
-        """Displacement, velocity, force of the element, last input."""
-        return 4
+        return gathered(self, self.elements)
 
     @property
     def fastest(self) -> float:
@@ -181,26 +175,13 @@ class Oscillator(Block):
         return 1e-3 * self.mass
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return what the kernel reads, for a sample time.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time.
-        """
         step = needs_sample_time(self.kind, sample_time)
         head = [step / self.substeps, self.substeps, self.hold == "zero"]
         springs = [self.inertia, self.damping, self.stiffness, self.output_offset or 0.0]
         return np.array([*head, *springs, *self.element])
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs the kernel in place.
-
-        Raises
-        ------
-        ModelError
-            Without a sample time, or where substeps are too few for it.
-        """
+        """Return a function that runs the kernel in place; refuse too few substeps for a sample time."""
         step = needs_sample_time(self.kind, sample_time)
         angle = self.fastest * step
         if not angle <= STABLE * self.substeps:
@@ -224,39 +205,26 @@ def bouc_wen_slope(z: float, velocity: float, numbers: Array) -> float:
     return numbers[0] - numbers[1] * along - numbers[2] * abs(z)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class BoucWenOscillator(Oscillator):
     """Mass, damper and spring with a Bouc-Wen element, from force to displacement.
 
     Parameters
     ----------
-    mass : float
-        m, the moving mass [kg]; positive.
-    damping : float
-        c, force by velocity [N s/mm]; not negative.
-    stiffness : float
-        k, force by displacement [N/mm]; positive.
     slope : float
         Stiffness of the element about z = 0 [N/mm]; positive.
     gamma, delta : float
         Shape of the element: how fast it loses its stiffness, on the whole and by direction [1/mm].
-    output_offset : float or None
-        Added to the displacement [mm]; None for none.
-    substeps : int
-        Runge-Kutta steps from sample to sample.
-    hold : {"first", "zero"}
-        What the input does between samples: go on in a straight line, or stay.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample: at rest where the first input leads slowly, or at rest
-        without any force, from which the input then goes to the first sample within one sample time.
-    input, output : Channel
-        Channel driven and channel given.
+    **others
+        As of `Oscillator`.
     """
 
     kind = "bouc-wen-oscillator"
     kernel, start_kernel = oscillator_kernels(bouc_wen_slope)
     slope_by = bouc_wen_slope
+    elements = ("slope", "gamma", "delta")
     parameters = ("mass", "damping", "stiffness", "slope", "gamma", "delta", "output_offset")
+    typical = (2.0, 0.004, 0.3, 0.2, 0.12, -0.15)
     notation = Notation(
         r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
         r"\dot{z} = a \dot{q} - \gamma |\dot{q}| z - \delta \dot{q} |z|",
@@ -269,28 +237,18 @@ class BoucWenOscillator(Oscillator):
         output_offset="y_0 [{y}]",
     )
 
-    mass: Positive
-    damping: NotNegative
-    stiffness: Positive
-    slope: Positive
+    mass: fields.Positive
+    damping: fields.NotNegative
+    stiffness: fields.Positive
+    slope: fields.Positive
     gamma: FiniteFloat
     delta: FiniteFloat
     output_offset: FiniteFloat | None = None
     substeps: Substeps = 10
     hold: Hold = "first"
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = FORCE
-    output: ChannelField = DISPLACEMENT
-
-    @property
-    def element(self) -> Array:
-        """[slope, gamma, delta]."""
-        return np.array([self.slope, self.gamma, self.delta])
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return an oscillator of 0.4 s whose loops harden."""
-        return cls(2.0, 0.004, 0.3, 0.2, 0.12, -0.15)
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
 
 @kernel
@@ -313,40 +271,27 @@ def duhem_slope(z: float, velocity: float, numbers: Array) -> float:
     return numbers[j] + share * (numbers[j + 1] - numbers[j])
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class DuhemOscillator(Oscillator):
     """Mass, damper and spring with an element of any slopes, from force to displacement.
 
     Parameters
     ----------
-    mass : float
-        m, the moving mass [kg]; positive.
-    damping : float
-        c, force by velocity [N s/mm]; not negative.
-    stiffness : float
-        k, force by displacement [N/mm]; positive.
     rising, falling : sequence of float
         Slopes of the element's force by the displacement while that rises, or falls, at every knot
         [N/mm].
     knots : sequence of float
         Forces of the element [N], increasing, at least two.
-    output_offset : float or None
-        Added to the displacement [mm]; None for none.
-    substeps : int
-        Runge-Kutta steps from sample to sample.
-    hold : {"first", "zero"}
-        What the input does between samples: go on in a straight line, or stay.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample: at rest where the first input leads slowly, or at rest
-        without any force, from which the input then goes to the first sample within one sample time.
-    input, output : Channel
-        Channel driven and channel given.
+    **others
+        As of `Oscillator`.
     """
 
     kind = "duhem-oscillator"
     kernel, start_kernel = oscillator_kernels(duhem_slope)
     increasing = ("knots",)
     slope_by = duhem_slope
+    elements = ("knots", "rising", "falling")
+    typical = (2.0, 0.004, 0.3, (0.5, 0.2, 0.25), (0.25, 0.2, 0.5), (-2.0, 0.0, 2.0))
     parameters = ("mass", "damping", "stiffness", "rising", "falling", "output_offset")
     notation = Notation(
         r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
@@ -363,18 +308,18 @@ class DuhemOscillator(Oscillator):
         output_offset="y_0 [{y}]",
     )
 
-    mass: Positive
-    damping: NotNegative
-    stiffness: Positive
-    rising: Vector
-    falling: Vector
-    knots: Vector
+    mass: fields.Positive
+    damping: fields.NotNegative
+    stiffness: fields.Positive
+    rising: fields.Vector
+    falling: fields.Vector
+    knots: fields.Vector
     output_offset: FiniteFloat | None = None
     substeps: Substeps = 10
     hold: Hold = "first"
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = FORCE
-    output: ChannelField = DISPLACEMENT
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.FORCE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         n = len(self.knots)
@@ -388,14 +333,3 @@ class DuhemOscillator(Oscillator):
                 f"{len(self.falling)} falling. Remedy: give two knots or more, in increasing order, and "
                 "a slope of either kind for each."
             )
-
-    @property
-    def element(self) -> Array:
-        """[knots, slopes rising, slopes falling]."""
-        return np.array([*self.knots, *self.rising, *self.falling])
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return an oscillator of 0.4 s whose element is stiffest just after a reversal."""
-        rising = (0.5, 0.2, 0.25)
-        return cls(2.0, 0.004, 0.3, rising, rising[::-1], (-2.0, 0.0, 2.0))

@@ -2,44 +2,28 @@
 
 The classical model: y_t = y_0 + sum_i w_i F_{r_i}[u]_t, with r_0 = 0 so that the first term is the
 reversible part. Source: "Analysis and modeling of a pneumatic artificial muscle system", Eqs. (12) and
-(13).
-The inverse is known to be a PI model too; here it is found by walking the same piecewise-linear relation
-from the operators' states, which is as exact, touches only the operators that move, and stays consistent
-when a reference has to be clipped.
+(13). Its inverse walks the same piecewise-linear relation from the operators' states, which touches only
+the operators that move, and stays consistent when a reference has to be clipped.
 
 The rate-dependent model: y_t = y_0 + sum_i (k_i v_t + d_i) F_{r_i}[u]_t, where v is the rate of u,
 optionally through a first-order filter for inputs that are measured and noisy. With a polynomial behind
 it, this is the MPI model of "High-Precision Displacement and Force Hybrid Modeling of Pneumatic
-Artificial Muscle Using 3D PI-NARMAX Model", Eqs. (2) to (4). The rate depends on the input looked for,
-so the inverse is solved for every sample, until the bracket closes: within 1e-10 of the output's range.
-Where the output falls at first when the input jumps up (strongly negative weights by rate and a short
-filter), a model has solutions that swing ever wider; the inverse then runs into the input limits and
-says so. A longer `rate_time_constant` mends it.
+Artificial Muscle Using 3D PI-NARMAX Model", Eqs. (2) to (4). Its inverse is solved for. Where the output
+falls at first when the input jumps up (strongly negative weights by rate and a short filter), solutions
+swing ever wider, into the input limits; a longer `rate_time_constant` prevents it.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from typing import Annotated, Self
 
 import numpy as np
-from annotated_types import Ge
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import needs_sample_time
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    InputRange,
-    StoredInitial,
-    Vector,
-    vector,
-)
+from mckibben.blocks import fields
+from mckibben.blocks.base import needs_sample_time, one_per, rate_filter
 from mckibben.blocks.hysteresis.play_operators import (
     check_invertible_sum,
     check_thresholds,
@@ -48,16 +32,10 @@ from mckibben.blocks.hysteresis.play_operators import (
     start_sum,
 )
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import DERIVED, improved, kernel, step, summing_step
-from mckibben.blocks.learning import (
-    Learnable,
-    follow_learning,
-    inverse_at,
-    learnable_operators,
-    start_learning,
-)
+from mckibben.blocks.kernels import inlined, kernel, step, summing_step
+from mckibben.blocks.learning import Learnable, learnable_operators, learning_kernels
 from mckibben.blocks.notation import FEW, Notation, summed, tex
-from mckibben.blocks.solving import solve_near
+from mckibben.blocks.solving import solved_inverse
 
 
 @summing_step
@@ -107,28 +85,16 @@ def pi_inverse_start(coefficients: Array, state: Array, inputs: Array, virgin: b
     state[n], state[n + 1] = inputs[0], 0.0
 
 
-@step
-def pi_adaptive_step(
-    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
-) -> None:
-    """Invert a PI model, and learn its weights and offset from what is measured."""
-    n = int(coefficients[0]) - 1
-    r = coefficients[inverse_at(coefficients) + 3 : inverse_at(coefficients) + n + 3]
-    s, last, learnt = state[:n], state[n : n + 3], state[n + 3 :]
-    follow_learning(coefficients, r, s, last, learnt, scratch, inputs[0], inputs[1])
-    outputs[0] = s[0]
+@inlined
+def first_operator(way: float, c: Array, state: Array, n: int) -> float:
+    """Return the input: the operator without a dead zone."""
+    return state[0]
 
 
-@kernel
-def pi_adaptive_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start as the inverse does, with the weights as fitted."""
-    n = int(coefficients[0]) - 1
-    pi_inverse_start(coefficients[inverse_at(coefficients) :], state[: n + 2], inputs, virgin)
-    state[n + 2] = 0.0
-    start_learning(coefficients, state[n + 3 :])
+adaptive_kernels = learning_kernels(pi_inverse_start, first_operator, 0)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class PI(Invertible):
     """Classical Prandtl-Ishlinskii model.
 
@@ -142,10 +108,8 @@ class PI(Invertible):
         Constant of the output.
     input_range : (float, float), optional
         Lowest and highest input that may be asked for; the inverse clips there. Default none.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample.
-    input, output : Channel
-        Channel driven and channel given.
+    initial, input, output
+        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "pi"
@@ -156,6 +120,9 @@ class PI(Invertible):
     inverse_remembers = "output"
     increasing = ("thresholds",)
     parameters = ("weights", "offset")
+    n_states = one_per("thresholds")  # one a play operator
+    layout = ("offset", "thresholds", "weights")
+    typical = ((0.0, 0.3, 0.8, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))
     notation = Notation(
         r"y = y_0 + \sum_i w_i F_{r_i}[u]",
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
@@ -164,25 +131,16 @@ class PI(Invertible):
         offset="y_0 [{y}]",
     )
 
-    thresholds: Vector
-    weights: Vector
+    thresholds: fields.Vector
+    weights: fields.Vector
     offset: FiniteFloat = 0.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
-
-    @property
-    def n_states(self) -> int:
-        """One a play operator."""
-        return len(self.thresholds)
-
-    def coefficients(self, sample_time: float | None) -> Array:
-        """Return [offset, thresholds, weights]."""
-        return np.array([self.offset, *self.thresholds, *self.weights])
 
     def peaks(self) -> Array:
         """Return the peaks from which the operators just come back to the lowest input."""
@@ -206,9 +164,8 @@ class PI(Invertible):
             self,
             self.input_limits,
             self.offset,
-            pi_adaptive_step,
-            pi_adaptive_start,
-            lambda theta: replace(self, weights=vector(theta[:-1]), offset=float(theta[-1])),
+            *adaptive_kernels,
+            lambda theta: replace(self, weights=fields.vector(theta[:-1]), offset=float(theta[-1])),
         )
 
     def worked(self) -> tuple[str, ...]:
@@ -219,16 +176,9 @@ class PI(Invertible):
         terms = [(w, rf"F_{{{tex(r)}}}[u]" if r else "u") for w, r in pairs]
         return (f"y = {summed([(self.offset, ''), *terms])}",)
 
-    @classmethod
-    def example(cls) -> Self:
-        """Return the shape of a small muscle's loop over 0 to 5 bar."""
-        return cls((0.0, 0.3, 0.8, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))
-
 
 @summing_step
-def rate_dependent_pi_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def rate_pi_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
 
     The state is [operators, previous input, filtered rate].
@@ -252,7 +202,7 @@ def rate_dependent_pi_step(
 @kernel
 def _rate_trial(u: float, memory: tuple[Array, Array]) -> float:
     coefficients, state = memory
-    n = state.size - 3
+    n = state.size - 2
     r = coefficients[3 : n + 3]
     rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
     y = coefficients[2]
@@ -262,54 +212,25 @@ def _rate_trial(u: float, memory: tuple[Array, Array]) -> float:
     return y
 
 
-@step
-def rate_dependent_pi_inverse_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
-    """Solve for the input; coefficients are [forward ones, lowest, highest input].
-
-    The state is [operators, previous input, filtered rate, samples clipped].
-    """
-    n = state.size - 3
-    lowest, highest = coefficients[-2], coefficients[-1]
-    u, clipped = solve_near(
-        _rate_trial, inputs[0], state[n], lowest, highest, (coefficients, state)
-    )
-    if DERIVED and lowest < u < highest:
-        u = improved(_rate_trial, inputs[0], u, (coefficients, state))
-    rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
+@kernel
+def _rate_advance(u: float, coefficients: Array, state: Array) -> None:
+    n = state.size - 2
     for i in range(n):
         r = coefficients[3 + i]
         state[i] = min(max(state[i], u - r), u + r)
+    state[n + 1] = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
     state[n] = u
-    state[n + 1] = rate
-    if clipped:
-        state[n + 2] += 1.0
-    outputs[0] = u
 
 
 @kernel
-def rate_dependent_pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+def rate_pi_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start at rest, at the first input."""
     n = state.size - 2
     start_operators(coefficients[3 : n + 3], inputs[0], inputs[0], virgin, state[:n])
     state[n], state[n + 1] = inputs[0], 0.0
 
 
-@kernel
-def rate_dependent_pi_inverse_start(
-    coefficients: Array, state: Array, inputs: Array, virgin: bool
-) -> None:
-    """Start at rest, at the input that gives the first reference."""
-    n = state.size - 3
-    lowest, highest = coefficients[-2], coefficients[-1]
-    r, d = coefficients[3 : n + 3], coefficients[2 * n + 3 : 3 * n + 3]
-    start_sum(inputs[0] - coefficients[2], lowest, highest, r, d, virgin, state[:n])
-    state[n] = state[0]  # whose threshold is 0
-    state[n + 1], state[n + 2] = 0.0, 0.0
-
-
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=fields.STRICT)
 class RateDependentPI(Invertible):
     """Prandtl-Ishlinskii model whose weights are linear in the input's rate.
 
@@ -327,21 +248,24 @@ class RateDependentPI(Invertible):
         Time constant of the filter of the rate [s]; 0, as in the paper, for none.
     input_range : (float, float), optional
         Lowest and highest input; the inverse needs it and clips there.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample.
-    input, output : Channel
-        Channel driven and channel given.
+    initial, input, output
+        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "rate-dependent-pi"
     solved = True
-    kernel = rate_dependent_pi_step
-    start_kernel = rate_dependent_pi_start
-    inverse_kernel = rate_dependent_pi_inverse_step
-    inverse_start_kernel = rate_dependent_pi_inverse_start
+    kernel = rate_pi_step
+    start_kernel = rate_pi_start
+    inverse_kernel, inverse_start_kernel = solved_inverse(_rate_trial, _rate_advance, rate_pi_start)
+    inverse_remembers = "input"
     rate_dependent = True
     increasing = ("thresholds",)
     parameters = ("rate_weights", "weights", "offset")
+    typical = (
+        *((0.0, 0.3, 0.8, 1.5), (-0.05, 0.02, 0.04, 0.01), (3.0, 1.5, 1.0, 0.5)),
+        *(2.0, 0.1, (0.0, 5.0)),
+    )
+    n_states = one_per("thresholds", 2)  # operators, previous input and filtered rate
     notation = Notation(
         r"y = y_0 + \sum_i (d_i + k_i v) F_{r_i}[u],\quad T \dot{v} = \dot{u} - v",
         r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
@@ -352,51 +276,35 @@ class RateDependentPI(Invertible):
         rate_time_constant="T [s]",
     )
 
-    thresholds: Vector
-    rate_weights: Vector
-    weights: Vector
+    thresholds: fields.Vector
+    rate_weights: fields.Vector
+    weights: fields.Vector
     offset: FiniteFloat = 0.0
-    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
-    input_range: InputRange | None = None
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
+    rate_time_constant: fields.NotNegative = 0.0
+    input_range: fields.InputRange | None = None
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, self.thresholds, self.weights)
         check_thresholds(self.kind, self.thresholds, self.rate_weights)
 
-    @property
-    def n_states(self) -> int:
-        """Operators, previous input and filtered rate."""
-        return len(self.thresholds) + 2
-
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return [smoothing, gain of the rate, offset, thresholds, k, d].
-
-        Raises
-        ------
-        ModelError
-            Without a sample time.
-        """
-        step = needs_sample_time(self.kind, sample_time)
-        tau = self.rate_time_constant
-        smoothing = math.exp(-step / tau) if tau > 0 else 0.0
-        head = [smoothing, (1 - smoothing) / step, self.offset]
-        return np.array([*head, *self.thresholds, *self.rate_weights, *self.weights])
+        """Return [smoothing, gain of the rate, offset, thresholds, k, d]."""
+        rate = rate_filter(self.rate_time_constant, needs_sample_time(self.kind, sample_time))
+        sums = (*self.thresholds, *self.rate_weights, *self.weights)
+        return np.array([*rate, self.offset, *sums])
 
     def check_invertible(self) -> None:
         """Demand an input range, a first threshold of 0, and an output that rises at rest."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
         super().check_invertible()
 
+    def remembered(self, state: Array) -> tuple[float, ...]:
+        return (float(state[-2]),)
+
     def reachable(self) -> tuple[Array, Array]:
         """Return the outputs that can be reached at rest whatever happened before."""
         at_rest = PI(self.thresholds, self.weights, self.offset, self.input_range)
         return at_rest.reachable()
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a mildly rate-dependent loop over 0 to 5 bar."""
-        weights, rate_weights = (3.0, 1.5, 1.0, 0.5), (-0.05, 0.02, 0.04, 0.01)
-        return cls((0.0, 0.3, 0.8, 1.5), rate_weights, weights, 2.0, 0.1, (0.0, 5.0))

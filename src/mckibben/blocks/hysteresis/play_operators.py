@@ -10,7 +10,6 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Eq. (3) with both envelope
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Self
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -26,13 +25,17 @@ from mckibben.errors import ModelError
 
 def check_thresholds(kind: str, thresholds: Sequence[float], weights: Sequence[float]) -> None:
     """Refuse thresholds that are negative or not increasing, or not one to a weight."""
-    r = np.asarray(thresholds)
-    if r.size == 0 or r.size != len(weights):
+    if not thresholds or len(thresholds) != len(weights):
         raise ModelError(
-            f"{kind!r} has {r.size} thresholds and {len(weights)} weights. "
+            f"{kind!r} has {len(thresholds)} thresholds and {len(weights)} weights. "
             "Remedy: give one weight to every threshold, and at least one."
         )
-    if r[0] < 0 or np.any(np.diff(r) <= 0):
+    check_order(kind, thresholds)
+
+
+def check_order(kind: str, thresholds: Sequence[float]) -> None:
+    """Refuse thresholds that are negative or not increasing."""
+    if any(r < 0 for r in thresholds[:1]) or np.any(np.diff(thresholds) <= 0):
         raise ModelError(
             f"the thresholds of {kind!r} are not 0 <= r_0 < r_1 < ... "
             "Remedy: sort them and drop repeated ones."
@@ -81,25 +84,15 @@ def started(r: Array, rising: float, falling: float, rule: str) -> Array:
 
 
 @kernel
-def start_from_rest(
-    target: float, lowest: float, highest: float, r: Array, w: Array, s: Array
-) -> None:
-    """Start as one excursion from rest leaves operators when the weighted sum is ``target``."""
-    for i in range(r.size):
-        s[i] = 0.0
-    if target > 0.0:
-        rise_to(target, highest, r, w, s)
-    elif target < 0.0:
-        fall_to(target, lowest, r, w, s)
-
-
-@kernel
 def start_sum(
     target: float, lowest: float, highest: float, r: Array, w: Array, virgin: bool, s: Array
 ) -> None:
     """Start operators so that their weighted sum is ``target``, within the limits of their input."""
     if virgin:
-        start_from_rest(target, lowest, highest, r, w, s)
+        s[:] = 0.0
+        if target != 0.0:
+            way = 1.0 if target > 0.0 else -1.0
+            move_to(target, way, highest if target > 0.0 else lowest, r, w, s)
         return
     risen, slope = target, 0.0
     for i in range(r.size):
@@ -128,51 +121,27 @@ def follow(
     missing = target - total
     slack = SLACK * abs(highest - lowest)
     if target > previous and missing > ROUNDING * size:
-        risen = rise_to(target, highest, r, w, s)
-        return 1.0, risen > highest + slack
+        return 1.0, move_to(target, 1.0, highest, r, w, s) > highest + slack
     if target < previous and missing < -ROUNDING * size:
-        fallen = fall_to(target, lowest, r, w, s)
-        return -1.0, fallen < lowest - slack
+        return -1.0, move_to(target, -1.0, lowest, r, w, s) < lowest - slack
     above = missing > w[0] * slack and s[0] >= highest
     below = missing < -w[0] * slack and s[0] <= lowest
     return 0.0, above or below
 
 
 @kernel
-def rise_to(target: float, z_max: float, r: Array, w: Array, s: Array) -> float:
-    """Raise the input of a weighted sum of play operators until the sum is ``target``.
+def move_to(target: float, way: float, limit: float, r: Array, w: Array, s: Array) -> float:
+    """Move the input of a sum of play operators up or down (``way`` 1 or -1) until it is ``target``.
 
-    Changes the states ``s``, as far as ``z_max`` allows, and returns the input that the target asks for.
-    """
-    z = _reach(target, 1.0, r, w, s)
-    for i in range(r.size):
-        s[i] = max(s[i], min(z, z_max) - r[i])
-    return z
-
-
-@kernel
-def fall_to(target: float, z_min: float, r: Array, w: Array, s: Array) -> float:
-    """Lower the input until the sum is ``target``; the mirror of `rise_to`."""
-    z = _reach(target, -1.0, r, w, s)
-    for i in range(r.size):
-        s[i] = min(s[i], max(z, z_min) + r[i])
-    return z
-
-
-@kernel
-def _reach(target: float, way: float, r: Array, w: Array, s: Array) -> float:
-    """Return the input, going up or down (``way`` 1 or -1), at which the sum is ``target``.
-
-    While the input z rises, operator i moves once z > s_i + r_i, and operators start moving in the
-    order of their thresholds; between two starts the sum is linear in z.
+    Changes the states ``s``, as far as the limit of the input allows, and returns the input that the
+    target asks for. While the input z rises, operator i moves once z > s_i + r_i, and operators start
+    moving in the order of their thresholds; between two starts the sum is linear in z.
     """
     n = r.size
     still = 0.0
     for i in range(n):
         still += w[i] * s[i]
-    slope = 0.0
-    moving = 0.0
-    z = s[0]
+    slope, moving, z = 0.0, 0.0, s[0]
     for i in range(n):
         still -= w[i] * s[i]
         slope += w[i]
@@ -180,6 +149,12 @@ def _reach(target: float, way: float, r: Array, w: Array, s: Array) -> float:
         z = (target - still + way * moving) / slope
         if i + 1 == n or way * z <= way * s[i + 1] + r[i + 1]:
             break
+    if way > 0.0:
+        for i in range(n):
+            s[i] = max(s[i], min(z, limit) - r[i])
+    else:
+        for i in range(n):
+            s[i] = min(s[i], max(z, limit) + r[i])
     return z
 
 
@@ -198,14 +173,19 @@ def play_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -
 
 
 @kernel
-def play_matrix(u: Array, r: Array, s: Array, operators: Array) -> None:
+def play_matrix(
+    u: Array, rising: Array, falling: Array, r: Array, s: Array, operators: Array
+) -> None:
     """Run play operators side by side: ``operators[t, i]`` is operator i after sample t.
 
-    Shapes: u (n,), r and s (N,), operators (n, N). Changes the states ``s``.
+    Shapes: u and what its edges see of it, rising and falling, (n,), r and s (N,), operators (n, N).
+    Changes the states ``s``, which are those after the first sample: nothing moves before the second.
     """
     for t in range(u.size):
+        lower = rising[t] if u[t] > u[max(t - 1, 0)] else -np.inf
+        upper = falling[t] if u[t] < u[max(t - 1, 0)] else np.inf
         for i in range(r.size):
-            s[i] = min(max(s[i], u[t] - r[i]), u[t] + r[i])
+            s[i] = min(max(s[i], lower - r[i]), upper + r[i])
             operators[t, i] = s[i]
 
 
@@ -217,16 +197,16 @@ class Play(Block):
     ----------
     threshold : float
         Half the dead zone, in the unit of the input; at least 0.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample.
-    input, output : Channel
-        Channel driven and channel given.
+    initial, input, output
+        Default memory before the first sample, and the channels driven and given.
     """
 
     kind = "play"
     kernel = play_step
     start_kernel = play_start
     parameters = ("threshold",)
+    n_states = 1  # the operator's own output
+    typical = (0.5,)
     notation = Notation(
         r"y = F_r[u],\quad F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
         threshold="r [{u}]",
@@ -239,13 +219,3 @@ class Play(Block):
 
     def __post_init__(self) -> None:
         check_thresholds(self.kind, (self.threshold,), (1.0,))
-
-    @property
-    def n_states(self) -> int:
-        """The operator's own output."""
-        return 1
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a play operator with a dead zone of 1 bar."""
-        return cls(0.5)

@@ -3,16 +3,14 @@
 Preisach, in Everett form: a relay switches up where the input rises through a and down where it
 falls through b <= a; the output is the weighted sum over all relays. The plane of (a, b) is cut into
 cells by the levels; each cell off the diagonal carries its weight evenly, each on the diagonal as
-relays without a dead zone (a = b), which is the reversible part of the model. Instead of relays, the
-turning points of the input that are not wiped out are remembered, and the output follows from E(a, b),
-the weight of all relays within b and a: after a minimum b, rising to u gives y_b + 2 E(u, b). Between
-levels E is bilinear.
+relays without a dead zone (a = b), the reversible part of the model. Turning points of the input that
+are not wiped out are remembered, and the output follows from E(a, b), the weight of all relays within b
+and a: after a minimum b, rising to u gives y_b + 2 E(u, b). Between levels E is bilinear. Along a branch
+the output is linear in the input from one level to the next, so the inverse is in closed form; it wants
+positive weights on the diagonal and none negative.
 
 Sources: Preisach 1935; Mayergoyz, "Mathematical Models of Hysteresis", 1991 (Everett form,
 wiping-out, congruency).
-
-Along a branch the output is linear in the input from one level to the next, so the inverse is in
-closed form; it wants positive weights on the diagonal and none negative.
 
 Krasnosel'skii-Pokrovskii: y = offset + sum_ij w_ij s_ij, where operator ij is a play operator with
 bounded ridges: while the input rises, s is at least the ramp from 0 at level i to 1 at level i + 1;
@@ -26,24 +24,15 @@ Preisach model by Banks, Kurdila and Webb, 1997.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Self
+from typing import Any
 
 import numpy as np
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Cost
-from mckibben.blocks.fields import (
-    DISPLACEMENT,
-    PRESSURE,
-    STRICT,
-    ChannelField,
-    Initial,
-    StoredInitial,
-    Vector,
-    wide,
-)
+from mckibben.blocks import fields
+from mckibben.blocks.base import Cost, one_per
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
@@ -51,19 +40,59 @@ from mckibben.blocks.solving import solved_inverse, solved_start
 from mckibben.errors import ModelError
 
 
-def check_grid(kind: str, levels: Sequence[float], weights: Sequence[float]) -> None:
-    """Refuse levels that do not increase, and other than a weight for every cell between them."""
-    n = len(levels) - 1
-    if n < 1 or np.any(np.diff(levels) <= 0):
-        raise ModelError(
-            f"the levels of {kind!r} do not increase. Remedy: give two or more, in order."
-        )
-    wide((levels[0], levels[-1]))
-    if len(weights) != n * (n + 1) // 2:
-        raise ModelError(
-            f"{kind!r} with {n + 1} levels has {len(weights)} weights. "
-            f"Remedy: give {n * (n + 1) // 2}."
-        )
+@dataclass(frozen=True, config=fields.STRICT)
+class Triangle(Invertible):
+    """A model of cells between levels of the input, one for each pair of intervals.
+
+    Parameters
+    ----------
+    levels : sequence of float, length L + 1
+        Increasing inputs that cut the plane into cells; the output is constant beyond them.
+    weights : sequence of float, length L (L + 1) / 2
+        Of the cells, for rising thresholds interval by interval, each from the lowest falling
+        threshold to the diagonal: w_00, w_10, w_11, w_20, ...
+    offset : float
+        Output with all cells down.
+    initial, input, output
+        Default memory before the first sample, and the channels driven and given.
+    """
+
+    increasing = ("levels",)
+    parameters = ("weights", "offset")
+
+    levels: fields.Vector
+    weights: fields.Vector
+    offset: FiniteFloat = 0.0
+    initial: fields.StoredInitial = "first_sample"
+    input: fields.ChannelField = fields.PRESSURE
+    output: fields.ChannelField = fields.DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        n = len(self.levels) - 1
+        if n < 1 or np.any(np.diff(self.levels) <= 0):
+            raise ModelError(
+                f"the levels of {self.kind!r} do not increase. Remedy: give two or more, in order."
+            )
+        fields.wide(self.input_range)
+        if len(self.weights) != n * (n + 1) // 2:
+            raise ModelError(
+                f"{self.kind!r} with {n + 1} levels has {len(self.weights)} weights. "
+                f"Remedy: give {n * (n + 1) // 2}."
+            )
+
+    @property
+    def input_range(self) -> tuple[float, float]:
+        """The first and last level."""
+        return self.levels[0], self.levels[-1]
+
+    def peaks(self) -> Array:
+        return np.array(self.levels)
+
+    @staticmethod
+    def near_diagonal(most: float) -> tuple[Any, ...]:
+        """Return the numbers of a loop over 0 to 5 with more weight near the diagonal."""
+        weights = [most / (1 + i - j) ** 2 for i in range(5) for j in range(i + 1)]
+        return fields.vector(np.linspace(0.0, 5.0, 6)), tuple(weights), 1.0
 
 
 def on_diagonal(weights: Sequence[float]) -> Array:
@@ -232,38 +261,28 @@ def _first_output(u: float, memory: tuple[Array, Array]) -> float:
     return state[LAST_OUTPUT]
 
 
-preisach_inverse_start = solved_start(_first_output, preisach_start, 1)
-
-
-@dataclass(frozen=True, config=STRICT)
-class Preisach(Invertible):
+@dataclass(frozen=True, config=fields.STRICT)
+class Preisach(Triangle):
     """Preisach model on a triangular grid.
 
     Parameters
     ----------
-    levels : sequence of float, length L + 1
-        Increasing inputs that cut the plane into cells; inputs beyond the first and last are
-        clipped.
     weights : sequence of float, length L (L + 1) / 2
-        Of the cells, for rising thresholds interval by interval, each from the lowest falling
-        threshold to the diagonal: w_00, w_10, w_11, w_20, ... Half the output that the cell's
-        relays give when they switch.
-    offset : float
-        Output with all relays down.
+        Half the outputs that the relays of cells give when they switch, ordered as in `Triangle`.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: the input has risen from the lowest level, or the
         input has swung ever less, from the whole range to the first sample.
-    input, output : Channel
-        Channel driven and channel given.
+    **others
+        As of `Triangle`.
     """
 
     kind = "preisach"
+    typical = Triangle.near_diagonal(2.0)
     kernel = preisach_step
     start_kernel = preisach_start
     inverse_kernel = preisach_inverse_step
-    inverse_start_kernel = preisach_inverse_start
-    increasing = ("levels",)
-    parameters = ("weights", "offset")
+    inverse_start_kernel = solved_start(_first_output, preisach_start, 1)
+    n_states = CLIPPED
     notation = Notation(
         r"y = y_0 + \sum_{j \le i} w_{ij} \left(1 + R_{ij}[u]\right)",
         r"R_{ij}[u] = +1 \text{ once } u \text{ rose through cell } i,\; -1 \text{ once "
@@ -272,26 +291,6 @@ class Preisach(Invertible):
         weights="w_k [{y}]",
         offset="y_0 [{y}]",
     )
-
-    levels: Vector
-    weights: Vector
-    offset: FiniteFloat = 0.0
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_grid(self.kind, self.levels, self.weights)
-
-    @property
-    def input_range(self) -> tuple[float, float]:
-        """The first and last level."""
-        return self.levels[0], self.levels[-1]
-
-    @property
-    def n_states(self) -> int:
-        """Depth and direction, turning points with their outputs, last input and output."""
-        return 2 * DEPTH + 4
 
     def table(self) -> Array:
         """Return E at pairs of levels, shape (L + 1, L + 1), zero above the diagonal."""
@@ -303,14 +302,8 @@ class Preisach(Invertible):
         found[1:, :n] = np.cumsum(np.cumsum(cells[:, ::-1], axis=1)[:, ::-1], axis=0)
         return np.tril(found, -1)
 
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the memory before the first sample.
-
-        Raises
-        ------
-        ModelError
-            If one given has a depth or direction that cannot be: they say where in it to go on.
-        """
+    def initial_state(self, first: Array, initial: fields.Initial | None = None) -> Array:
+        """Return the memory before the first sample; refuse a depth or direction that cannot be."""
         state = super().initial_state(first, initial)
         depth, direction = state[0], state[1]
         if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
@@ -344,16 +337,6 @@ class Preisach(Invertible):
                 "'preisach' has no inverse: its weights must not be negative, and positive on the "
                 "diagonal. Remedy: identify it with nonnegative=true."
             )
-
-    def peaks(self) -> Array:
-        return np.array(self.levels)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a loop over 0 to 5 bar with more weight near the diagonal."""
-        n = 5
-        weights = [2.0 / (1 + i - j) ** 2 for i in range(n) for j in range(i + 1)]
-        return cls(tuple(np.linspace(0.0, 5.0, n + 1).tolist()), tuple(weights), 1.0)
 
 
 @kernel
@@ -390,9 +373,7 @@ def _trial(u: float, memory: tuple[Array, Array]) -> float:
 
 
 @step
-def krasnoselskii_pokrovskii_step(
-    coefficients: Array, state: Array, inputs: Array, outputs: Array
-) -> None:
+def ridges_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Run the model; coefficients are [number of intervals, offset, levels, weights].
 
     The state is [operators, previous input].
@@ -407,9 +388,7 @@ def krasnoselskii_pokrovskii_step(
 
 
 @kernel
-def krasnoselskii_pokrovskii_start(
-    coefficients: Array, state: Array, inputs: Array, virgin: bool
-) -> None:
+def ridges_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
     """Start on the rising ridges, or half-way between the ridges."""
     n = int(coefficients[0])
     levels = coefficients[2 : 3 + n]
@@ -423,36 +402,29 @@ def krasnoselskii_pokrovskii_start(
     state[place] = inputs[0]
 
 
-@dataclass(frozen=True, config=STRICT)
-class KrasnoselskiiPokrovskii(Invertible):
+@dataclass(frozen=True, config=fields.STRICT)
+class KrasnoselskiiPokrovskii(Triangle):
     """Krasnosel'skii-Pokrovskii model on a triangular grid.
 
     Parameters
     ----------
-    levels : sequence of float, length L + 1
-        Increasing inputs between which the ridges rise; the output is constant beyond them.
     weights : sequence of float, length L (L + 1) / 2
-        Output of the operators, for rising ridges interval by interval, each from the lowest
-        falling ridge to the diagonal: w_00, w_10, w_11, w_20, ...
-    offset : float
-        Output with all operators at 0.
+        Outputs of the operators, ordered as in `Triangle`.
     initial : {"first_sample", "virgin"} or sequence of float
         Default memory before the first sample: the input has risen from the lowest level, or every
         operator is half-way between its ridges.
-    input, output : Channel
-        Channel driven and channel given.
+    **others
+        As of `Triangle`.
     """
 
     kind = "krasnoselskii-pokrovskii"
+    typical = Triangle.near_diagonal(4.0)
     solved = True
     inverse_remembers = "input"
-    kernel = krasnoselskii_pokrovskii_step
-    start_kernel = krasnoselskii_pokrovskii_start
-    inverse_kernel, inverse_start_kernel = solved_inverse(
-        _trial, _advance, krasnoselskii_pokrovskii_start
-    )
-    increasing = ("levels",)
-    parameters = ("weights", "offset")
+    kernel = ridges_step
+    start_kernel = ridges_start
+    inverse_kernel, inverse_start_kernel = solved_inverse(_trial, _advance, ridges_start)
+    n_states = one_per("weights", 1)  # operators and the previous input
     notation = Notation(
         r"y = y_0 + \sum_{j \le i} w_{ij} s_{ij}",
         r"s_{ij,t} = \begin{cases} \max(s_{ij,t-1},\, \rho_i(u_t)) & u \text{ rises} \\ "
@@ -463,26 +435,6 @@ class KrasnoselskiiPokrovskii(Invertible):
         weights="w_k [{y}]",
         offset="y_0 [{y}]",
     )
-
-    levels: Vector
-    weights: Vector
-    offset: FiniteFloat = 0.0
-    initial: StoredInitial = "first_sample"
-    input: ChannelField = PRESSURE
-    output: ChannelField = DISPLACEMENT
-
-    def __post_init__(self) -> None:
-        check_grid(self.kind, self.levels, self.weights)
-
-    @property
-    def input_range(self) -> tuple[float, float]:
-        """The first and last level."""
-        return self.levels[0], self.levels[-1]
-
-    @property
-    def n_states(self) -> int:
-        """Operators and the previous input."""
-        return len(self.weights) + 1
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [number of intervals, offset, levels, weights]."""
@@ -498,13 +450,3 @@ class KrasnoselskiiPokrovskii(Invertible):
     def remembered(self, state: Array) -> tuple[float, ...]:
         """Return the input last seen, within the levels."""
         return (float(np.clip(state[-1], *self.input_range)),)
-
-    def peaks(self) -> Array:
-        return np.array(self.levels)
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return a loop over 0 to 5 bar with more weight near the diagonal."""
-        n = 5
-        weights = [4.0 / (1 + i - j) ** 2 for i in range(n) for j in range(i + 1)]
-        return cls(tuple(np.linspace(0.0, 5.0, n + 1).tolist()), tuple(weights), 1.0)

@@ -12,8 +12,8 @@ from annotated_types import Interval
 from mckibben.arrays import Array
 from mckibben.blocks.fields import vector
 from mckibben.blocks.hysteresis.envelopes import Envelope, Exponential, PiecewiseLinear, Tanh
-from mckibben.blocks.hysteresis.gpi import GPI, gpi_matrix, smallest_gap
-from mckibben.blocks.hysteresis.play_operators import started
+from mckibben.blocks.hysteresis.gpi import GPI, smallest_gap
+from mckibben.blocks.hysteresis.play_operators import play_matrix, started
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.separable import SeparableEstimator
@@ -216,7 +216,7 @@ class GPIEstimator(SeparableEstimator):
         u, radii = np.ascontiguousarray(run.history), self.radii(rising, falling, data)
         up, down = rising(u), falling(u)
         operators = np.empty((u.size, radii.size))
-        gpi_matrix(
+        play_matrix(
             u, up, down, radii, started(radii, up[0], down[0], self.starting_rule), operators
         )
         return operators

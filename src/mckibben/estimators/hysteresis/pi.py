@@ -49,7 +49,8 @@ def spread(n: int, span: float, spacing: Spacing) -> Array:
 def play_operators(u: Array, radii: Array, rule: str) -> Array:
     """Return play operators side by side over an input, shape (n, N)."""
     operators = np.empty((u.size, radii.size))
-    play_matrix(np.ascontiguousarray(u), radii, started(radii, u[0], u[0], rule), operators)
+    u = np.ascontiguousarray(u)
+    play_matrix(u, u, u, radii, started(radii, u[0], u[0], rule), operators)
     return operators
 
 

@@ -277,6 +277,16 @@ class Estimator(ABC):
         beside = zip(self.told, data.scheduled, strict=True)
         return {"input": data.inputs[0], "output": data.outputs[0], **dict(beside)}
 
+    @property
+    def starting_rule(self) -> Literal["first_sample", "virgin"]:
+        """The rule that blocks start by: that of `initial`, unless it is fitted."""
+        return "virgin" if self.get_params().get("initial") == "virgin" else "first_sample"
+
+    def common_fields(self, data: TrainingData) -> dict[str, Any]:
+        """Return the fields that most blocks with memory share: range of the input, start, channels."""
+        own = {"input_range": data.input_range, "initial": self.starting_rule}
+        return own | self.channels(data)
+
     def _told_channels(self) -> tuple[str, ...]:
         return tuple(getattr(self, name) for name in self.told)
 
@@ -504,18 +514,6 @@ class SearchEstimator(Estimator):
     input: str = "pressure"
     output: str = "displacement"
     initial: Initial = "first_sample"
-
-    @property
-    def starting_rule(self) -> Literal["first_sample", "virgin"]:
-        """The rule behind `initial` that blocks start by."""
-        return "virgin" if self.initial == "virgin" else "first_sample"
-
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        return self.identify(data, tracker)
-
-    @abstractmethod
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data with the memories at the start that belong to it."""
 
 
 def _rms(residual: Array) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Ge
@@ -78,11 +78,6 @@ class SeparableEstimator(Estimator):
 
     rises: ClassVar[bool] = True
     """Whether the block's output rises with its input, so that falling data are turned over."""
-
-    @property
-    def starting_rule(self) -> Literal["first_sample", "virgin"]:
-        """The rule behind `initial` that blocks start by."""
-        return "virgin" if self.initial == "virgin" else "first_sample"
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return lowest and highest non-linear parameters, each of shape (m,); by default none."""

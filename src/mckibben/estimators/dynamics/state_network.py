@@ -91,7 +91,7 @@ class StateNetworkEstimator(SearchEstimator):
     made_for: ClassVar[tuple[str, str] | None] = ("force", "displacement")
     effort: ClassVar[float] = 100.0
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         step = data.timed()
         if self.initial == "fitted":
             raise ModelError(

@@ -170,7 +170,7 @@ class ActivationPressureEstimator(SearchEstimator):
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     frequency: Annotated[float, Ge(0)] | None = None
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the model found, set to the first moving run's frequency, and the data."""
         step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency
         at = np.array([dominant_frequency(run) if given is None else given for run in data.runs])

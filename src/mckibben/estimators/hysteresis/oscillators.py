@@ -425,7 +425,7 @@ class OscillatorEstimator(SearchEstimator):
         )
         return replace(model, knots=vector(knots), rising=rising, falling=falling)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         step = data.timed()
         if self.initial == "fitted":
             raise ModelError(

@@ -49,8 +49,11 @@ DefaultFor = Literal["load", "plan of displacement", "plan of force"]
 """Where one model is used without being named: fitted to each load, beside models that are given the
 load; or fitted before a plan of recordings."""
 
-Initial = Literal["first_sample", "virgin", "fitted"]
-"""Memory before the first sample of every recording."""
+Start = Literal["first_sample", "virgin"]
+"""Memory before the first sample of every recording where it is not fitted."""
+
+Initial = Literal[Start, "fitted"]
+"""The same, or fitted with the rest."""
 
 MADE_OF_DISPLACEMENT = {
     "length": ", and a length is the rest length less the displacement: read that column as length, "
@@ -278,7 +281,7 @@ class Estimator(ABC):
         return {"input": data.inputs[0], "output": data.outputs[0], **dict(beside)}
 
     @property
-    def starting_rule(self) -> Literal["first_sample", "virgin"]:
+    def starting_rule(self) -> Start:
         """The rule that blocks start by: that of `initial`, unless it is fitted."""
         return "virgin" if self.get_params().get("initial") == "virgin" else "first_sample"
 
@@ -506,14 +509,14 @@ class SearchEstimator(Estimator):
     ----------
     input, output : str
         Channels to learn from.
-    initial : {"first_sample", "virgin", "fitted"}
-        Memory before the first sample of every recording: as if the input had only risen; as if nothing
-        had ever happened; or fitted with the rest.
+    initial : {"first_sample", "virgin"}
+        Memory before the first sample of every recording: at rest at the first input, or as if nothing
+        had ever happened.
     """
 
     input: str = "pressure"
     output: str = "displacement"
-    initial: Initial = "first_sample"
+    initial: Start = "first_sample"
 
 
 def _rms(residual: Array) -> Array:

@@ -119,7 +119,7 @@ class SeparableEstimator(Estimator):
         matrix = self.matrix(theta, data)
         if not np.isfinite(matrix).all():
             return np.zeros((len(matrix), theta.size))
-        linear, _ = self._solve_for(matrix, data)
+        linear, _ = self.solve(matrix, data)
         moves = self.moves(theta, linear, data)
         directions = np.linalg.qr(self.free(matrix, linear, data))[0]
         return np.asarray(moves - directions @ (directions.T @ moves))
@@ -153,7 +153,7 @@ class SeparableEstimator(Estimator):
             for _ in range(2):
                 data = self._fit_peaks(theta, data)
                 theta = self._polish(theta, data, tracker)
-        linear, offset = self._solve(theta, data)
+        linear, offset = self.solve(self.matrix(theta, data), data)
         return self.build(theta, linear, offset, data), data
 
     def _search(self, data: TrainingData, tracker: Tracker) -> Array:
@@ -231,17 +231,13 @@ class SeparableEstimator(Estimator):
         """Return the basis at the samples that count, of all runs, shape (samples, k)."""
         return counting(data, lambda run: self.basis(theta, run, data))
 
-    def _solve(self, theta: Array, data: TrainingData) -> tuple[Array, float]:
-        return self._solve_for(self.matrix(theta, data), data)
-
-    def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
-        least = self.least(matrix, data)
-        nonnegative = self.solves_nonnegative
+    def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
+        """Return the linear parameters and the offset that suit the basis best."""
         return solve_linear(
             matrix,
             data.target,
-            nonnegative=nonnegative,
-            least=least,
+            nonnegative=self.solves_nonnegative,
+            least=self.least(matrix, data),
             with_offset=self.solves_offset,
         )
 
@@ -271,7 +267,7 @@ class SeparableEstimator(Estimator):
         matrix = self.matrix(theta, data)
         if not np.isfinite(matrix).all():
             return np.full(data.target.size, WORST)
-        linear, offset = self._solve_for(matrix, data)
+        linear, offset = self.solve(matrix, data)
         return np.asarray(matrix @ linear + offset - data.target)
 
     def best_of(

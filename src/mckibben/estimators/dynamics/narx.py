@@ -139,10 +139,6 @@ class NarxEstimator(SearchEstimator):
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the best model that stays within bounds, and the data."""
         data.timed(instead=", or use gpi")
-        if self.initial == "fitted":
-            raise ModelError(
-                "a NARX model starts from the first measured output. Remedy: leave initial out."
-            )
         found = self._polynomials if self.mapping == "polynomial" else self._networks
         paths: list[list[Narx]] = []
         tried: list[tuple[float, Narx]] = []

@@ -116,7 +116,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
         alone = np.eye(unit.n_parameters)[1:]
         return unit.simulate_many(alone, run.inputs, sample_time=run.sample_time).T
 
-    def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
+    def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         """Solve with every run's errors relative to its own range, so that light loads count too."""
         parts = [run.y[run.counts] for run in data.runs]
         weights = np.concatenate(

@@ -140,7 +140,7 @@ class CreepPIEstimator(SeparableEstimator):
                 tracker.saw_all(part)
                 if part.interrupted:
                     return False
-                linear, offset = tried._solve(theta, known)
+                linear, offset = tried.solve(tried.matrix(theta, known), known)
                 errors = tried.matrix(theta, later) @ linear + offset - later.target
                 missed[settled] += float(errors @ errors)
         return missed[False] < missed[True]

@@ -117,7 +117,5 @@ class ElasticPlasticEstimator(SeparableEstimator):
             slipping,
             sticking - slipping,
             float(theta[0] * np.ptp(data.input_range)),
-            data.input_range,
-            self.starting_rule,
-            **self.channels(data),
+            **self.common_fields(data),
         )

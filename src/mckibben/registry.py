@@ -133,7 +133,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",
         "sdchm-published": "mckibben.estimators.coupled.sdchm:SDCHM_PUBLISHED",
         "state-network": "mckibben.estimators.dynamics.state_network:StateNetworkEstimator",
-        "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
+        "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNN",
     },
     "faces": {
         "block": "mckibben.report.notebook.models:BlockFace",

@@ -72,6 +72,6 @@ def test_what_is_no_command_is_refused() -> None:
     with pytest.raises(DataError, match="pressure"):
         AirEstimator(longest_dead_time=0.0).fit(falling)
     with pytest.raises(ModelError, match="initial"):
-        AirEstimator(initial="fitted").fit(run)
+        AirEstimator(initial="fitted").fit(run)  # type: ignore[arg-type]
     with pytest.raises(DataError, match="time"):
         AirEstimator().fit(replace(run, sample_time=None))

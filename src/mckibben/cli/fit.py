@@ -18,7 +18,7 @@ from mckibben.cli.options import (
     Seed,
     Settings,
 )
-from mckibben.cli.output import print_json, progress_bar, say
+from mckibben.cli.output import print_json, print_table, progress_bar, say
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
 
@@ -154,6 +154,21 @@ def fit(
         say(
             "That starts every recording from its fitted state; from rest, as streams and generated "
             f"code start, the RMSE is {numeral(found.rmse_from_rest, 4)} {unit_name}."
+        )
+    if estimator.errors_known:
+        print_table(
+            ("parameter", "value", "standard error", "unit"),
+            [
+                (
+                    one.name,
+                    numeral(value, 4),
+                    "–" if math.isnan(error) else numeral(error, 2),
+                    one.unit,
+                )
+                for one, value, error in zip(
+                    numbers, estimator.model_.pack(), found.standard_errors, strict=True
+                )
+            ],
         )
     if undetermined:
         say(f"Not determined by these recordings: {'; '.join(undetermined)}.")

@@ -49,8 +49,11 @@ DefaultFor = Literal["load", "plan of displacement", "plan of force"]
 """Where one model is used without being named: fitted to each load, beside models that are given the
 load; or fitted before a plan of recordings."""
 
-Initial = Literal["first_sample", "virgin", "fitted"]
-"""Memory before the first sample of every recording."""
+Start = Literal["first_sample", "virgin"]
+"""Memory before the first sample of every recording where it is not fitted."""
+
+Initial = Literal[Start, "fitted"]
+"""The same, or fitted with the rest."""
 
 MADE_OF_DISPLACEMENT = {
     "length": ", and a length is the rest length less the displacement: read that column as length, "
@@ -277,6 +280,16 @@ class Estimator(ABC):
         beside = zip(self.told, data.scheduled, strict=True)
         return {"input": data.inputs[0], "output": data.outputs[0], **dict(beside)}
 
+    @property
+    def starting_rule(self) -> Start:
+        """The rule that blocks start by: that of `initial`, unless it is fitted."""
+        return "virgin" if self.get_params().get("initial") == "virgin" else "first_sample"
+
+    def common_fields(self, data: TrainingData) -> dict[str, Any]:
+        """Return the fields that most blocks with memory share: range of the input, start, channels."""
+        own = {"input_range": data.input_range, "initial": self.starting_rule}
+        return own | self.channels(data)
+
     def _told_channels(self) -> tuple[str, ...]:
         return tuple(getattr(self, name) for name in self.told)
 
@@ -496,26 +509,14 @@ class SearchEstimator(Estimator):
     ----------
     input, output : str
         Channels to learn from.
-    initial : {"first_sample", "virgin", "fitted"}
-        Memory before the first sample of every recording: as if the input had only risen; as if nothing
-        had ever happened; or fitted with the rest.
+    initial : {"first_sample", "virgin"}
+        Memory before the first sample of every recording: at rest at the first input, or as if nothing
+        had ever happened.
     """
 
     input: str = "pressure"
     output: str = "displacement"
-    initial: Initial = "first_sample"
-
-    @property
-    def starting_rule(self) -> Literal["first_sample", "virgin"]:
-        """The rule behind `initial` that blocks start by."""
-        return "virgin" if self.initial == "virgin" else "first_sample"
-
-    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        return self.identify(data, tracker)
-
-    @abstractmethod
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data with the memories at the start that belong to it."""
+    initial: Start = "first_sample"
 
 
 def _rms(residual: Array) -> Array:

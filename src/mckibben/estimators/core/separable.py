@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Ge
@@ -79,11 +79,6 @@ class SeparableEstimator(Estimator):
     rises: ClassVar[bool] = True
     """Whether the block's output rises with its input, so that falling data are turned over."""
 
-    @property
-    def starting_rule(self) -> Literal["first_sample", "virgin"]:
-        """The rule behind `initial` that blocks start by."""
-        return "virgin" if self.initial == "virgin" else "first_sample"
-
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return lowest and highest non-linear parameters, each of shape (m,); by default none."""
         return np.empty(0), np.empty(0)
@@ -124,7 +119,7 @@ class SeparableEstimator(Estimator):
         matrix = self.matrix(theta, data)
         if not np.isfinite(matrix).all():
             return np.zeros((len(matrix), theta.size))
-        linear, _ = self._solve_for(matrix, data)
+        linear, _ = self.solve(matrix, data)
         moves = self.moves(theta, linear, data)
         directions = np.linalg.qr(self.free(matrix, linear, data))[0]
         return np.asarray(moves - directions @ (directions.T @ moves))
@@ -158,7 +153,7 @@ class SeparableEstimator(Estimator):
             for _ in range(2):
                 data = self._fit_peaks(theta, data)
                 theta = self._polish(theta, data, tracker)
-        linear, offset = self._solve(theta, data)
+        linear, offset = self.solve(self.matrix(theta, data), data)
         return self.build(theta, linear, offset, data), data
 
     def _search(self, data: TrainingData, tracker: Tracker) -> Array:
@@ -236,17 +231,13 @@ class SeparableEstimator(Estimator):
         """Return the basis at the samples that count, of all runs, shape (samples, k)."""
         return counting(data, lambda run: self.basis(theta, run, data))
 
-    def _solve(self, theta: Array, data: TrainingData) -> tuple[Array, float]:
-        return self._solve_for(self.matrix(theta, data), data)
-
-    def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
-        least = self.least(matrix, data)
-        nonnegative = self.solves_nonnegative
+    def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
+        """Return the linear parameters and the offset that suit the basis best."""
         return solve_linear(
             matrix,
             data.target,
-            nonnegative=nonnegative,
-            least=least,
+            nonnegative=self.solves_nonnegative,
+            least=self.least(matrix, data),
             with_offset=self.solves_offset,
         )
 
@@ -276,7 +267,7 @@ class SeparableEstimator(Estimator):
         matrix = self.matrix(theta, data)
         if not np.isfinite(matrix).all():
             return np.full(data.target.size, WORST)
-        linear, offset = self._solve_for(matrix, data)
+        linear, offset = self.solve(matrix, data)
         return np.asarray(matrix @ linear + offset - data.target)
 
     def best_of(

@@ -87,7 +87,7 @@ class BalanceForceEstimator(SearchEstimator):
             return "it maps length, or displacement, to force"
         return super().objection(recordings, inputs, outputs, scheduling)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         place, (pressure,) = data.inputs[0], data.scheduled
         balance = BalanceEstimator(
             n_stops=self.n_stops,

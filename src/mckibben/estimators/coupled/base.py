@@ -172,7 +172,7 @@ class CoupledEstimator(Estimator):
                 file=first.source,
                 remedy=f"give recordings of at least {FEWEST_SAMPLES} samples",
             )
-        if not self.fits(len(inputs), len(outputs)):
+        if self.pairs and not self.fits(len(inputs), len(outputs)):
             raise DataError(
                 f"there are {len(inputs)} inputs and {len(outputs)} outputs",
                 file=first.source,
@@ -187,6 +187,11 @@ class CoupledEstimator(Estimator):
                 f"no {FEWEST_SAMPLES} samples in a row count", remedy="give longer recordings"
             )
         return kept
+
+    @property
+    def pairs(self) -> bool:
+        """Whether these settings need an output to every input."""
+        return self.paired
 
     @property
     def spans(self) -> tuple[float, ...] | None:

@@ -10,6 +10,7 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Algorithm 1.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -47,125 +48,16 @@ BEYOND = 0.1
 FRICTION = (0.002, 0.1)
 """Smallest and largest threshold of a muscle's own friction, relative to its travel."""
 
+ARBITRARY = (
+    "its network is arbitrary where muscles move in other combinations (mckibben reproduce sdchm)"
+)
+
 LEAST_SLOPE = 0.05
 """Smallest slope of a displacement by itself, right after a reversal."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class NetworkEstimator(CoupledEstimator):
-    """What models with a fuzzy network share.
-
-    Parameters
-    ----------
-    n_sets : int
-        Gaussian sets of every input.
-    constants : bool
-        Whether rules have a constant term; the paper's have none.
-    method : {"ls", "pso"}
-        Antecedents by variable projection, or by the paper's particle swarm.
-    ridge : float
-        Damping of what is a rule's own, relative to the size of what it multiplies. With next to none
-        (1e-7) the network follows what was recorded most closely; but it is then undetermined where no
-        run has been: it neither predicts there nor can be inverted.
-    particles, iterations : int
-        Of the swarm.
-    search_samples : int
-        Samples on which antecedents are searched; consequents are solved for on all.
-    """
-
-    fewest_inputs: ClassVar[int] = 2
-
-    n_sets: Annotated[int, Interval(ge=1, le=6)] = 3
-    constants: bool = False
-    method: Method = "ls"
-    ridge: Annotated[float, Ge(0)] = 1e-3
-    particles: Annotated[int, Ge(1)] = 20
-    iterations: Annotated[int, Ge(1)] = 50
-    search_samples: Annotated[int, Ge(100)] = 6000
-
-    @property
-    def stops_early(self) -> bool:
-        """Where there is a network."""
-        return self.n_sets > 0
-
-    @property
-    def search(self) -> Search:
-        """How antecedents are searched."""
-        swarm = printed_swarm(self.particles, self.iterations)
-        return Search(self.method, self.search_samples, swarm, self.seed)
-
-    def network(
-        self,
-        x: Array,
-        y: Array,
-        driven: tuple[Channel, ...],
-        data: TrainingData,
-        early: tuple[Array, Array] | None,
-        tracker: Tracker,
-    ) -> FuzzyNetwork:
-        """Return a network from driven and scheduling inputs to displacements."""
-        found = fit_network(
-            x,
-            y,
-            self.n_sets,
-            Consequents(self.constants, self.ridge),
-            self.search,
-            tracker=tracker,
-            validation=early,
-        )
-        n = len(driven)
-        low, high = x[:, :n].min(axis=0), x[:, :n].max(axis=0)
-        margin = BEYOND * (high - low)
-        limits = np.column_stack([low - margin, high + margin])
-        return as_block(found, driven, data.outputs, data.scheduled, limits, self.constants)
-
-
-def as_block(
-    fitted: Fitted,
-    driven: tuple[Channel, ...],
-    given: tuple[Channel, ...],
-    scheduled: tuple[Channel, ...],
-    limits: Array,
-    constants: bool,
-) -> FuzzyNetwork:
-    """Return a fitted network as a block."""
-    n_terms = len(driven) + len(scheduled) + constants
-    consequents = fitted.consequents.reshape(-1, n_terms, len(given))
-    return FuzzyNetwork(
-        rows(fitted.sets.centres),
-        rows(fitted.sets.widths),
-        vector(np.moveaxis(consequents, 2, 1).ravel()),
-        driven,
-        given,
-        scheduled,
-        constants,
-        rows(limits),
-    )
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class TSFNNEstimator(NetworkEstimator):
-    """Fuzzy network on the raw pressures: the paper's baseline, without memory."""
-
-    title = "Takagi–Sugeno fuzzy network of raw pressures (TSFNN)"
-    can = "A network without memory, as a baseline."
-    cannot = "Hysteresis; combinations of pressures unlike those recorded."
-    caution = (
-        "its network is arbitrary where muscles move in other combinations (mckibben "
-        "reproduce sdchm)"
-    )
-    inverse_kind = "solved"
-    effort: ClassVar[float] = 5.0
-
-    paired: ClassVar[bool] = False
-
-    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        held = None if data.early is None else _table(data.early)
-        return self.network(*_table(data), data.inputs, data, held, tracker)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class SDCHMEstimator(NetworkEstimator):
+class SDCHMEstimator(CoupledEstimator):
     """Hysteresis of every muscle, coupling, a network scheduled by stiffness, and friction.
 
     Where every part but the network has an exact inverse, and the network one solved for, so has the
@@ -182,14 +74,27 @@ class SDCHMEstimator(NetworkEstimator):
     ----------
     n_sets : int
         Gaussian sets of every input of the network; 0 for neither network nor friction.
-    memory : str
-        Model of every muscle's hysteresis: any with an exact inverse. ``cpi`` knows creep.
+    memory : str, optional
+        Model of every muscle's hysteresis: any with an exact inverse. ``cpi`` knows creep. None for a
+        network of the raw pressures.
     memory_settings : mapping
         Its settings.
     n_friction : int
         Play operators with a dead zone behind the network, on every displacement; 0 for no such part.
     n_rounds : int
         Times that network and friction are fitted in turn.
+    constants : bool
+        Whether rules have a constant term; the paper's have none.
+    method : {"ls", "pso"}
+        Antecedents by variable projection, or by the paper's particle swarm.
+    ridge : float
+        Damping of what is a rule's own, relative to the size of what it multiplies. With next to none
+        (1e-7) the network follows what was recorded most closely; but it is then undetermined where no
+        run has been: it neither predicts there nor can be inverted.
+    particles, iterations : int
+        Of the swarm.
+    search_samples : int
+        Samples on which antecedents are searched; consequents are solved for on all.
     """
 
     title = "Stiffness-dependent coupled hysteresis model (SDCHM)"
@@ -204,68 +109,105 @@ class SDCHMEstimator(NetworkEstimator):
     inverse_kind = "solved"
     effort: ClassVar[float] = 20.0
     each_alone: ClassVar[bool] = True
+    fewest_inputs: ClassVar[int] = 2
 
     n_sets: Annotated[int, Interval(ge=0, le=6)] = 3
-    constants: bool = True
-    memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "cpi"
+    memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] | None = "cpi"
     memory_settings: dict[str, Any] | None = None
     n_friction: Annotated[int, Interval(ge=0, le=20)] = 6
     n_rounds: Annotated[int, Interval(ge=1, le=5)] = 2
+    constants: bool = True
+    method: Method = "ls"
+    ridge: Annotated[float, Ge(0)] = 1e-3
+    particles: Annotated[int, Ge(1)] = 20
+    iterations: Annotated[int, Ge(1)] = 50
+    search_samples: Annotated[int, Ge(100)] = 6000
+
+    @property
+    def stops_early(self) -> bool:
+        """Where there is a network."""
+        return self.n_sets > 0
+
+    @property
+    def pairs(self) -> bool:
+        """Whether these settings need an output to every input: every muscle's hysteresis does."""
+        return self.memory is not None
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        chosen = [softest(data, muscle) for muscle in range(len(data.inputs))]
         tracker.reached(0.0)
-        memories = [self.hysteresis(run, k, data) for k, run in enumerate(chosen)]
-        hysteresis = PerChannel(tuple(memories))
-        tracker.reached(0.2)
-        coupling = coupled(memories, chosen, data)
-        front = Series((hysteresis, coupling))
+        front: tuple[Block, ...] = ()
+        runs, driven = list(data.runs), data.inputs
+        if self.memory is not None:
+            chosen = [softest(data, muscle) for muscle in range(len(data.inputs))]
+            memories = [self.hysteresis(run, k, data) for k, run in enumerate(chosen)]
+            tracker.reached(0.2)
+            front = (PerChannel(tuple(memories)), coupled(memories, chosen, data))
+            used = {id(run) for run in chosen}
+            runs = [run for run in data.runs if id(run) not in used] or runs
+            driven = data.outputs
         if not self.n_sets:
             if data.scheduled:
                 tracker.notes.append(f"{data.scheduled[0].name} is not used by this model")
-            return front
-        used = {id(run) for run in chosen}
-        rest = [run for run in data.runs if id(run) not in used] or list(data.runs)
-        x = stacked_inputs(front, rest)
+            return Series(front)
+        x, target = network_inputs(front, runs), [run.outputs for run in runs]
         held = None
         if data.early is not None:
-            held = (stacked_inputs(front, list(data.early.runs)), data.early.stacked("outputs"))
-        target = [run.outputs for run in rest]
+            held = network_inputs(front, data.early.runs), data.early.stacked("outputs")
         rounds = self.n_rounds if self.n_friction else 1
+        parts: tuple[Block, ...] = ()
         for number in range(rounds):
-            first, last = (0.25 + 0.75 * (number + end) / rounds for end in (0, 1))
-            own = tracker.part(first, last)
-            network = self.network(
-                x,
-                np.concatenate(target),
-                data.outputs,
-                data,
-                held if number == 0 else None,
-                own,
-            )
+            own = tracker.part(*(0.25 + 0.75 * (number + end) / rounds for end in (0, 1)))
+            network = self.network(x, np.concatenate(target), driven, data, held, own)
             tracker.saw_all(own)
+            parts = (*front, network)
             if not self.n_friction:
-                return Series((hysteresis, coupling, network))
-            straight = np.split(
-                network.simulate(x), np.cumsum([len(run.outputs) for run in rest])[:-1]
-            )
+                break
+            ends = np.cumsum([len(run.outputs) for run in runs])[:-1]
+            straight = np.split(network.simulate(x), ends)
             rubbing = PerChannel(
                 tuple(
                     self.friction(
                         [part[:, k] for part in straight],
-                        [run.outputs[:, k] for run in rest],
+                        [run.outputs[:, k] for run in runs],
                         channel,
                     )
                     for k, channel in enumerate(data.outputs)
                 )
             )
+            parts, held = (*parts, rubbing), None
             if tracker.interrupted:
                 break
             unrubbed = rubbing.inverse()
             with warnings.catch_warnings():  # noise at the ends is clipped
                 warnings.simplefilter("ignore", ModelWarning)
-                target = [unrubbed.simulate(run.outputs) for run in rest]
-        return Series((hysteresis, coupling, network, rubbing))
+                target = [unrubbed.simulate(run.outputs) for run in runs]
+        return parts[0] if len(parts) == 1 else Series(parts)
+
+    def network(
+        self,
+        x: Array,
+        y: Array,
+        driven: tuple[Channel, ...],
+        data: TrainingData,
+        held: tuple[Array, Array] | None,
+        tracker: Tracker,
+    ) -> FuzzyNetwork:
+        """Return a network from driven and scheduling inputs to displacements."""
+        swarm = printed_swarm(self.particles, self.iterations)
+        found = fit_network(
+            x,
+            y,
+            self.n_sets,
+            Consequents(self.constants, self.ridge),
+            Search(self.method, self.search_samples, swarm, self.seed),
+            tracker=tracker,
+            validation=held,
+        )
+        n = len(driven)
+        low, high = x[:, :n].min(axis=0), x[:, :n].max(axis=0)
+        margin = BEYOND * (high - low)
+        limits = np.column_stack([low - margin, high + margin])
+        return as_block(found, driven, data.outputs, data.scheduled, limits, self.constants)
 
     def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
         """Return the memory of a muscle's own motion: play operators, all partial sums positive."""
@@ -299,6 +241,7 @@ class SDCHMEstimator(NetworkEstimator):
             run.sample_time,
         )
         settings = {"input": given.name, "output": wanted.name, "seed": self.seed}
+        assert self.memory is not None
         estimator = registry.load("estimators", self.memory)()
         try:
             estimator.set_params(**settings | (self.memory_settings or {}))
@@ -309,19 +252,39 @@ class SDCHMEstimator(NetworkEstimator):
         return block
 
 
-def _table(data: TrainingData) -> tuple[Array, Array]:
-    """Return the inputs and outputs of all runs, one under another."""
-    return data.stacked("inputs"), data.stacked("outputs")
+def as_block(
+    fitted: Fitted,
+    driven: tuple[Channel, ...],
+    given: tuple[Channel, ...],
+    scheduled: tuple[Channel, ...],
+    limits: Array,
+    constants: bool,
+) -> FuzzyNetwork:
+    """Return a fitted network as a block."""
+    n_terms = len(driven) + len(scheduled) + constants
+    consequents = fitted.consequents.reshape(-1, n_terms, len(given))
+    return FuzzyNetwork(
+        rows(fitted.sets.centres),
+        rows(fitted.sets.widths),
+        vector(np.moveaxis(consequents, 2, 1).ravel()),
+        driven,
+        given,
+        scheduled,
+        constants,
+        rows(limits),
+    )
 
 
-def stacked_inputs(front: Block, runs: list[Run]) -> Array:
-    """Return what the network is given over all runs: coupled hysteresis, then what schedules."""
-    return np.concatenate([np.column_stack([simulated(front, run), run.scheduled]) for run in runs])
+def network_inputs(front: Sequence[Block], runs: Sequence[Run]) -> Array:
+    """Return what the network is given over all runs: driven through blocks, and what schedules."""
 
+    def of(run: Run) -> Array:
+        driven = np.ascontiguousarray(run.driven)
+        for block in front:
+            driven = block.simulate(driven, sample_time=run.sample_time)
+        return np.column_stack([driven, run.scheduled])
 
-def simulated(block: Block, run: Run) -> Array:
-    """Return a block's outputs over a run's pressures."""
-    return block.simulate(np.ascontiguousarray(run.driven), sample_time=run.sample_time)
+    return np.concatenate([of(run) for run in runs])
 
 
 def softest(data: TrainingData, muscle: int) -> Run:
@@ -380,15 +343,27 @@ SDCHM_PUBLISHED = preset(
     title="SDCHM as its paper identifies it",
     can="As sdchm, identified as its paper has it.",
     cannot="Combinations of pressures unlike those recorded: its network is arbitrary there.",
-    caution=(
-        "its network is arbitrary where muscles move in other combinations (mckibben "
-        "reproduce sdchm)"
-    ),
+    caution=ARBITRARY,
     effort=25.0,
     constants=False,
     method="pso",
     ridge=1e-9,
     memory="gpi",
     memory_settings={"threshold_rule": "paper", "initial": "virgin"},
+    n_friction=0,
+)
+
+TSFNN = preset(
+    SDCHMEstimator,
+    "Fuzzy network on the raw pressures: the paper's baseline, without memory.",
+    title="Takagi–Sugeno fuzzy network of raw pressures (TSFNN)",
+    can="A network without memory, as a baseline.",
+    cannot="Hysteresis; combinations of pressures unlike those recorded.",
+    caution=ARBITRARY,
+    effort=5.0,
+    paired=False,
+    each_alone=False,
+    memory=None,
+    constants=False,
     n_friction=0,
 )

@@ -13,8 +13,9 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import LONGEST_DELAY
-from mckibben.errors import DataError, ModelError
+from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Start
 from mckibben.estimators.core.separable import SEARCH_SAMPLES, SeparableEstimator
 from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.optimisers.multi_start import multi_start
@@ -75,6 +76,7 @@ class AirEstimator(SeparableEstimator):
 
     input: str = "voltage"
     output: str = "pressure"
+    initial: Start = "first_sample"
     n_starts: Annotated[int, Ge(1)] = 8
     n_refined: Annotated[int, Ge(1)] = 2
     longest_dead_time: Annotated[float, Ge(0)] = 0.5
@@ -101,11 +103,6 @@ class AirEstimator(SeparableEstimator):
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         step = data.timed()
-        if self.initial == "fitted":
-            raise ModelError(
-                "starts of air are not fitted. Remedy: use initial=first_sample, and recordings that "
-                "begin at rest."
-            )
         shortest = min(run.u.size for run in data.runs)
         most = min(int(self.longest_dead_time / step + 1e-9), LONGEST_DELAY, shortest // 4)
         tried: dict[int, tuple[float, Air]] = {}

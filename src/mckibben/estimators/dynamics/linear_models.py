@@ -19,8 +19,10 @@ from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Initial, resting
 from mckibben.estimators.core.uncertainty import inverted, simulate_all, told_by_runs, unknown
 from mckibben.estimators.coupled.base import schedules
-from mckibben.estimators.dynamics.linear_polynomials import Orders, Polynomials, Start
 from mckibben.estimators.dynamics.prediction_error import (
+    Orders,
+    Polynomials,
+    Start,
     arx,
     evaluate,
     minimise,

@@ -136,13 +136,9 @@ class NarxEstimator(SearchEstimator):
     activation: Literal["tanh", "wavelet"] = "tanh"
     n_starts: Annotated[int, Interval(ge=1, le=100)] = 3
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the best model that stays within bounds, and the data."""
         data.timed(instead=", or use gpi")
-        if self.initial == "fitted":
-            raise ModelError(
-                "a NARX model starts from the first measured output. Remedy: leave initial out."
-            )
         found = self._polynomials if self.mapping == "polynomial" else self._networks
         paths: list[list[Narx]] = []
         tried: list[tuple[float, Narx]] = []

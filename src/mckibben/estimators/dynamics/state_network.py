@@ -19,7 +19,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.state_network import SETTLING, SETTLING_STEP, StateNetwork
 from mckibben.blocks.fields import rows
 from mckibben.blocks.kernels import summing_kernel
-from mckibben.errors import DataError, ModelError
+from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
@@ -91,13 +91,8 @@ class StateNetworkEstimator(SearchEstimator):
     made_for: ClassVar[tuple[str, str] | None] = ("force", "displacement")
     effort: ClassVar[float] = 100.0
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         step = data.timed()
-        if self.initial == "fitted":
-            raise ModelError(
-                "starts of state-space networks are not fitted. Remedy: use recordings that begin at "
-                "rest, or periodic=true and whole periods of a motion that repeats itself."
-            )
         linear = linear_oscillator(data, self.channels(data))
         self._warm = linear.forgets(data)
         merged = averaged(data) if self.periodic else data

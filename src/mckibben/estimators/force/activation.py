@@ -116,7 +116,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
         alone = np.eye(unit.n_parameters)[1:]
         return unit.simulate_many(alone, run.inputs, sample_time=run.sample_time).T
 
-    def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
+    def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         """Solve with every run's errors relative to its own range, so that light loads count too."""
         parts = [run.y[run.counts] for run in data.runs]
         weights = np.concatenate(
@@ -170,7 +170,7 @@ class ActivationPressureEstimator(SearchEstimator):
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     frequency: Annotated[float, Ge(0)] | None = None
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the model found, set to the first moving run's frequency, and the data."""
         step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency
         at = np.array([dominant_frequency(run) if given is None else given for run in data.runs])

@@ -248,53 +248,22 @@ class MultistateEstimator(SeparableEstimator):
         columns = force_columns(length, pressure, ORDERS[self.static], data.input_range)
         return np.column_stack([friction, columns])
 
-    def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
-        """Solve for positive stiffnesses, and for the static law, whose coefficients may be negative."""
-        from scipy.optimize import nnls
+    @property
+    def solves_nonnegative(self) -> bool:
+        """Whether the linear parameters have least values: always, those of the static law none."""
+        return True
 
-        n = self.n_stiffnesses
-        friction, target = matrix[:, :n], data.target
-        if self.static is None:
-            law = np.empty((len(matrix), 0))
-        else:
-            law = np.column_stack([np.ones(len(matrix)), matrix[:, n:]])
-        size = np.linalg.norm(law, axis=0)
-        size[size == 0] = 1.0
-        # what the law can take up is projected out; runs at one pressure leave it undetermined
-        directions: Array
-        singular: Array
-        right: Array
-        directions, singular, right = np.linalg.svd(law / size, full_matrices=False)
-        known = singular > 1e-9 * singular.max(initial=1e-300)
-        directions = directions[:, known]
-
-        def beside(columns: Array) -> Array:
-            return np.asarray(columns - directions @ (directions.T @ columns))
-
-        scale = np.maximum(np.linalg.norm(friction, axis=0), 1e-300)
-        floor = self.least(friction, data)
-        both = np.column_stack([beside(friction) / scale, beside(target)])
-        reduced: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
-        rest = reduced[:, n] - reduced[:, :n] @ (floor * scale)
-        stiffnesses = floor + nnls(reduced[:, :n], rest, maxiter=100 * n)[0] / scale
-        if self.static is None:
-            return stiffnesses, 0.0
-        left = directions.T @ (target - friction @ stiffnesses)
-        found = (right[known].T @ (left / singular[known])) / size
-        return np.concatenate([stiffnesses, found[1:]]), float(found[0])
+    @property
+    def solves_offset(self) -> bool:
+        """Whether there is a constant: that of the static law."""
+        return self.static is not None
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return the least stiffnesses, with which every element gives some force."""
-        largest = np.abs(matrix[:, : self.n_stiffnesses]).max(axis=0)
-        return np.asarray(LEAST_SHARE * np.ptp(data.target) / np.maximum(largest, 1e-300))
-
-    def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
-        """Return the elements above their least force, and the static law, which has the offset."""
-        n = self.n_stiffnesses
-        elements = matrix[:, :n][:, linear[:n] > 1.01 * self.least(matrix, data)]
-        if self.static is None:
-            return elements
-        return np.column_stack([np.ones(len(matrix)), matrix[:, n:], elements])
+        largest = np.maximum(np.abs(matrix).max(axis=0), 1e-300)
+        floor = np.asarray(LEAST_SHARE * np.ptp(data.target) / largest)
+        floor[self.n_stiffnesses :] = -np.inf
+        return floor
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         """Return the friction, with the static law beside it if there is one."""

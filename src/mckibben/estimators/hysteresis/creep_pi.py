@@ -140,7 +140,7 @@ class CreepPIEstimator(SeparableEstimator):
                 tracker.saw_all(part)
                 if part.interrupted:
                     return False
-                linear, offset = tried._solve(theta, known)
+                linear, offset = tried.solve(tried.matrix(theta, known), known)
                 errors = tried.matrix(theta, later) @ linear + offset - later.target
                 missed[settled] += float(errors @ errors)
         return missed[False] < missed[True]
@@ -227,7 +227,7 @@ class CreepPIEstimator(SeparableEstimator):
         """Return the offset of the logarithm, and the thresholds on it."""
         offset = float(np.exp(theta[self.n_operators]))
         low, high = self._logs(offset, data)
-        return offset, self.threshold_share * spread(self.n_operators, high - low, "even")
+        return offset, self.threshold_share * spread(self.n_operators, (low, high))
 
     @staticmethod
     def _logs(offset: float, data: TrainingData) -> tuple[float, float]:

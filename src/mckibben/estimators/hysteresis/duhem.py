@@ -35,6 +35,7 @@ class DuhemEstimator(SeparableEstimator):
         "Minor loops are not congruent and need not close; the inverse exists only where the "
         "slopes stay positive."
     )
+    inverse_kind = "exact where stable"
     makes = ("duhem",)
     effort: ClassVar[float] = 1.1
 
@@ -60,9 +61,7 @@ class DuhemEstimator(SeparableEstimator):
             float(np.exp(theta[0])),
             low + half,
             half,
-            data.input_range,
-            self.starting_rule,
-            **self.channels(data),
+            **self.common_fields(data),
         )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:

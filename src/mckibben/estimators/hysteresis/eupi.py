@@ -48,11 +48,6 @@ class EUPIEstimator(SeparableEstimator):
     spacing: Spacing = "even"
     n_starts: Annotated[int, Ge(1)] = 16
 
-    def radii(self, data: TrainingData) -> Array:
-        """Return the thresholds, shape (n_operators,)."""
-        low, high = data.input_range
-        return spread(self.n_operators, high - low, self.spacing)
-
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the falling edge's slope and threshold ratio."""
         return np.array([0.3, 0.0]), np.array([3.0, 3.0])
@@ -65,7 +60,7 @@ class EUPIEstimator(SeparableEstimator):
         """Return the pieces of the cubic, then the operators, over the run's history."""
         low, high = data.input_range
         x = np.ascontiguousarray(run.history - low)
-        radii = self.radii(data)
+        radii = spread(self.n_operators, data.input_range, self.spacing)
         operators = np.empty((x.size, radii.size))
         state = started(radii, x[0], x[0], self.starting_rule)
         eupi_matrix(x, theta[0], theta[1], radii, state, operators)
@@ -73,22 +68,19 @@ class EUPIEstimator(SeparableEstimator):
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a little of every piece of the cubic, so that it increases."""
-        floor = np.zeros(matrix.shape[1])
-        span = data.output_range[1] - data.output_range[0]
-        floor[: CUBIC.size] = 1e-3 * span
-        return floor
+        low, high = data.output_range
+        return np.where(np.arange(matrix.shape[1]) < CUBIC.size, 1e-3 * (high - low), 0.0)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> EUPI:
         low, high = data.input_range
-        cubic = CUBIC.powers(linear[: CUBIC.size])[1:] / (high - low) ** np.arange(1, 4)
+        slope, ratio = theta.tolist()
+        a, b, c = (CUBIC.powers(linear[:3])[1:] / (high - low) ** np.arange(1, 4)).tolist()
         return EUPI(
-            vector(self.radii(data)),
-            vector(linear[CUBIC.size :]),
-            float(theta[0]),
-            float(theta[1]),
-            (float(cubic[0]), float(cubic[1]), float(cubic[2])),
+            vector(spread(self.n_operators, data.input_range, self.spacing)),
+            vector(linear[3:]),
+            slope,
+            ratio,
+            (a, b, c),
             offset,
-            data.input_range,
-            self.starting_rule,
-            **self.channels(data),
+            **self.common_fields(data),
         )

@@ -9,7 +9,7 @@ such a sum rises with its input, so it has an inverse; and loops may lag (w) or 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -146,12 +146,12 @@ class BoucWenEstimator(SeparableEstimator):
         """Return the model of z alone; an asymmetric shape turns over at mid-range."""
         low, high = data.input_range
         span, rate = high - low, float(np.exp(theta[0])) / (high - low)
-        ending: Any = (data.input_range, self.starting_rule, *self.channels(data).values())
+        fields = self.common_fields(data)
         n = self.exponent or 1
         if self.asymmetric:
             half, shape = 0.5 * span, vector(theta[1:])
-            return GeneralizedBoucWen((0.0,), 1.0, rate, shape, n, low + half, half, *ending)
-        return BoucWen((0.0,), 1.0, rate, float(theta[1]), n, low, span, *ending)
+            return GeneralizedBoucWen((0.0,), 1.0, rate, shape, n, low + half, half, **fields)
+        return BoucWen((0.0,), 1.0, rate, float(theta[1]), n, low, span, **fields)
 
     @property
     def linear(self) -> Loops:
@@ -244,16 +244,14 @@ class MaxwellSlipEstimator(SeparableEstimator):
         n, (low, high) = self.n_operators, data.input_range
         kappa, ratio = np.exp(theta) if theta.size else (1.0, 1.0)
         return MaxwellSlip(
-            vector(spread(n + 1, high - low, self.spacing)[1:]),
+            vector(spread(n + 1, (low, high), self.spacing)[1:]),
             (0.0,) * n,
             (0.0,),
             float(kappa),
             float(ratio),
             low,
             high - low,
-            data.input_range,
-            self.starting_rule,
-            **self.channels(data),
+            **self.common_fields(data),
         )
 
     def steepest(self, springs: MaxwellSlip) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -120,8 +120,7 @@ class MPIEstimator(SeparableEstimator):
 
     def radii(self, data: TrainingData) -> Array:
         """Return the thresholds, shape (n_operators,)."""
-        low, high = data.input_range
-        return spread(self.n_operators, high - low, self.spacing)
+        return spread(self.n_operators, data.input_range, self.spacing)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the relative weights, then of those by rate relative to the fastest."""
@@ -213,14 +212,11 @@ class MPIEstimator(SeparableEstimator):
     def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
         """Return the hysteresis part."""
         n, radii = self.n_operators, vector(self.radii(data))
-        ending: Any = (data.input_range, self.starting_rule, *self.channels(data).values())
+        fields = self.common_fields(data)
         if not self.rate_dependent:
-            return PI(radii, vector(weights), offset, *ending)
-        by_rate = vector(weights[n:] / self.fastest(data))
-        rate_time_constant = self.rate_time_constant or 0.0
-        return RateDependentPI(
-            radii, by_rate, vector(weights[:n]), offset, rate_time_constant, *ending
-        )
+            return PI(radii, vector(weights), offset, **fields)
+        by_rate, tau = vector(weights[n:] / self.fastest(data)), self.rate_time_constant or 0.0
+        return RateDependentPI(radii, by_rate, vector(weights[:n]), offset, tau, **fields)
 
 
 RDPI = preset(

@@ -425,13 +425,8 @@ class OscillatorEstimator(SearchEstimator):
         )
         return replace(model, knots=vector(knots), rising=rising, falling=falling)
 
-    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         step = data.timed()
-        if self.initial == "fitted":
-            raise ModelError(
-                "starts of oscillators are not fitted. Remedy: use recordings that begin at rest, or "
-                "periodic=true and whole periods of a motion that repeats itself."
-            )
         linear = linear_oscillator(data, self.channels(data))
         fine = self.substeps or linear.substeps(step, ANGLE)
         coarse = min(max(linear.substeps(step, COARSE_ANGLE), FEWEST_COARSE), fine)

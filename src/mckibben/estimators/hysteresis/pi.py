@@ -24,8 +24,8 @@ from mckibben.estimators.optimisers.tracker import Tracker
 Spacing = Literal["even", "dense"]
 
 
-def spread(n: int, span: float, spacing: Spacing) -> Array:
-    """Return ``n`` thresholds from 0 to below half of ``span``.
+def spread(n: int, ends: tuple[float, float], spacing: Spacing = "even") -> Array:
+    """Return ``n`` thresholds from 0 to below half of a range.
 
     An operator of threshold r only moves when the input moves by more than 2 r after a reversal, so
     thresholds beyond half the range never move.
@@ -34,16 +34,16 @@ def spread(n: int, span: float, spacing: Spacing) -> Array:
     ----------
     n : int
         Number of thresholds, at least 1.
-    span : float
-        Range of what the operators act on.
+    ends : (float, float)
+        Of the range of what the operators act on.
     spacing : {"even", "dense"}
         Equal steps, or steps that grow from 0, for loops that bend right after a reversal.
 
-    >>> spread(4, 8.0, "even").tolist()
+    >>> spread(4, (1.0, 9.0)).tolist()
     [0.0, 1.0, 2.0, 3.0]
     """
     share = np.arange(n) / n
-    return 0.5 * span * (share if spacing == "even" else share**1.5)
+    return 0.5 * (ends[1] - ends[0]) * (share if spacing == "even" else share**1.5)
 
 
 def play_operators(u: Array, radii: Array, rule: str) -> Array:
@@ -104,22 +104,15 @@ class PIEstimator(SeparableEstimator):
         """Return the thresholds to use, shape (number of operators,)."""
         if self.thresholds is not None:
             return np.asarray(self.thresholds, dtype=np.float64)
-        low, high = data.input_range
-        return spread(self.n_operators, high - low, self.spacing)
+        return spread(self.n_operators, data.input_range, self.spacing)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the play operators over the run's history, shape (n, N)."""
         return play_operators(run.history, self.radii(data), self.starting_rule)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> PI:
-        return PI(
-            vector(self.radii(data)),
-            vector(linear),
-            offset,
-            data.input_range,
-            self.starting_rule,
-            **self.channels(data),
-        )
+        radii = vector(self.radii(data))
+        return PI(radii, vector(linear), offset, **self.common_fields(data))
 
     def _by_slopes(self, data: TrainingData) -> PI:
         """Cut the widest loop where its operators begin to move, and difference slopes.

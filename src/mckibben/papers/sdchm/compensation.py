@@ -16,7 +16,7 @@ from mckibben.comparison.kept import Kept
 from mckibben.control import Controller, Tracked, control_law, track, tune_pid
 from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.fuzzy import Consequents, Search, fit_network, printed_swarm
-from mckibben.estimators.coupled.sdchm import SDCHMEstimator, as_block, stacked_inputs
+from mckibben.estimators.coupled.sdchm import SDCHMEstimator, as_block, network_inputs
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.papers.reproduction import Cell, Figure, Table, thinned
 from mckibben.papers.sdchm import printed
@@ -187,7 +187,7 @@ def compensators(
     hysteresis, coupling, network = published.parts
     data = SDCHMEstimator().data(train)
     rest = [run for run in data.runs if "gpi" not in run.name] or list(data.runs)
-    x = stacked_inputs(Series((hysteresis, coupling)), rest)
+    x = network_inputs((hysteresis, coupling), rest)
     y = np.concatenate([np.column_stack([r.outputs, r.scheduled]) for r in rest])
     limits = np.column_stack([y[:, :3].min(axis=0), y[:, :3].max(axis=0)])
 

@@ -23,7 +23,9 @@ from mckibben.system.caches import place
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_OPTIONS = {"nogil": True, "error_model": "numpy"}
+_OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+"""No entry for C: it would hold all the code again, and nothing calls it."""
+
 _lock = threading.Lock()
 
 

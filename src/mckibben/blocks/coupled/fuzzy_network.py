@@ -309,7 +309,8 @@ def fuzzy_network_inverse_start(
             error = max(error, abs(y[j] - inputs[j]))
         if error < least:
             least = error
-            state[:m] = trial[:m]
+            for i in range(m):
+                state[i] = trial[i]
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -474,14 +474,12 @@ class _Translator:
         self.arrays[target.id] = View(name, size, (target.id, *view.roots), columns=view.columns)
 
     def _fill(self, target: ast.expr, value: ast.expr) -> None:
-        view, k = self.view(target), self._spare("k")
         if self._is_array(value):
-            given = self.view(value).element(Whole([k])).text
-        else:
-            given = self.value(value).to(REAL).text
-            if not isinstance(value, ast.Constant | ast.Name):  # computed once, as in Python
-                self._emit(f"const mck_real {(same := self._spare('same'))} = {given};")
-                given = same
+            raise self.refusal(value, f"a copy of {ast.unparse(value)!r}", "write a loop")
+        view, k, given = self.view(target), self._spare("k"), self.value(value).to(REAL).text
+        if not isinstance(value, ast.Constant | ast.Name):  # computed once, as in Python
+            self._emit(f"const mck_real {(same := self._spare('same'))} = {given};")
+            given = same
         size = view.size.value().within(RELATION + 1)
         self._emit(f"for (int {k} = 0; {k} < {size}; {k}++) {{")
         self._emit(f"    {view.element(Whole([k])).text} = {given};")

@@ -406,7 +406,7 @@ def test_what_a_band_is_fitted_to_is_what_it_sees() -> None:
         np.array([0.9]),
     )
     found = np.empty((len(samples), 3 + 2 * 3))
-    look_along(samples, ends.ravel(), widths, keeps, 2, found)
+    look_along(samples, ends.ravel(), widths, keeps, np.empty(2 * 3), found)
     expected, _ = motion_seen(ends.tolist(), widths.tolist(), keeps.tolist(), 2, samples.tolist())
     np.testing.assert_allclose(found, expected, atol=1e-12)
 

@@ -108,7 +108,8 @@ def arrays(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> 
     for i in range(n):
         rows[0, i] = rows[1, i] + inputs[0] * rest[i]
     row = rows[1]
-    row[:] = rows[0]
+    for i in range(n):
+        row[i] = rows[0, i]
     state[n:][0] = rest[-1]
     outputs[0] = rows[0, n - 1] + polynomial(inputs[0], rest) + rest.size
     outputs[1] = polynomial(0.5, rows[1][1:]) + row.size
@@ -175,7 +176,12 @@ def has_a_tolerance(x: float) -> bool:
 
 @kernel
 def steps_through(x: Array, y: Array) -> None:
-    y[:] = x[::2]
+    y[0] = x[::2][0]
+
+
+@kernel
+def copies(x: Array, y: Array) -> None:
+    y[:] = x
 
 
 @kernel
@@ -242,6 +248,7 @@ REFUSED = {
     takes_the_second_result: 1,
     has_a_tolerance: 1,
     steps_through: 1,
+    copies: 1,
     takes_a_default: 0,
     uses_the_counter: 3,
     powers: 1,

@@ -119,8 +119,9 @@ def find_band(
         samples = np.ascontiguousarray(np.hstack([run.inputs, run.modelled]))
         n_driving, n_x = run.inputs.shape[1], samples.shape[1]
         keeps = np.exp(-(run.sample_time or 1.0) / np.array(times))
-        found = np.empty((len(samples), n_x + n_driving * (len(WIDTHS) + keeps.size)))
-        look_along(samples, ends.ravel(), np.array(WIDTHS), keeps, n_driving, found)
+        state = np.empty(n_driving * (len(WIDTHS) + keeps.size))
+        found = np.empty((len(samples), n_x + state.size))
+        look_along(samples, ends.ravel(), np.array(WIDTHS), keeps, state, found)
         seen.append(found[run.counts])
         units_of.append(own[run.counts])
         all_missed.append(errors[run.counts])

@@ -90,11 +90,14 @@ def look(
 
 @kernel
 def look_along(
-    samples: Array, ends: Array, widths: Array, keeps: Array, n_driving: int, found: Array
+    samples: Array, ends: Array, widths: Array, keeps: Array, state: Array, found: Array
 ) -> None:
-    """Fill ``found``, shape (n, states of motion), over a run that begins at rest."""
+    """Fill ``found``, shape (n, states of motion), over a run that begins at rest.
+
+    ``state`` is room for plays and lags of all inputs that drive.
+    """
     per = widths.size + keeps.size
-    state = samples[0, :1].repeat(n_driving * per)
+    n_driving = state.size // per
     rest(samples[0], ends, n_driving, per, state)
     for t in range(samples.shape[0]):
         look(samples[t], ends, widths, keeps, n_driving, state, found[t])

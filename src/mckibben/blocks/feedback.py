@@ -68,8 +68,8 @@ def pid_start(
     """Start with empty integrals and rates, at the first measurements."""
     n = state.size // 4
     state[: 2 * n] = 0.0
-    state[2 * n : 3 * n] = inputs[n : 2 * n]
-    state[3 * n :] = inputs[n : 2 * n]
+    for k in range(n):
+        state[2 * n + k] = state[3 * n + k] = inputs[n + k]
     scratch[:] = 0.0
 
 

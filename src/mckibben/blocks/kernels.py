@@ -9,6 +9,7 @@ agree to the last bit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from inspect import signature
 from typing import Any, Protocol, TypeVar, cast
 
@@ -33,8 +34,12 @@ constants of its own of this kind has a table of its own."""
 
 
 def kernel(function: Function) -> Function:
-    """Compile with exact arithmetic, for everything but weighted sums."""
-    return deferred(function)
+    """Compile with exact arithmetic, for everything but weighted sums.
+
+    Here and in what follows arrays are not reference-counted, which would take longer than a short
+    kernel; so none is made, and a copy of one is a loop.
+    """
+    return deferred(function, _nrt=False)
 
 
 def summing_kernel(function: Function) -> Function:
@@ -47,7 +52,7 @@ def summing_kernel(function: Function) -> Function:
 
 def inlined(function: Function) -> Function:
     """Compile into each kernel that calls it, for functions that take functions."""
-    return deferred(function, inline="always")
+    return deferred(function, inline="always", _nrt=False)
 
 
 @kernel
@@ -66,6 +71,13 @@ def remember(latest: float, past: Array) -> None:
         past[k] = past[k - 1]
     if past.size > 0:
         past[0] = latest
+
+
+@kernel
+def fill(to: Array, numbers: Array) -> None:
+    """Fill an array with the first numbers of another."""
+    for i in range(to.size):
+        to[i] = numbers[i]
 
 
 DERIVED = False
@@ -101,6 +113,7 @@ class Step(Protocol):
 
 def step(function: Callable[..., None], **options: Any) -> Step:
     """Compile a kernel that advances one sample, and make the loop over samples from it."""
+    options["_nrt"] = False
     one: Any = deferred(function, inline="always", **options)
 
     def batch(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
@@ -120,13 +133,11 @@ def step(function: Callable[..., None], **options: Any) -> Step:
 
 
 def summing_step(function: Callable[..., None]) -> Step:
-    """Compile a `step` with the freedom of a `summing_kernel`.
-
-    Arrays are not reference-counted, which would take longer than a short sum; so it may not copy any.
-    """
-    return step(function, fastmath=SUMS, _nrt=False)
+    """Compile a `step` with the freedom of a `summing_kernel`."""
+    return step(function, fastmath=SUMS)
 
 
+@cache
 def in_scratch(kernel: Callable[..., Any]) -> bool:
     """Return whether a step or a start computes in scratch that is passed in."""
     return "scratch" in signature(kernel).parameters

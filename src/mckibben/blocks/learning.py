@@ -189,7 +189,8 @@ def learn(
         sense[IGNORED] += 1.0
         return False
     if sense[SURPRISE] > SURPRISED:  # the plant has stepped
-        root[:] = fresh
+        for i in range(fresh.size):
+            root[i] = fresh[i]
         sense[SURPRISE] = 1.0
     error = measured - predicted
     f, g = work[:p], work[p : 2 * p]
@@ -364,9 +365,10 @@ def start_learning(c: Array, learnt: Array) -> None:
     """Start what is learnt, [theta, used, root, senses], with the fitted parameters."""
     p, noise = int(c[0]), c[2]
     fitted, fresh = c[4 + 2 * p : 4 + 3 * p], c[4 + 3 * p : family_at(c)]
-    learnt[:p] = fitted
-    learnt[p : 2 * p] = fitted
-    learnt[2 * p : 2 * p + fresh.size] = fresh
+    for j in range(p):
+        learnt[j] = learnt[p + j] = fitted[j]
+    for i in range(fresh.size):
+        learnt[2 * p + i] = fresh[i]
     senses = learnt[2 * p + fresh.size :]
     senses[:] = 0.0
     for first in range(0, senses.size, SENSES):

@@ -28,7 +28,7 @@ from mckibben.blocks.fields import STRICT, Initial, Vector
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.inverse import Inverse, drives
-from mckibben.blocks.kernels import Step, in_scratch, kernel, step
+from mckibben.blocks.kernels import Step, fill, in_scratch, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.planning import (
@@ -134,7 +134,7 @@ def gpi_resume(coefficients: Array, memory: Array, state: Array) -> None:
 @kernel
 def same_resume(coefficients: Array, memory: Array, state: Array) -> None:
     """Fill a state that is that of the model."""
-    state[:] = memory
+    fill(state, memory)
 
 
 def resume_of(compensator: Block) -> Resume | None:
@@ -203,7 +203,7 @@ def predictive_kernels(
         undoing = scratch[: int(c[4])]
         begins(numbers, undoing, scratch[int(c[4]) :], inputs, virgin)
         state[:] = 0.0
-        state[: int(c[3])] = undoing[: int(c[3])]
+        fill(state[: int(c[3])], undoing)
 
     return step(predictive_step), predictive_start
 
@@ -240,7 +240,7 @@ def step_of(
         vectors = tables[(n + 1) * count :]
         way, answer, change = vectors[:n], vectors[n : 2 * n], vectors[2 * n : 3 * n]
         way[:] = 1.0
-        kept[:] = memory
+        fill(kept, memory)
         for t in range(count // n):
             for k in range(n):
                 p = path[(t + 1) * n + k]
@@ -248,19 +248,19 @@ def step_of(
                 if abs(moved) > STILL * nudges[k]:
                     way[k] = 1.0 if moved > 0.0 else -1.0
                 given[k] = p
-            trial[:] = kept
+            fill(trial, kept)
             answers(model, trial, room, given, answer)
-            after[:] = trial
+            fill(after, trial)
             for k in range(n):
                 given[k] = path[(t + 1) * n + k] + way[k] * nudges[k]
-                trial[:] = kept
+                fill(trial, kept)
                 answers(model, trial, room, given, change)
                 for i in range(n):
                     slopes[(t * n + i) * n + k] = (change[i] - answer[i]) / (way[k] * nudges[k])
                 given[k] = path[(t + 1) * n + k]
             for k in range(n):
                 errors[t * n + k] = wished[t * n + k] - answer[k]
-            kept[:] = after
+            fill(kept, after)
 
     def predictive_step(
         coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
@@ -282,32 +282,32 @@ def step_of(
         first = last[n] == 0.0
         for i in range(count - n):
             wished[i] = inputs[i % n] if first else wished[i + n]
-        wished[count - n :] = inputs[:n]
+        fill(wished[count - n :], inputs[:n])
         resume(model, memory, undoing)
-        given[:] = inputs
+        fill(given, inputs)
         for t in range(int(c[1])):
-            given[:n] = wished[t * n : (t + 1) * n]
+            fill(given[:n], wished[t * n : (t + 1) * n])
             undoes(undo, undoing, room, given, path[(t + 1) * n : (t + 2) * n])
         if first:  # whatever the rate
-            nominal[:n] = lowest
-            nominal[n : 2 * n] = path[n : 2 * n]
+            fill(nominal[:n], lowest)
+            fill(nominal[n : 2 * n], path[n : 2 * n])
             _ = allowed(n, rows, nominal, 0, True)
-            last[:n] = nominal[n : 2 * n]
+            fill(last[:n], nominal[n : 2 * n])
             last[n] = 1.0
-        path[:n] = last[:n]
-        nominal[:] = path
+        fill(path[:n], last[:n])
+        fill(nominal, path)
         if not kept_to(n, rows, path):
             slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
             for _ in range(PASSES):
                 linearise(n, model, nudges, memory, wished, nominal, given, tables, states, room)
                 _ = planner(n, rows, slopes, nominal[n:], errors, path, room)
                 _ = kept_to(n, rows, path)
-                nominal[:] = path
+                fill(nominal, path)
             last[n + 1] += 1.0
-        last[:n] = path[n : 2 * n]
-        given[:n] = last[:n]
+        fill(last[:n], path[n : 2 * n])
+        fill(given[:n], last[:n])
         answers(model, memory, room, given, nominal[:n])
-        outputs[:] = last[:n]
+        fill(outputs, last[:n])
 
     return predictive_step
 

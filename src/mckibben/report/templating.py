@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import lzma
+from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from mckibben.report import interactive, wording
 from mckibben.report.mathematics import mathml
 
 if TYPE_CHECKING:
-    from jinja2 import Template
+    from jinja2 import Environment, Template
 
 
 PLOTLY = "plotly-basic.min.js.xz"
@@ -32,9 +33,7 @@ def page(name: str, figures: dict[str, Any], **about: Any) -> str:
     **about
         What else the template names.
     """
-    folder = resources.files("mckibben.report").joinpath("templates")
-    packed = folder.joinpath(PLOTLY).read_bytes()
-    scripts = [lzma.decompress(packed).decode(), folder.joinpath("report.js").read_text("utf-8")]
+    scripts = _scripts()
     return template(name).render(
         figures=figures,
         bar=interactive.BAR,
@@ -42,6 +41,14 @@ def page(name: str, figures: dict[str, Any], **about: Any) -> str:
         policy=policy(*scripts),
         **about,
     )
+
+
+@cache
+def _scripts() -> tuple[str, ...]:
+    """Return what a page runs."""
+    folder = resources.files("mckibben.report").joinpath("templates")
+    packed = folder.joinpath(PLOTLY).read_bytes()
+    return lzma.decompress(packed).decode(), folder.joinpath("report.js").read_text("utf-8")
 
 
 def policy(*scripts: str) -> str:
@@ -58,6 +65,12 @@ def policy(*scripts: str) -> str:
 
 def template(name: str) -> Template:
     """Return a template: everything escaped, nothing undefined, numbers as they are printed."""
+    return _environment().get_template(name)
+
+
+@cache
+def _environment() -> Environment:
+    """Return where templates are compiled, each once for all pages."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -75,4 +88,4 @@ def template(name: str) -> Template:
         "mathml": mathml,
     }
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
-    return environment.get_template(name)
+    return environment

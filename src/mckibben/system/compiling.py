@@ -30,7 +30,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 DIGEST = sha256().digest_size
 """Bytes before what was compiled, by which a damaged file is known."""
 
-_OPTIONS = {"nogil": True, "error_model": "numpy"}
+_OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+"""No entry for C: it would hold all the code again, and nothing calls it."""
+
 _lock = threading.Lock()
 
 

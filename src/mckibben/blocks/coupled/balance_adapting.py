@@ -84,7 +84,8 @@ def balance_adaptive_step(
     row = rest[n * size + n * n : n * size + 2 * n * n + n]
     c = rest[n * size + 2 * n * n + n : n * size + 2 * n * n + n + fitted.size]
     room = rest[n * size + 2 * n * n + n + fitted.size :]
-    c[:] = fitted
+    for i in range(fitted.size):
+        c[i] = fitted[i]
     retune(fitted, which, used, c)
     slopes_of(c, own, which, used, y, p, x, terms, matrix, row)
     taught = False

@@ -146,7 +146,8 @@ def force_balance_step(
         outputs[k] = limited
     for j in range(n):
         state[j] = y[j]
-    state[n : n + n * m] = scratch[: n * m]
+    for k in range(n * m):
+        state[n + k] = scratch[k]
     if clipped:
         state[n + n * m] += 1.0
 
@@ -201,7 +202,8 @@ def force_balance_inverse_step(
     for j in range(n):
         state[j] = y[j]
         outputs[j] = scale * y[j]
-    state[n : n + n * m] = scratch[: n * m]
+    for k in range(n * m):
+        state[n + k] = scratch[k]
 
 
 @kernel
@@ -224,7 +226,8 @@ def force_balance_inverse_start(
     n, n_in = int(coefficients[0]), inputs.size
     given, outputs, rest = scratch[:n_in], scratch[n_in : n_in + n], scratch[n_in + n :]
     state[:] = 0.0
-    given[:] = inputs
+    for i in range(n_in):
+        given[i] = inputs[i]
     for i in range(PATH + 1):
         for k in range(n):
             given[k] = (i * (1.0 / PATH)) * inputs[k]

@@ -263,7 +263,8 @@ def fuzzy_network_inverse_start(
         error = solve_driven(coefficients, trial, scratch[2 * m :], inputs, driven)
         if error < least or k == 0:
             least = error
-            state[:m] = driven
+            for i in range(m):
+                state[i] = driven[i]
 
 
 @dataclass(frozen=True, config=STRICT)

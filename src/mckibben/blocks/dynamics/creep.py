@@ -41,6 +41,26 @@ def creep_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) 
     state[:] = 0.0 if virgin else inputs[0]
 
 
+@kernel
+def creep_matrix(coefficients: Array, columns: Array, state: Array, found: Array) -> None:
+    """Fill ``found`` with columns (n, k), each with creep, from elements at rest at its first value.
+
+    ``state`` is room for elements by columns.
+    """
+    n, k = state.shape
+    for i in range(n):
+        for j in range(k):
+            state[i, j] = columns[0, j]
+    for t in range(columns.shape[0]):
+        for j in range(k):
+            found[t, j] = columns[t, j]
+        for i in range(n):
+            keeps, compliance = coefficients[i], coefficients[n + i]
+            for j in range(k):
+                state[i, j] = keeps * state[i, j] + (1.0 - keeps) * columns[t, j]
+                found[t, j] += compliance * state[i, j]
+
+
 @step
 def creep_inverse_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Undo the model; coefficients and state as forward."""

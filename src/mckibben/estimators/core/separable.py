@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -110,16 +111,16 @@ class SeparableEstimator(Estimator):
             columns.append((there - here) / (moved[index] - theta[index]))
         return np.column_stack(columns)
 
-    def jacobian(self, theta: Array, data: TrainingData) -> Array:
+    def jacobian(
+        self, theta: Array, matrix: Array, linear: Array | None, data: TrainingData
+    ) -> Array:
         """Return the derivatives of the residuals with the linear parameters solved for.
 
         Shape (samples that count, m). Kaufman's form: how the output moves, less what the linear
-        parameters that are free would take up of it.
+        parameters that are free would take up of it. Zero where nothing could be solved for.
         """
-        matrix = self.matrix(theta, data)
-        if not np.isfinite(matrix).all():
+        if linear is None:
             return np.zeros((len(matrix), theta.size))
-        linear, _ = self.solve(matrix, data)
         moves = self.moves(theta, linear, data)
         directions = np.linalg.qr(self.free(matrix, linear, data))[0]
         return np.asarray(moves - directions @ (directions.T @ moves))
@@ -164,15 +165,16 @@ class SeparableEstimator(Estimator):
         if self.searches_condensed:
             thin = thin.condensed()
         tracker.budget = self.n_starts + self.n_refined * self.search_evaluations
+        residuals, jacobian = self._errors(thin)
         theta = multi_start(
-            lambda point: self._residuals(point, thin),
+            residuals,
             self.guesses(data) + self._scattered(lower, upper),
             lower,
             upper,
             tracker,
             n_refined=self.n_refined,
             max_evaluations=self.search_evaluations,
-            jacobian=lambda point: self.jacobian(point, thin),
+            jacobian=jacobian,
             choices=self.choices(data),
         )
         return theta if tracker.interrupted else self._polish(theta, data, tracker)
@@ -188,17 +190,17 @@ class SeparableEstimator(Estimator):
         lower, upper = self.bounds(data)
         if lower.size == 0:
             return theta
-        thin = data.thinned(POLISH_SAMPLES)
+        residuals, jacobian = self._errors(data.thinned(POLISH_SAMPLES))
         own = tracker.part(0.9, 1.0)
         best = multi_start(
-            lambda point: self._residuals(point, thin),
+            residuals,
             [theta],
             lower,
             upper,
             own,
             n_refined=1,
             max_evaluations=self.polish_evaluations,
-            jacobian=lambda point: self.jacobian(point, thin),
+            jacobian=jacobian,
         )
         tracker.saw_all(own)
         return best
@@ -216,7 +218,7 @@ class SeparableEstimator(Estimator):
 
             def cost(peak: float, index: int = index) -> float:
                 tried = [*peaks[:index], peak, *peaks[index + 1 :]]
-                return _rms(self._residuals(theta, data.with_peaks(tried)))
+                return _rms(self._solved(theta, data.with_peaks(tried))[2])
 
             grid = np.linspace(first, high, 17)
             costs = [cost(peak) for peak in grid]
@@ -263,12 +265,33 @@ class SeparableEstimator(Estimator):
         floor[0] = LEAST_REVERSIBLE * span / reach if reach > 0 else 0.0
         return floor
 
-    def _residuals(self, theta: Array, data: TrainingData) -> Array:
+    def _solved(self, theta: Array, data: TrainingData) -> tuple[Array, Array | None, Array]:
+        """Return the basis, the linear parameters solved for if it is finite, and the residuals."""
         matrix = self.matrix(theta, data)
         if not np.isfinite(matrix).all():
-            return np.full(data.target.size, WORST)
+            return matrix, None, np.full(data.target.size, WORST)
         linear, offset = self.solve(matrix, data)
-        return np.asarray(matrix @ linear + offset - data.target)
+        return matrix, linear, np.asarray(matrix @ linear + offset - data.target)
+
+    def _errors(
+        self, data: TrainingData
+    ) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+        """Return the residuals and their derivatives as functions of the non-linear parameters.
+
+        A search asks for both at one place, where the linear parameters are solved for once.
+        """
+
+        @lru_cache(maxsize=1)
+        def solved(place: bytes) -> tuple[Array, Array | None, Array]:
+            return self._solved(np.frombuffer(place).copy(), data)
+
+        def residuals(theta: Array) -> Array:
+            return solved(theta.tobytes())[2]
+
+        def jacobian(theta: Array) -> Array:
+            return self.jacobian(theta, *solved(theta.tobytes())[:2], data)
+
+        return residuals, jacobian
 
     def best_of(
         self, setting: str, values: Sequence[float], data: TrainingData, tracker: Tracker

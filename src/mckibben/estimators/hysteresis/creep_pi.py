@@ -17,7 +17,7 @@ from annotated_types import Ge, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.dynamics.creep import Creep, creep_step
+from mckibben.blocks.dynamics.creep import Creep, creep_matrix
 from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.memoryless import Logarithm
@@ -320,13 +320,9 @@ def with_creep(
         return columns
     assert step is not None
     coefficients = np.array([*np.exp(-step / np.asarray(taus)), *compliances])
+    columns = np.ascontiguousarray(columns)
     crept = np.empty_like(columns)
-    for k in range(columns.shape[1]):
-        state = np.full(len(taus), columns[0, k])
-        given = np.ascontiguousarray(columns[:, k : k + 1])
-        out = np.empty_like(given)
-        creep_step.batch(coefficients, state, given, out)
-        crept[:, k] = out[:, 0]
+    creep_matrix(coefficients, columns, np.empty((len(taus), columns.shape[1])), crept)
     return crept
 
 

@@ -508,19 +508,12 @@ class _Translator:
         return bool(words & {*map(self._safe, stored)} or read & self.function.written)
 
     def _fill(self, target: ast.expr, value: ast.expr) -> None:
-        view, k = self.view(target), self._spare("k")
-        self.function.written |= {*view.roots}
         if self._is_array(value):
-            if not {*view.roots}.isdisjoint(self.view(value).roots):
-                places = f"{view.place()}, {self.view(value).place()}"
-                self._emit(f"mck_copy({places}, {view.size.value().text});")
-                return
-            given = self.view(value).element(Whole([k])).text
-        else:
-            given = self.value(value).to(REAL).text
-            if not isinstance(value, ast.Constant | ast.Name):  # computed once, as in Python
-                self._emit(f"const mck_real {(same := self._spare('same'))} = {given};")
-                given = same
+            raise self.refusal(value, f"a copy of {ast.unparse(value)!r}", "write a loop")
+        view, k, given = self.view(target), self._spare("k"), self.value(value).to(REAL).text
+        if not isinstance(value, ast.Constant | ast.Name):  # computed once, as in Python
+            self._emit(f"const mck_real {(same := self._spare('same'))} = {given};")
+            given = same
         size = view.size.value().within(RELATION + 1)
         self._emit(f"for (int {k} = 0; {k} < {size}; {k}++) {{")
         self._emit(f"    {view.element(Whole([k])).text} = {given};")

@@ -17,7 +17,7 @@ from functools import cache, cached_property
 from typing import Any
 
 from mckibben.blocks.kernels import SINGLE
-from mckibben.errors import ModelError
+from mckibben.errors import KernelError
 from mckibben.export.naming import commented
 
 BOOL, INT, REAL = "bool", "int", "float"
@@ -31,24 +31,6 @@ log log10 log1p log2 pow sin sinh sqrt tan tanh trunc"""
 
 FUNCTIONS = frozenset(_FUNCTIONS.split())
 """Functions of ``math`` that kernels may call."""
-
-
-class KernelError(ModelError):
-    """A kernel that is not written in the kernel language.
-
-    Attributes
-    ----------
-    file, line : str, int
-        Where it is.
-    construct, instead : str
-        What it has, and what to write instead.
-    """
-
-    def __init__(self, file: str, line: int, construct: str, instead: str) -> None:
-        self.file, self.line, self.construct, self.instead = file, line, construct, instead
-        super().__init__(
-            f"{file}, line {line}: kernels cannot have {construct}. Remedy: {instead}."
-        )
 
 
 class Source:

@@ -135,9 +135,7 @@ def used(*nodes: ast.AST, how: type[ast.expr_context] = ast.expr_context) -> Cou
 
 def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:
     """Yield the row of every comment, its words, and whether it has the line for itself."""
-    lines = text.splitlines()
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type == tokenize.COMMENT and not token.string.startswith("# type:"):
-            row = token.start[0]
-            alone = lines[row - 1].lstrip().startswith("#")
-            yield row, (commented(token.string.lstrip("# ").split("  # ")[0]), alone)
+            alone = token.line.lstrip().startswith("#")
+            yield token.start[0], (commented(token.string.lstrip("# ").split("  # ")[0]), alone)

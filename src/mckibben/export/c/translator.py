@@ -260,7 +260,7 @@ class _Translator:
 
     def _safe(self, name: str) -> str:
         """Return a local name that C has not taken; macros have capitals."""
-        free = not name.isupper() and name not in TAKEN | self.whole.names
+        free = not (name.isupper() or name in TAKEN or name in self.whole.names)
         return name if free else self._made(f"{name.lower()}_")
 
     def _made(self, name: str) -> str:
@@ -640,8 +640,7 @@ class _Translator:
             return Value(self._safe(name), ATOM, self.types.get(name, BOOL))
         known = self.source.number(node)
         if known is None:
-            instead = "use numbers, arguments and constants of the module"
-            raise self.refusal(node, f"the name {name!r}", instead)
+            raise self.refusal(node, f"the name {name!r}", "use arguments and constants")
         single = self.source.single(name) if self.whole.single else None
         if single is None:
             found = self._written(known, node)
@@ -759,8 +758,7 @@ class _Translator:
             raise self.refusal(node, what, "name its result first, x = f(a)")
         if callee is None:
             return self._accumulate(*node.args)
-        nowhere = ast.Name("_", ast.Store())
-        pointers = pointers or [self._pointer(nowhere, kind) for kind in callee.returns[1:]]
+        pointers = pointers or [self._pointer(ast.Name("_"), kind) for kind in callee.returns[1:]]
         texts = ", ".join([*self._arguments(node, callee), *pointers])
         return Value(f"{callee.name}({texts})", ATOM, next(iter(callee.returns), ""))
 

@@ -98,3 +98,21 @@ def unforeseen(error: Exception) -> str:
         f"this is a fault of the program, not of the data ({type(error).__name__}: {error}). "
         "Remedy: try other settings or another model, and report it."
     )
+
+
+class KernelError(ModelError):
+    """A kernel that is not written in the kernel language.
+
+    Attributes
+    ----------
+    file, line : str, int
+        Where it is.
+    construct, instead : str
+        What it has, and what to write instead.
+    """
+
+    def __init__(self, file: str, line: int, construct: str, instead: str) -> None:
+        self.file, self.line, self.construct, self.instead = file, line, construct, instead
+        super().__init__(
+            f"{file}, line {line}: kernels cannot have {construct}. Remedy: {instead}."
+        )

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mckibben.export.c.language import KernelError
+from mckibben.errors import KernelError
 from mckibben.export.c.project import SHARED
 from mckibben.export.c.translator import Translation
 from tests.export import programs

@@ -149,9 +149,9 @@ class _Rewriting(ast.NodeTransformer):
         elif name in HELPERS:
             return _helped(name, *node.args)
         elif name != ast.unparse(node.func):
+            known = ", ".join(sorted({*HELPERS, *BY_REAL_PART} - {"over"}))
             raise ModelError(
-                f"kernels have no derivative of {ast.unparse(node.func)}. Remedy: use another function, "
-                "see docs/kernels.md."
+                f"kernels have no derivative of {ast.unparse(node.func)}. Remedy: use one of {known}."
             )
         return node
 

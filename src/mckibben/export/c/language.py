@@ -17,7 +17,7 @@ from functools import cache, cached_property
 from typing import Any
 
 from mckibben.blocks.kernels import SINGLE
-from mckibben.errors import ModelError
+from mckibben.errors import KernelError
 from mckibben.export.naming import commented
 
 BOOL, INT, REAL = "bool", "int", "float"
@@ -31,24 +31,6 @@ log log10 log1p log2 pow sin sinh sqrt tan tanh trunc"""
 
 FUNCTIONS = frozenset(_FUNCTIONS.split())
 """Functions of ``math`` that kernels may call."""
-
-
-class KernelError(ModelError):
-    """A kernel that is not written in the kernel language.
-
-    Attributes
-    ----------
-    file, line : str, int
-        Where it is.
-    construct, instead : str
-        What it has, and what to write instead.
-    """
-
-    def __init__(self, file: str, line: int, construct: str, instead: str) -> None:
-        self.file, self.line, self.construct, self.instead = file, line, construct, instead
-        super().__init__(
-            f"{file}, line {line}: kernels cannot have {construct}. Remedy: {instead}."
-        )
 
 
 class Source:
@@ -153,9 +135,7 @@ def used(*nodes: ast.AST, how: type[ast.expr_context] = ast.expr_context) -> Cou
 
 def _comments(text: str) -> Iterator[tuple[int, tuple[str, bool]]]:
     """Yield the row of every comment, its words, and whether it has the line for itself."""
-    lines = text.splitlines()
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type == tokenize.COMMENT and not token.string.startswith("# type:"):
-            row = token.start[0]
-            alone = lines[row - 1].lstrip().startswith("#")
-            yield row, (commented(token.string.lstrip("# ").split("  # ")[0]), alone)
+            alone = token.line.lstrip().startswith("#")
+            yield token.start[0], (commented(token.string.lstrip("# ").split("  # ")[0]), alone)

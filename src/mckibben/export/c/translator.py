@@ -4,9 +4,6 @@
 arguments of their own where a function needs them; results behind the first are written through
 pointers; functions and tuples of arrays that a kernel takes are bound, so that a kernel that takes
 functions is written once for every caller. Nothing is allocated.
-
-A function is written repeatedly, each time with the types of local names and the arrays written to that
-the pass before has found, until its text stays the same.
 """
 
 from __future__ import annotations
@@ -108,10 +105,9 @@ class View:
 
 
 class Parameter(NamedTuple):
-    """A parameter of a function of C.
+    """A parameter of a function of C, for the argument of Python at a ``place``.
 
-    ``place`` is that of the argument of Python, ``item`` which array of a tuple it is, and ``asks`` what
-    of an array: "itself", its "size" or its "columns".
+    It is an ``item`` of a tuple there, and ``asks`` of an array "itself", its "size" or its "columns".
     """
 
     name: str
@@ -191,7 +187,11 @@ class Translation:
 
 
 class _Translator:
-    """Translates one function, with what is bound to its parameters."""
+    """Translates one function, with what is bound to its parameters.
+
+    It is written repeatedly, each time with the types of names and the arrays written to that the pass
+    before has found, until its text stays the same.
+    """
 
     def __init__(self, whole: Translation, source: Source, bound: dict[str, Any]) -> None:
         self.whole, self.source, self.bound = whole, source, bound
@@ -260,7 +260,7 @@ class _Translator:
 
     def _safe(self, name: str) -> str:
         """Return a local name that C has not taken; macros have capitals."""
-        free = not name.isupper() and name not in TAKEN | self.whole.names
+        free = not (name.isupper() or name in TAKEN or name in self.whole.names)
         return name if free else self._made(f"{name.lower()}_")
 
     def _made(self, name: str) -> str:
@@ -276,9 +276,9 @@ class _Translator:
     def _emit(self, text: str) -> None:
         """Append a line of C with the statement's comment, behind those that have to be before it."""
         words, self.comment = f" /* {self.comment} */" if self.comment else "", ""
-        pending, self.pending = self.pending, []
-        for line in (*pending, text + words):
+        for line in (*self.pending, text + words):
             self.lines += wrapped("    " * self.depth + line)
+        self.pending = []
 
     def _block(self, body: Sequence[ast.stmt]) -> None:
         self.depth += 1
@@ -314,7 +314,7 @@ class _Translator:
                 self._emit(f"if ({self.value(node.test).text}) {{")
                 self._branches(node)
             case ast.While(orelse=[]):
-                self._emit(f"while ({self._condition(node)}) {{")
+                self._emit(f"while ({self.value(node.test).text}) {{")
                 self._loop(node.body, endless=bool(self.source.number(node.test)))
             case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), arguments), orelse=[]):
                 self._for(node, counter, arguments)
@@ -339,21 +339,17 @@ class _Translator:
             self.fresh.discard(name)
             self.pending.append(f"{TYPES[self.types.get(name, BOOL)]} {self._safe(name)};")
 
-    def _condition(self, node: ast.If | ast.While) -> str:
-        """Return a condition before which nothing can be computed."""
-        before, self.alone = len(self.pending), _alone(node)
-        test = self.value(node.test)
-        if len(self.pending) > before:
-            raise self.refusal(node.test, "this condition", "call the kernel before it")
-        return test.text
-
     def _branches(self, node: ast.If) -> None:
         before = {*self.known}
         self._block(node.body)
         one, self.known = self.known, before
         match node.orelse:
             case [ast.If() as other] if id(other) not in self.declared:
-                self._emit(f"}} else if ({self._condition(other)}) {{")
+                self.alone = _alone(other)
+                test = self.value(other.test).text
+                if self.pending:
+                    raise self.refusal(other, "this condition", "call the kernel before it")
+                self._emit(f"}} else if ({test}) {{")
                 self._branches(other)
             case orelse:
                 if orelse:
@@ -362,9 +358,9 @@ class _Translator:
                 self._emit("}")
         self.known &= one
 
-    def _loop(self, body: Sequence[ast.stmt], *, endless: bool = False) -> None:
+    def _loop(self, body: Sequence[ast.stmt], counter: str = "_", *, endless: bool = False) -> None:
         """Write the body of a loop, and what is known behind it."""
-        before = {*self.known}
+        before, self.known = self.known, {*self.known, counter}
         self.breaks.append({*self.nowhere})
         self._block(body)
         self._emit("}")
@@ -372,8 +368,9 @@ class _Translator:
         self.known = left if endless else before
 
     def _for(self, node: ast.For, counter: str, arguments: list[ast.expr]) -> None:
-        if counter != "_" and counter in self.types:
-            raise self.refusal(node, f"{counter!r} for a counter in here", "use another name")
+        assigned = self.types.keys() | used(*node.body, how=ast.Store).keys()
+        if counter in assigned - {"_"}:
+            raise self.refusal(node, f"{counter!r} counted and assigned", "use two names")
         self.types[counter] = INT
         low, high = [Value("0"), *(self._as(each, INT) for each in arguments[:2])][-2:]
         by = arguments[2] if len(arguments) == 3 else ast.Constant(1)
@@ -388,9 +385,7 @@ class _Translator:
         test = f"{name} {'>' if stride < 0 else '<'} {high.within(RELATION + 1)}"
         moved = name + {"1": "++", "-1": "--"}.get(step, f" += {step}")
         self._emit(f"for (int {name} = {low.text}; {test}; {moved}) {{")
-        self.known.add(counter)
-        self._loop(node.body)
-        self.known.discard(counter)
+        self._loop(node.body, counter)
         self.types.pop(counter, None)
 
     def _return(self, value: ast.expr | None) -> None:
@@ -422,13 +417,9 @@ class _Translator:
                 self._set(target, self.value(value))
 
     def _assign_several(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> None:
-        before = [(target, value) for k, value in enumerate(values) for target in targets[:k]]
-        if not any(
-            target.id in used(value)
-            if isinstance(target, ast.Name)
-            else self._roots(used(target)) & self._roots(used(value))
-            for target, value in before
-        ):
+        changed = [{t.id} if isinstance(t, ast.Name) else self._roots(used(t)) for t in targets]
+        read = [used(value).keys() | self._roots(used(value)) for value in values]
+        if not any(read[k] & each for k in range(len(read)) for each in changed[:k]):
             for target, value in zip(targets, values, strict=True):
                 self._assign(target, value)
             return
@@ -462,8 +453,6 @@ class _Translator:
 
     def _learn(self, target: ast.expr, kind: str) -> None:
         """Note that a number of a type is assigned to a name, or that an array is written to."""
-        if isinstance(target, ast.Name) and target.id in self.source.counters - {"_"}:
-            raise self.refusal(target, f"{target.id!r} counted and assigned", "use two names")
         if isinstance(target, ast.Name):
             before = self.types.get(target.id, BOOL)
             self.types[target.id] = _widest(before, kind)
@@ -530,28 +519,25 @@ class _Translator:
 
     def view(self, node: ast.expr) -> View:
         """Return the array that an expression is."""
-        if isinstance(node, ast.Name) and isinstance(found := self.arrays.get(node.id), View):
-            self._assigned(node)
-            return found
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-            shape = node.args[0] if len(node.args) == 1 else None
-            if node.func.attr == "reshape" and isinstance(shape, ast.Tuple):
-                base, (rows, columns) = self.view(node.func.value), shape.elts
+        match node:
+            case ast.Name(name) if isinstance(found := self.arrays.get(name), View):
+                self._assigned(node)
+                return found
+            case ast.Call(ast.Attribute(inner, "reshape"), [ast.Tuple([rows, columns])]):
                 size = self._product(rows, length := self._as(columns, INT))
-                return replace(base, size=size, columns=length)
-        if not isinstance(node, ast.Subscript) or isinstance(node.slice, ast.Tuple):
-            raise self.refusal(node, f"{ast.unparse(node)!r} for an array", "pass one in")
-        base, part = self.view(node.value), node.slice
-        if not isinstance(part, ast.Slice):
-            if base.columns is None:
-                raise self.refusal(node, f"{ast.unparse(node)!r} for an array", "slice it")
-            begin = base.begin.plus(self._product(part, base.columns))
-            return replace(base, size=self._terms(base.columns), begin=begin, columns=None)
-        if part.step or base.columns is not None:
-            raise self.refusal(node, "a slice like this", "write a loop")
-        low = self._at(part.lower, base.size) if part.lower else Whole()
-        high = self._at(part.upper, base.size) if part.upper else base.size
-        return replace(base, size=high.plus(low, -1), begin=base.begin.plus(low))
+                return replace(self.view(inner), size=size, columns=length)
+            case ast.Subscript(inner, part) if not isinstance(part, ast.Tuple):
+                base = self.view(inner)
+                match part, base.columns:
+                    case ast.Slice(below, above, None), None:
+                        low = self._at(below, base.size) if below else Whole()
+                        high = self._at(above, base.size) if above else base.size
+                        return replace(base, size=high.plus(low, -1), begin=base.begin.plus(low))
+                    case ast.expr(), Value() as length if not isinstance(part, ast.Slice):
+                        begin = base.begin.plus(self._product(part, length))
+                        return replace(base, size=self._terms(length), begin=begin, columns=None)
+        instead = "use arrays that are passed in, their rows, and parts without a step"
+        raise self.refusal(node, f"{ast.unparse(node)!r} for an array", instead)
 
     def _at(self, place: ast.expr, size: Whole) -> Whole:
         """Return a place in an array; one below 0 is counted from the end."""
@@ -647,8 +633,7 @@ class _Translator:
             return Value(self._safe(name), ATOM, self.types.get(name, BOOL))
         known = self.source.number(node)
         if known is None:
-            instead = "use numbers, arguments and constants of the module"
-            raise self.refusal(node, f"the name {name!r}", instead)
+            raise self.refusal(node, f"the name {name!r}", "use arguments and constants")
         single = self.source.single(name) if self.whole.single else None
         if single is None:
             found = self._written(known, node)
@@ -692,12 +677,12 @@ class _Translator:
         lefts = [node.left, *node.comparators]
         links = [*zip(lefts, node.ops, node.comparators, strict=False)]
         left, op, right = links[0]
-        if isinstance(op, ast.In) and isinstance(right, ast.Tuple):
-            links = [(left, ast.Eq(), each) for each in right.elts]
-        if len(links) > 1:
+        within = isinstance(op, ast.In) and isinstance(right, ast.Tuple) and len(links) == 1
+        if within:
+            links = [(left, ast.Eq(), each) for each in getattr(right, "elts", ())]
+        if within or len(links) > 1:
             each = [ast.copy_location(ast.Compare(a, [b], [c]), node) for a, b, c in links]
-            either = ast.Or() if isinstance(op, ast.In) else ast.And()
-            return self.value(ast.BoolOp(either, [*each]))
+            return self.value(ast.BoolOp(ast.Or() if within else ast.And(), [*each]))
         if type(op) not in COMPARISON:
             raise self.refusal(node, "this comparison", "use < <= > >= == != or in")
         one, other, _ = _alike(self.value(left), self.value(right))
@@ -766,8 +751,7 @@ class _Translator:
             raise self.refusal(node, what, "name its result first, x = f(a)")
         if callee is None:
             return self._accumulate(*node.args)
-        nowhere = ast.Name("_", ast.Store())
-        pointers = pointers or [self._pointer(nowhere, kind) for kind in callee.returns[1:]]
+        pointers = pointers or [self._pointer(ast.Name("_"), kind) for kind in callee.returns[1:]]
         texts = ", ".join([*self._arguments(node, callee), *pointers])
         return Value(f"{callee.name}({texts})", ATOM, next(iter(callee.returns), ""))
 

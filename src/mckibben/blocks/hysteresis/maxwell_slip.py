@@ -87,10 +87,9 @@ def maxwell_slip_step(
 
     Coefficients are [kappa, lambda, centre, scale, limits, weights, polynomial].
     """
-    n = state.size - 1
-    _advance(inputs[0], coefficients, state, scratch)
-    c, size = coefficients, coefficients.size - 4 - 2 * n
-    y = polynomial_at((inputs[0] - c[2]) / c[3], c, 4 + 2 * n, size)
+    c, n = coefficients, state.size - 1
+    _advance(inputs[0], c, state, scratch)
+    y = polynomial_at((inputs[0] - c[2]) / c[3], c, 4 + 2 * n, c.size - 4 - 2 * n)
     for i in range(n):
         y += c[4 + n + i] * state[i]
     outputs[0] = y

@@ -320,11 +320,17 @@ class GeneralizedBoucWen(Invertible):
             )
 
     @property
-    def steepest(self) -> float:
-        """Largest slope of z by the input; |z|^n is at most 1 by the smallest psi of loading."""
+    def bound(self) -> float:
+        """Largest size of z: where it ends with the smallest psi of loading."""
         signs = [(s * g, s * g, g, g, s) for s in (1, -1) for g in (1, -1)]
         smallest = 1.0 + min(float(np.dot(self.shape, sign)) for sign in signs)
-        return self.rate * (1.0 + (1.0 + float(np.abs(self.shape).sum())) / smallest)
+        return float(smallest ** (-1.0 / self.exponent))
+
+    @property
+    def steepest(self) -> float:
+        """Largest slope of z by the input."""
+        asymmetry = float(np.abs(self.shape).sum())
+        return self.rate * (1.0 + (1.0 + asymmetry) * self.bound**self.exponent)
 
     def least_slope(self) -> float:
         reversible = least_slope(self.polynomial, self.centre, self.scale, self.input_limits)

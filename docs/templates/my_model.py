@@ -6,7 +6,6 @@ F_r is the play operator of threshold r. Source: title of the paper, its equatio
 from __future__ import annotations
 
 from dataclasses import dataclass as settings
-from typing import Self
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -62,6 +61,7 @@ class ElasticPlastic(Invertible):
     kernel, inverse_kernel, inverse_start_kernel = solved_kernels(trial, advance, start_kernel)
     solved, inverse_remembers = True, "input"
     parameters = ("gain", "weight", "threshold")  # in this order they are the kernel's coefficients
+    typical = (4.0, -1.5, 0.4, (0.0, 5.0))  # of `example`, on which tests run
     notation = Notation(
         r"y = g u + w (u - F_r[u])", gain="g [{y}/{u}]", weight="w [{y}/{u}]", threshold="r [{u}]"
     )
@@ -80,10 +80,6 @@ class ElasticPlastic(Invertible):
 
     def least_slope(self) -> float:  # of the output by the input: the inverse wants it positive
         return min(self.gain, self.gain + self.weight)
-
-    @classmethod
-    def example(cls) -> Self:  # small and typical: tests run on it
-        return cls(4.0, -1.5, 0.4, (0.0, 5.0))
 
 
 @settings(kw_only=True, repr=False, eq=False)

@@ -22,6 +22,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Block, needs_sample_time
 from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
+from mckibben.blocks.hysteresis.play_operators import start_operators
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
@@ -85,8 +86,7 @@ def coupled_memory_start(coefficients: Array, state: Array, inputs: Array, virgi
             x = 0.0 if virgin else inputs[i]
             state[lag * n + i] = x
             plays = state[n_lags * n + (lag * n + i) * m :]
-            for k in range(m):
-                plays[k] = min(max(0.0, x - radii[i * m + k]), x + radii[i * m + k])
+            start_operators(radii[i * m : (i + 1) * m], x, x, True, plays)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -104,15 +104,17 @@ def contract(c: Array, m: int, known: Array, memberships: Array, left: Array) ->
             firing *= memberships[i * most + rest % sets]
             rest //= sets
         if firing > NOTHING:
-            for row in range(left.size // (m + 1)):
-                rule, j = row // n_out, row % n_out
-                at = ((rule * n_known + k) * n_out + j) * width
-                total = rows[at + n] if constant else 0.0
-                for i in range(m, n):
-                    total += rows[at + i] * known[i - m]
-                for i in range(m):
-                    left[row * (m + 1) + i] += firing * rows[at + i]
-                left[row * (m + 1) + m] += firing * total
+            for rule in range(left.size // (n_out * (m + 1))):
+                at, place = (rule * n_known + k) * n_out * width, rule * n_out * (m + 1)
+                for _ in range(n_out):
+                    total = rows[at + n] if constant else 0.0
+                    for i in range(m, n):
+                        total += rows[at + i] * known[i - m]
+                    for i in range(m):
+                        left[place + i] += firing * rows[at + i]
+                    left[place + m] += firing * total
+                    at += width
+                    place += m + 1
 
 
 @kernel

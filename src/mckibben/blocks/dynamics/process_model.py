@@ -99,11 +99,6 @@ class ProcessModel(Block):
     rate_dependent = True
     filters = True
     start_on = start_on
-    no_inverse = (
-        "has no exact inverse: its output lags its input, so following a reference would take "
-        "derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, mpi), or a transfer-function "
-        "identified with delay=0."
-    )
     typical = (6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
     notation = Notation(
         gain="K [{y}/{u}]",
@@ -154,6 +149,15 @@ class ProcessModel(Block):
         return f"P{self.order}{'D' * (self.delay > 0)}{under}{'Z' * (self.zero_time is not None)}"
 
     n_fitted = order
+
+    @property
+    def no_inverse(self) -> str:  # type: ignore[override]
+        """Which structure has none, and why."""
+        return (
+            f"({self.name}) has no exact inverse: its output lags its input, so following a reference "
+            "would take derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, mpi), or a "
+            "transfer-function identified with delay=0."
+        )
 
     @property
     def n_states(self) -> int:

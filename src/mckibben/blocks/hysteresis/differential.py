@@ -74,34 +74,9 @@ def loop_kernels(
     return step(loop_step), *solved_inverse(kernel(trial), advance, start)
 
 
-class Loop(Invertible):
-    """A model of one memory beside the input, whose output rises with it.
-
-    Parameters
-    ----------
-    polynomial : sequence of float
-        Ascending coefficients of the reversible part, at least one; two for the classical model.
-    weight : float
-        Output per z; negative where the output lags the input, as a muscle's displacement lags
-        pressure.
-    rate : float
-        How fast z moves with the input, per input; positive.
-    exponent : {1, 2}
-        n; how sharply z saturates.
-    centre, scale : float
-        Of the input in polynomials; scale positive.
-    input_range : (float, float), optional
-        Lowest and highest input; the inverse needs it and clips there.
-    initial, input, output
-        Default memory before the first sample, z = 1 or virgin z = 0, and the channels driven and given.
-    """
-
-    solved = True
-    inverse_remembers = "input"
-    n_states = 2
-
-    def peaks(self) -> Array:
-        return np.linspace(*self.input_limits, 33)
+def many_peaks(model: Invertible) -> Array:
+    """Return peaks over the whole range, as a memory that moves all the time has none of its own."""
+    return np.linspace(*model.input_limits, 33)
 
 
 @kernel
@@ -176,18 +151,33 @@ def _bouc_wen_output(u: float, z: float, c: Array) -> float:
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class BoucWen(Loop):
+class BoucWen(Invertible):
     """Normalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
     ----------
+    polynomial : sequence of float
+        Ascending coefficients of the reversible part, at least one; two for the classical model.
+    weight : float
+        Output per z; negative where the output lags the input, as a muscle's displacement lags
+        pressure.
+    rate : float
+        How fast z moves with the input, per input; positive.
     sigma : float
         Shape of the loop, at least 0.5: the part of the decay that changes sign with the direction.
-    **others
-        As of `Loop`.
+    exponent : {1, 2}
+        n; how sharply z saturates.
+    centre, scale : float
+        Of the input in the polynomial; scale positive.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial, input, output
+        Default memory before the first sample, z = 1 or virgin z = 0, and the channels driven and given.
     """
 
     kind = "bouc-wen"
+    solved, inverse_remembers, n_states = True, "input", 2
+    peaks = many_peaks
     start_kernel = bouc_wen_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
         _bouc_wen_moved, _bouc_wen_output, bouc_wen_start
@@ -259,18 +249,33 @@ def _generalized_output(u: float, z: float, c: Array) -> float:
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class GeneralizedBoucWen(Loop):
+class GeneralizedBoucWen(Invertible):
     """Generalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
     ----------
+    polynomial : sequence of float
+        Ascending coefficients of the reversible part, at least one; two for the classical model.
+    weight : float
+        Output per z; negative where the output lags the input, as a muscle's displacement lags
+        pressure.
+    rate : float
+        How fast z moves with the input, per input; positive.
     shape : sequence of float, length 5
         b2 to b6; their sizes may add up to less than 1, which keeps z bounded and lets it return.
-    **others
-        As of `Loop`.
+    exponent : {1, 2}
+        n; how sharply z saturates.
+    centre, scale : float
+        Of the input in the polynomial; scale positive.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial, input, output
+        Default memory before the first sample, z = 1 or virgin z = 0, and the channels driven and given.
     """
 
     kind = "generalized-bouc-wen"
+    solved, inverse_remembers, n_states = True, "input", 2
+    peaks = many_peaks
     start_kernel = bouc_wen_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
         _generalized_moved, _generalized_output, bouc_wen_start
@@ -315,11 +320,17 @@ class GeneralizedBoucWen(Loop):
             )
 
     @property
-    def steepest(self) -> float:
-        """Largest slope of z by the input; |z|^n is at most 1 by the smallest psi of loading."""
+    def bound(self) -> float:
+        """Largest size of z: where it ends with the smallest psi of loading."""
         signs = [(s * g, s * g, g, g, s) for s in (1, -1) for g in (1, -1)]
         smallest = 1.0 + min(float(np.dot(self.shape, sign)) for sign in signs)
-        return self.rate * (1.0 + (1.0 + float(np.abs(self.shape).sum())) / smallest)
+        return float(smallest ** (-1.0 / self.exponent))
+
+    @property
+    def steepest(self) -> float:
+        """Largest slope of z by the input."""
+        asymmetry = float(np.abs(self.shape).sum())
+        return self.rate * (1.0 + (1.0 + asymmetry) * self.bound**self.exponent)
 
     def least_slope(self) -> float:
         reversible = least_slope(self.polynomial, self.centre, self.scale, self.input_limits)
@@ -370,7 +381,7 @@ def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: flo
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class Duhem(Loop):
+class Duhem(Invertible):
     """Duhem model with a polynomial to tend to and a polynomial slope.
 
     Parameters
@@ -381,12 +392,19 @@ class Duhem(Loop):
         Ascending coefficients of g, output per scaled input; at least one.
     alpha : float
         How fast the output tends to f, per scaled input; positive.
-    **others
-        As of `Loop`; the memory is the output, which starts on the curve of inputs that have only risen,
-        or virgin on f.
+    centre, scale : float
+        Of the input; scale positive.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: on the curve of inputs that have only risen, or on f.
+    input, output : Channel
+        Channel driven and channel given.
     """
 
     kind = "duhem"
+    solved, inverse_remembers, n_states = True, "input", 2
+    peaks = many_peaks
     start_kernel = duhem_start
     kernel, inverse_kernel, inverse_start_kernel = loop_kernels(
         _duhem_moved, _duhem_output, duhem_start

@@ -9,7 +9,6 @@ Behavior for Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator", Eq. 
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar, Protocol, Self, cast
@@ -60,6 +59,9 @@ class Envelope(Parametrised):
     value: ClassVar[EnvelopeKernel]
     inverse: ClassVar[EnvelopeKernel]
 
+    typical: ClassVar[tuple[tuple[Any, ...], tuple[Any, ...]]]
+    """Arguments of `examples`."""
+
     def coefficients(self) -> Array:
         """Return the numbers that the kernels read; by default the parameters."""
         return self.pack()
@@ -69,9 +71,10 @@ class Envelope(Parametrised):
         return replace(self, offset=self.offset + offset)  # type: ignore[type-var,attr-defined]
 
     @classmethod
-    @abstractmethod
     def examples(cls) -> tuple[Self, Self]:
         """Return a pair for rising and falling input over 0 to 5 bar, the second never lower."""
+        rising, falling = cls.typical
+        return cls(*rising), cls(*falling)
 
     def __call__(self, inputs: ArrayLike) -> Array:
         """Return the envelope at the inputs, any shape."""
@@ -123,16 +126,12 @@ class Tanh(Envelope):
     value = tanh_value
     inverse = tanh_inverse
     parameters = ("slope", "shift", "offset")
+    typical = (0.5, -1.3, 0.0), (0.45, -0.9, 0.1)
     notation = Notation(r"\gamma(u) = \tanh(a u + b) + c", slope="a [1/{u}]", shift="b", offset="c")
 
     slope: Positive
     shift: FiniteFloat
     offset: FiniteFloat = 0.0
-
-    @classmethod
-    def examples(cls) -> tuple[Self, Self]:
-        """Return a pair for rising and falling input over 0 to 5 bar."""
-        return cls(0.5, -1.3, 0.0), cls(0.45, -0.9, 0.1)
 
 
 @envelope_kernel
@@ -170,6 +169,7 @@ class Exponential(Envelope):
     value = exponential_value
     inverse = exponential_inverse
     parameters = ("rate", "shift", "offset")
+    typical = (0.3, 0.2, 0.0), (0.4, 0.2, 0.2)
     notation = Notation(
         r"\gamma(u) = c + \operatorname{sgn}(a) \left(1 - e^{b - a u}\right)",
         rate="a [1/{u}]",
@@ -186,11 +186,6 @@ class Exponential(Envelope):
             raise ModelError(
                 "an exponential envelope of rate 0 is flat. Remedy: give a rate that is not zero."
             )
-
-    @classmethod
-    def examples(cls) -> tuple[Self, Self]:
-        """Return a pair for rising and falling input over 0 to 5 bar."""
-        return cls(0.3, 0.2, 0.0), cls(0.4, 0.2, 0.2)
 
 
 @envelope_kernel
@@ -224,6 +219,10 @@ class PiecewiseLinear(Envelope):
     inverse = piecewise_linear_inverse
     increasing = ("knots", "values")
     parameters = ("values",)
+    typical = (
+        ((0.0, 1.0, 2.5, 4.0, 5.0), (0.0, 0.1, 0.5, 0.9, 1.0)),
+        ((0.0, 1.0, 2.5, 4.0, 5.0), (0.05, 0.3, 0.7, 0.95, 1.05)),
+    )
     notation = Notation(
         r"\gamma(u) = v_k + (v_{k+1} - v_k) \frac{u - \xi_k}{\xi_{k+1} - \xi_k},\quad "
         r"\xi_k \le u \le \xi_{k+1}",
@@ -244,9 +243,3 @@ class PiecewiseLinear(Envelope):
     def shifted(self, offset: float) -> Self:
         """Return this envelope raised by a constant."""
         return replace(self, values=tuple(value + offset for value in self.values))
-
-    @classmethod
-    def examples(cls) -> tuple[Self, Self]:
-        """Return a pair for rising and falling input over 0 to 5 bar."""
-        knots = (0.0, 1.0, 2.5, 4.0, 5.0)
-        return cls(knots, (0.0, 0.1, 0.5, 0.9, 1.0)), cls(knots, (0.05, 0.3, 0.7, 0.95, 1.05))

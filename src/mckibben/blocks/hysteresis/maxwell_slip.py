@@ -68,17 +68,12 @@ def _advance(u: float, c: Array, state: Array, lost: Array) -> None:
 
 
 @kernel
-def _reversible(u: float, c: Array, n: int) -> float:
-    return polynomial_at((u - c[2]) / c[3], c, 4 + 2 * n, c.size - 4 - 2 * n)
-
-
-@kernel
 def _trial(u: float, memory: tuple[Array, Array]) -> float:
     c, state = memory
     n = state.size - 1
     du = u - state[n]
     change = stretch(du, c[0])
-    y = _reversible(u, c, n)
+    y = polynomial_at((u - c[2]) / c[3], c, 4 + 2 * n, c.size - 4 - 2 * n)
     for i in range(n):
         y += c[4 + n + i] * slip(state[i] + change, du, c[4 + i], c[1])
     return y
@@ -92,11 +87,11 @@ def maxwell_slip_step(
 
     Coefficients are [kappa, lambda, centre, scale, limits, weights, polynomial].
     """
-    n = state.size - 1
-    _advance(inputs[0], coefficients, state, scratch)
-    y = _reversible(inputs[0], coefficients, n)
+    c, n = coefficients, state.size - 1
+    _advance(inputs[0], c, state, scratch)
+    y = polynomial_at((inputs[0] - c[2]) / c[3], c, 4 + 2 * n, c.size - 4 - 2 * n)
     for i in range(n):
-        y += coefficients[4 + n + i] * state[i]
+        y += c[4 + n + i] * state[i]
     outputs[0] = y
 
 

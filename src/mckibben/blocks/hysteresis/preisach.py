@@ -24,7 +24,7 @@ Preisach model by Banks, Kurdila and Webb, 1997.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -36,13 +36,14 @@ from mckibben.blocks.base import Cost, one_per
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import ROUNDING, SLACK, kernel, step
 from mckibben.blocks.notation import Notation
+from mckibben.blocks.parameters import Parametrised
 from mckibben.blocks.solving import solved_inverse, solved_start
 from mckibben.errors import ModelError
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class Triangle(Invertible):
-    """A model of cells between levels of the input, one for each pair of intervals.
+class Triangle(Parametrised):
+    """Fields of a model of cells between levels of the input, one for each pair of intervals.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ class Triangle(Invertible):
         Default memory before the first sample, and the channels driven and given.
     """
 
-    increasing = ("levels",)
+    increasing: ClassVar[tuple[str, ...]] = ("levels",)
     parameters = ("weights", "offset")
 
     levels: fields.Vector
@@ -262,7 +263,7 @@ def _first_output(u: float, memory: tuple[Array, Array]) -> float:
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class Preisach(Triangle):
+class Preisach(Triangle, Invertible):
     """Preisach model on a triangular grid.
 
     Parameters
@@ -403,7 +404,7 @@ def ridges_start(coefficients: Array, state: Array, inputs: Array, virgin: bool)
 
 
 @dataclass(frozen=True, config=fields.STRICT)
-class KrasnoselskiiPokrovskii(Triangle):
+class KrasnoselskiiPokrovskii(Triangle, Invertible):
     """Krasnosel'skii-Pokrovskii model on a triangular grid.
 
     Parameters

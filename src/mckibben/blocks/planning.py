@@ -287,15 +287,12 @@ def plan_several(
     width, block, length = n + 2, n * n, nominal.size // n
     m = rows.size // width
     count, size_of = length * m, length * block
-    hessian, system, rest = (
-        scratch[:size_of],
-        scratch[size_of : 3 * size_of],
-        scratch[3 * size_of :],
-    )
-    wished, right = rest[: length * n], rest[length * n : 2 * length * n]
-    rest = rest[2 * length * n :]
-    step, rest = rest[: (length + 1) * n], rest[(length + 1) * n :]
-    duals, work = rest[: 6 * count], rest[6 * count :]
+    hessian, system = scratch[:size_of], scratch[size_of : 3 * size_of]
+    vectors = scratch[3 * size_of :]
+    wished, right = vectors[: length * n], vectors[length * n : 2 * length * n]
+    rest = vectors[2 * length * n :]
+    step, others = rest[: (length + 1) * n], rest[(length + 1) * n :]
+    duals, work = others[: 6 * count], others[6 * count :]
     room, price, short = duals[:count], duals[count : 2 * count], duals[2 * count : 3 * count]
     goal, room_step = duals[3 * count : 4 * count], duals[4 * count : 5 * count]
     price_step, p = duals[5 * count :], path[n:]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben import Block, Recording
-from mckibben.blocks.adaptive.adaptive import Adaptive, adaptive
+from mckibben.blocks.adaptive import Adaptive, adaptive
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.control import track
 from mckibben.control.drifting import Drift, Drifting

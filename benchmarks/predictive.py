@@ -24,8 +24,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.blocks.predictive.plan import kept_to
-from mckibben.blocks.predictive.predictive import Predictive
+from mckibben.blocks.planning import kept_to
+from mckibben.blocks.predictive import Predictive
 from mckibben.export.c.emulation import emulate, missing_tools
 from mckibben.export.c.project import export_c
 
@@ -52,11 +52,11 @@ def followed(
     places = np.minimum(np.arange(len(held)) + block.samples_ahead, len(held) - 1)
     ahead[:, :n] = held[places, :n]
     state = block.initial_state(held[0])
-    start = state[: block.undone.n_states].tolist()
+    start = state[: block.forward_model.n_states].tolist()
     pressures = np.empty((len(held), n))
     block.bind(STEP, state, ahead, pressures)()
     driven = np.hstack([pressures, held[:, n:]])
-    given = block.undone.simulate(driven, initial=start, sample_time=STEP)
+    given = block.forward_model.simulate(driven, initial=start, sample_time=STEP)
     return np.asarray(given)[HORIZON:], float(state[-1] / len(held))
 
 
@@ -68,9 +68,9 @@ def clipped(inverse: Block, references: Array, **limits: float) -> Array:
     pressures = np.asarray(inverse.simulate(held, sample_time=STEP))
     pressures = pressures.reshape(-1, n)
     kept_to(n, rows.ravel(), pressures.reshape(-1))
-    start = block.initial_state(held[0])[: block.undone.n_states].tolist()
+    start = block.initial_state(held[0])[: block.forward_model.n_states].tolist()
     driven = np.hstack([pressures, held[:, n:]])
-    given = block.undone.simulate(driven, initial=start, sample_time=STEP)
+    given = block.forward_model.simulate(driven, initial=start, sample_time=STEP)
     return np.asarray(given)[HORIZON:]
 
 

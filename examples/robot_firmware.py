@@ -26,7 +26,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mckibben
-from mckibben.blocks.adaptive.adaptive import Adaptive, adaptive
+from mckibben.blocks.adaptive import Adaptive, adaptive
 from mckibben.control.drifting import Drift, Drifting
 from mckibben.export import Serving, state_of
 from mckibben.link import ByteStream, Link

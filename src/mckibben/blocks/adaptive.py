@@ -318,7 +318,6 @@ class Adaptive(Block):
 
     @property
     def title(self) -> str:
-        """That of the block undone, and that it learns."""
         block = self.forward
         return f"{block.forward.title if isinstance(block, Inverse) else block.title}-adaptive"
 
@@ -421,12 +420,10 @@ class Adaptive(Block):
 
     @property
     def kernel(self) -> Step | None:  # type: ignore[override]
-        """That of the family that learns; None of a series."""
         return None if self.parts else self.learnable.step
 
     @property
     def start_kernel(self) -> Start | None:  # type: ignore[override]
-        """As `kernel`."""
         return None if self.parts else self.learnable.start
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -453,7 +450,6 @@ class Adaptive(Block):
         return self.fixed.cost(sample_time) + Cost(learnt, learnt)
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs what learns; of a series, all parts."""
         run = Layout(self).bind if self.parts else super().bind
         return run(sample_time, state, inputs, outputs)
 
@@ -470,14 +466,12 @@ class Adaptive(Block):
         return found
 
     def report(self, state: Array) -> None:
-        """Warn as the inverse that does not learn would; of a series, as all parts do."""
         if self.parts:
             super().report(state)
         else:
             self.fixed.report(state[: self.fixed.n_states])
 
     def n_clipped(self, state: Array) -> int:
-        """Return what the inverse that does not learn would count; of a series, all parts."""
         if self.parts:
             return super().n_clipped(state)
         return self.fixed.n_clipped(state[: self.fixed.n_states])

@@ -282,7 +282,6 @@ class Band(Block):
         return 1 + 2 * self._n_seen + len(self.bells)
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the numbers that the kernel reads, at this level."""
         step = needs_sample_time(self.kind, sample_time) if self.times else 1.0
         keeps = np.exp(-step / np.array(self.times))
         places = [int(np.ceil(self.level * (len(row) - 1) - 1e-9)) for row in self.scores]
@@ -380,7 +379,6 @@ class Banded(Composition):
 
     @property
     def title(self) -> str:
-        """That of the model, and that it has a band."""
         return f"{self.forward.title}-banded"
 
     @property

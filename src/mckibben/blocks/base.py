@@ -188,7 +188,8 @@ class Block(DrawsItself, Parametrised):
             names = [channel.name for channel in channels]
             if not names or len(set(names)) < len(names):
                 raise ModelError(
-                    f"channels of {self.kind!r} are {names}. Remedy: give each a name of its own."
+                    f"channels of {self.kind!r} are: {', '.join(names) or 'none'}. "
+                    "Remedy: give each a name of its own."
                 )
 
     @property

@@ -162,6 +162,11 @@ def _parts(value: object) -> object:
 Parts = Annotated[tuple[InstanceOf[Block], ...], BeforeValidator(_parts)]
 
 
+def _of_any(name: str) -> Any:
+    """Return a property that is true where it is of any part."""
+    return property(lambda composition: any(getattr(part, name) for part in composition.parts))
+
+
 class Composition(Block):
     """What all compositions share: states and parameters are those of the parts, one after another."""
 
@@ -181,24 +186,12 @@ class Composition(Block):
         marks = [f"{self.letter}_{{{place + 1}}}" for place in range(len(self.parts))]
         return (self.joined(marks),)
 
-    @property
-    def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether any part is."""
-        return any(part.rate_dependent for part in self.parts)
-
-    @property
-    def of_local_rules(self) -> bool:  # type: ignore[override]
-        """Whether any part is."""
-        return any(part.of_local_rules for part in self.parts)
-
-    @property
-    def undoing(self) -> bool:  # type: ignore[override]
-        """Whether any part is an inverse: it reaches only what the block undone wants."""
-        return any(part.undoing for part in self.parts)
+    rate_dependent = _of_any("rate_dependent")
+    of_local_rules = _of_any("of_local_rules")
+    undoing = _of_any("undoing")
 
     @property
     def dead_time(self) -> float:  # type: ignore[override]
-        """That of the parts together."""
         return type(self).together(part.dead_time for part in self.parts)
 
     @property
@@ -227,11 +220,9 @@ class Composition(Block):
         return Layout(self)
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return the parts' states, each started from the first sample that reaches it."""
         return self.wiring.initial_state(first, initial)
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that runs the parts in order."""
         return self.wiring.bind(sample_time, state, inputs, outputs)
 
 
@@ -280,11 +271,9 @@ class Series(Composition):
 
     @property
     def outputs(self) -> tuple[Channel, ...]:
-        """Those of the last part."""
         return self.parts[-1].outputs
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
-        """Lay out the parts one behind the other."""
         by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
         signals = list(taken)
         for number, part in enumerate(self.parts):
@@ -300,7 +289,6 @@ class Series(Composition):
         return signals
 
     def inverse(self) -> Series:
-        """Return the reversed series of the inverses; each part must have one."""
         return Series(tuple(part.inverse() for part in reversed(self.parts)))
 
     def reachable(self) -> tuple[Array, Array]:
@@ -314,7 +302,6 @@ class Series(Composition):
         return low, high
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the parts one behind the other."""
         return reduce(LinearSystem.then, [part.linear_system(sample_time) for part in self.parts])
 
     def joined(self, parts: Sequence[str]) -> str:
@@ -369,7 +356,6 @@ class Parallel(Composition):
 
     @cached_property
     def outputs(self) -> tuple[Channel, ...]:
-        """Those of all parts."""
         return tuple({c.name: c for part in self.parts for c in part.outputs}.values())
 
     def _places(self, part: Block) -> tuple[list[int], list[int]]:
@@ -380,7 +366,6 @@ class Parallel(Composition):
         return taken, [given.index(channel.name) for channel in part.outputs]
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
-        """Lay out the parts on the signals, and add what they give."""
         terms: list[list[Any]] = [[] for _ in self.outputs]
         for part in self.parts:
             own, places = self._places(part)
@@ -390,7 +375,6 @@ class Parallel(Composition):
         return [board.add(own) for own in terms]
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the sum of the parts."""
         n, m = len(self.inputs), len(self.outputs)
         systems = [
             part.linear_system(sample_time).among(*self._places(part), n, m) for part in self.parts
@@ -434,25 +418,20 @@ class PerChannel(Composition):
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
-        """One of every part."""
         return tuple(part.inputs[0] for part in self.parts)
 
     @property
     def outputs(self) -> tuple[Channel, ...]:
-        """One of every part."""
         return tuple(part.outputs[0] for part in self.parts)
 
     def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
-        """Lay out the parts, each on its own signal."""
         pairs = zip(self.parts, taken, strict=True)
         return [part.wired(board, [signal])[0] for part, signal in pairs]
 
     def inverse(self) -> PerChannel:
-        """Return the inverses, channel by channel."""
         return PerChannel(tuple(part.inverse() for part in self.parts))
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the outputs that every channel can reach whatever happened before."""
         ends = [part.reachable() for part in self.parts]
         return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
 

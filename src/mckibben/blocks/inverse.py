@@ -196,7 +196,6 @@ class Inverse(Block):
 
     @property
     def title(self) -> str:
-        """That of the block undone, and that it is undone."""
         return f"{self.forward.title}-inverse"
 
     @property
@@ -206,11 +205,9 @@ class Inverse(Block):
 
     @property
     def outputs(self) -> tuple[Channel, ...]:
-        """The forward block's driven inputs."""
         return self.forward.inputs[: self.forward.n_driven]
 
     def start_numbers(self) -> Array:
-        """Return the forward block's, as the inverse reads them."""
         return self.forward.inverse_numbers(self.forward.start_numbers())
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
@@ -230,7 +227,6 @@ class Inverse(Block):
         return state
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the forward block's, as the inverse reads them."""
         return self.forward.inverse_numbers(self.forward.coefficients(sample_time))
 
     def reachable(self) -> tuple[Array, Array]:
@@ -241,7 +237,6 @@ class Inverse(Block):
         return super().reachable()
 
     def inverse(self) -> Block:
-        """Return the forward block."""
         return self.forward
 
     def report(self, state: Array) -> None:
@@ -250,7 +245,6 @@ class Inverse(Block):
             warnings.warn(self.forward.inverse_complaint(state), ModelWarning, stacklevel=4)
 
     def n_clipped(self, state: Array) -> int:
-        """Return how many samples the forward block complains of."""
         return int(state[-1]) if self.forward.counts_clipped and state[-1] > 0 else 0
 
     def equations(self) -> tuple[str, ...]:
@@ -264,7 +258,6 @@ class Inverse(Block):
 
     @classmethod
     def example(cls) -> Self:
-        """Return the inverse of a Prandtl-Ishlinskii model."""
         return cls(load("blocks", "pi").example())
 
 

@@ -22,7 +22,7 @@ from itertools import combinations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.kernels import SLACK, kernel
+from mckibben.blocks.kernels import SLACK, fill, kernel
 
 MOST_STEPS = 30
 """Of the interior-point method; it takes about ten."""
@@ -238,7 +238,7 @@ def moved(
     price_step, forward = duals[5 * count :], work[:n]
     off, factors = system[: length * block], system[length * block :]
     step[:n] = 0.0
-    step[n:] = right
+    fill(step[n:], right)
     for t in range(length):
         for i in range(m):
             row, at = rows[i * width : (i + 1) * width], t * m + i
@@ -249,7 +249,7 @@ def moved(
                     step[t * n + k] += pull * row[2 + k]
     for t in range(length):
         now = step[(t + 1) * n : (t + 2) * n]
-        forward[:] = now
+        fill(forward, now)
         if t > 0:
             applied(n, off[t * block : (t + 1) * block], step[t * n : (t + 1) * n], -1.0, forward)
         now[:] = 0.0
@@ -287,15 +287,12 @@ def plan_several(
     width, block, length = n + 2, n * n, nominal.size // n
     m = rows.size // width
     count, size_of = length * m, length * block
-    hessian, system, rest = (
-        scratch[:size_of],
-        scratch[size_of : 3 * size_of],
-        scratch[3 * size_of :],
-    )
-    wished, right = rest[: length * n], rest[length * n : 2 * length * n]
-    rest = rest[2 * length * n :]
-    step, rest = rest[: (length + 1) * n], rest[(length + 1) * n :]
-    duals, work = rest[: 6 * count], rest[6 * count :]
+    hessian, system = scratch[:size_of], scratch[size_of : 3 * size_of]
+    vectors = scratch[3 * size_of :]
+    wished, right = vectors[: length * n], vectors[length * n : 2 * length * n]
+    rest = vectors[2 * length * n :]
+    step, others = rest[: (length + 1) * n], rest[(length + 1) * n :]
+    duals, work = others[: 6 * count], others[6 * count :]
     room, price, short = duals[:count], duals[count : 2 * count], duals[2 * count : 3 * count]
     goal, room_step = duals[3 * count : 4 * count], duals[4 * count : 5 * count]
     price_step, p = duals[5 * count :], path[n:]
@@ -317,7 +314,7 @@ def plan_several(
             for k in range(n):
                 wished[t * n + i] += slope[k * n + i] * errors[t * n + k] / size
                 wished[t * n + i] += own[i * n + k] * nominal[t * n + k]
-    p[:] = nominal
+    fill(p, nominal)
     for t in range(length):
         for i in range(m):
             row = rows[i * width : (i + 1) * width]
@@ -325,7 +322,7 @@ def plan_several(
             price[t * m + i] = ROOM
     for taken in range(MOST_STEPS):
         gap, amiss = 0.0, 0.0
-        right[:] = wished
+        fill(right, wished)
         for t in range(length):
             curved = hessian[t * block : (t + 1) * block]
             applied(n, curved, p[t * n : (t + 1) * n], -1.0, right[t * n : (t + 1) * n])

@@ -442,7 +442,6 @@ class Predictive(Block):
 
     @property
     def start(self) -> Initial:
-        """The compensator's, where that has a name."""
         return self.compensator.start if isinstance(self.compensator.start, str) else "first_sample"
 
     @property
@@ -476,7 +475,6 @@ class Predictive(Block):
         return self._kernels and self._kernels[1]
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the coefficients that `predictive_kernels` names."""
         if self._kernels is None:
             raise ModelError(
                 f"{self.compensator.title!r} cannot be run ahead in C. Remedy: export pi, gpi or "
@@ -516,7 +514,6 @@ class Predictive(Block):
         return Cost(length * inverse, length * (inverse + answers + planned))
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        """Return a function that looks ahead at every sample."""
         if self._kernels is not None:
             return super().bind(sample_time, state, inputs, outputs)
         numbers = self._numbers(sample_time, [np.empty(0), np.empty(0)])

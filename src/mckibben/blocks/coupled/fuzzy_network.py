@@ -28,7 +28,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Cost
 from mckibben.blocks.fields import STRICT, Channel, Channels, PositiveRows, Rows, Vector
 from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, kernel, step
+from mckibben.blocks.kernels import DERIVED, NOTHING, SLACK, fill, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import eliminate, newton_cost
 from mckibben.errors import ModelError
@@ -245,7 +245,7 @@ def fuzzy_network_inverse_step(
     m = state.size - 1
     if solve_driven(coefficients, state[:m], scratch, inputs, outputs) > SLACK:
         state[m] += 1.0
-    state[:m] = outputs
+    fill(state[:m], outputs)
 
 
 @kernel
@@ -265,8 +265,7 @@ def fuzzy_network_inverse_start(
         error = solve_driven(coefficients, trial, scratch[2 * m :], inputs, driven)
         if error < least or k == 0:
             least = error
-            for i in range(m):
-                state[i] = driven[i]
+            fill(state[:m], driven)
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -31,14 +31,4 @@ static inline mck_real mck_sum(mck_real total, mck_real change, mck_real *lost)
     return next;
 }
 
-/* Copy numbers within an array: first those whose places others are copied to. */
-static inline void mck_copy(mck_real *to, const mck_real *from, int n)
-{
-    const int forwards = to <= from;
-    for (int i = 0; i < n; i++) {
-        const int k = forwards ? i : n - 1 - i;
-        to[k] = from[k];
-    }
-}
-
 #endif

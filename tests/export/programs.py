@@ -473,8 +473,8 @@ def stays(a: Array) -> float:
 
 EDGES: dict[Any, int | None] = {
     counts_down_by_name: None,
-    shifts_up: None,
-    shifts_down: None,
+    shifts_up: 1,
+    shifts_down: 2,
     stands_alone: None,
     has_derivatives_and_else: None,
     assigns_what_it_reads: None,

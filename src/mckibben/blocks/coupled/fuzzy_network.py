@@ -95,8 +95,8 @@ def contract(c: Array, m: int, known: Array, memberships: Array, left: Array) ->
     n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
     n_known = fill_between(c, m, n, known, memberships)
     rows, width = c[5 + n + 2 * int(c[2]) :], n + constant
-    for place in range(left.size):
-        left[place] = 0.0
+    for i in range(left.size):
+        left[i] = 0.0
     for k in range(n_known):
         firing, rest = 1.0, k
         for i in range(n - 1, m - 1, -1):

@@ -498,7 +498,9 @@ class _Translator:
 
     def _fill(self, target: ast.expr, value: ast.expr) -> None:
         if self._is_array(value):
-            raise self.refusal(value, f"a copy of {ast.unparse(value)!r}", "call `fill(to, numbers)`")
+            raise self.refusal(
+                value, f"a copy of {ast.unparse(value)!r}", "call `fill(to, numbers)`"
+            )
         view, k, given = self.view(target), self._spare("k"), self.value(value).to(REAL).text
         if not isinstance(value, ast.Constant | ast.Name):  # computed once, as in Python
             self._emit(f"const mck_real {(same := self._spare('same'))} = {given};")

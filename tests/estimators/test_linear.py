@@ -19,6 +19,7 @@ from mckibben.estimators.core.data import training_data
 from mckibben.estimators.dynamics.prediction_error import Orders, errors
 from mckibben.papers.field_models.affine_match import affine_match
 from mckibben.registry import load
+from tests.golden.plants import runs
 
 Array = NDArray[np.float64]
 
@@ -248,3 +249,9 @@ def test_starts_that_explain_everything_are_not_believed() -> None:
         found = fit.fit(recording).diagnostics_
         assert found.rmse == found.rmse_from_rest < np.ptp(y)
         assert fit.model_.to_dict()["initial"] == "first_sample"
+
+
+def test_poles_that_oscillate_are_found_beside_lags() -> None:
+    found = load("estimators", "oe")(n_poles=4, n_zeros=2).fit(runs("muscle"))
+    assert found.diagnostics_.rmse < 1.52
+    assert np.abs(found.model_.poles.imag).max() > 0.1

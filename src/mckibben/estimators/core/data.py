@@ -32,13 +32,7 @@ def stretches(mask: Mask) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Run:
-    """One recording: what drives (n, k), outputs (n, m), what schedules (n, s), and which samples count.
-
-    ``place`` is that among all runs, ``recording`` that of its recording among all; ``unmeasured``
-    are channels that schedule and that it lacks, which are as in others on average.
-    ``peak`` is the input from which the run is taken to have come before its first sample, where that
-    is not below: it makes the memory at the start.
-    """
+    """One recording: what drives (n, k), outputs (n, m), what schedules (n, s), which samples count."""
 
     name: str
     driven: Array
@@ -47,9 +41,16 @@ class Run:
     counts: Mask
     sample_time: float | None
     peak: float | None = None
+    """Input from which the run came before its first sample, where that is not below: its memory."""
+
     place: int = 0
+    """Among all runs."""
+
     recording: int = 0
+    """Place of its recording among all."""
+
     unmeasured: tuple[str, ...] = ()
+    """Channels that schedule and that it lacks, which are as in others on average."""
 
     @property
     def u(self) -> Array:
@@ -69,10 +70,6 @@ class Run:
     def cut(self, start: int, stop: int | None = None) -> Run:
         """Return a part of the run, which begins with a memory of its own."""
         return replace(self._at(slice(start, stop)), peak=None if start else self.peak)
-
-    def carrying(self, u: Array, y: Array) -> Run:
-        """Return the run with another input and output, each of shape (n,)."""
-        return replace(self, driven=u[:, np.newaxis], outputs=y[:, np.newaxis])
 
     def stretches(self, shortest: int) -> list[Run]:
         """Return the stretches whose samples all count, longer than so many, each a run of its own."""
@@ -246,9 +243,12 @@ class TrainingData:
         inputs = np.concatenate([run.u[run.counts] for run in self.runs])
         return float(np.dot(inputs - inputs.mean(), self.target)) < 0
 
+    def _changed(self, change: Callable[[Run], Run]) -> TrainingData:
+        return replace(self, runs=tuple(map(change, self.runs)))
+
     def negated(self) -> TrainingData:
         """Return the same data with the output's sign changed."""
-        return replace(self, runs=tuple(replace(run, outputs=-run.outputs) for run in self.runs))
+        return self._changed(lambda run: replace(run, outputs=-run.outputs))
 
     def with_peaks(self, peaks: Sequence[float | None]) -> TrainingData:
         """Return the same data with other memories at the start."""
@@ -261,7 +261,7 @@ class TrainingData:
 
     def condensed(self) -> TrainingData:
         """Return the same data with every run condensed; see `Run.condensed`."""
-        return replace(self, runs=tuple(run.condensed() for run in self.runs))
+        return self._changed(Run.condensed)
 
     def stretches(self, shortest: int) -> TrainingData:
         """Return the same data as runs whose samples all count; see `Run.stretches`."""
@@ -275,28 +275,27 @@ class TrainingData:
 
     def between(self, start: float, stop: float) -> TrainingData:
         """Return the same runs of which only what is between two shares of their time counts."""
-        runs = []
-        for run in self.runs:
-            counts, n = np.zeros_like(run.counts), run.counts.size
-            part = slice(round(start * n), round(stop * n))
-            counts[part] = run.counts[part]
-            runs.append(replace(run, counts=counts))
-        return replace(self, runs=tuple(runs))
+
+        def part(run: Run) -> Run:
+            shares = np.arange(run.counts.size)
+            inside = (shares >= round(start * shares.size)) & (shares < round(stop * shares.size))
+            return replace(run, counts=run.counts & inside)
+
+        return self._changed(part)
 
     def thinned(self, most: int) -> TrainingData:
         """Return the same runs with fewer samples that count, spread evenly; inputs stay whole."""
         total = sum(int(run.counts.sum()) for run in self.runs)
         if total <= most:
             return self
-        runs = []
-        for run in self.runs:
+
+        def thinner(run: Run) -> Run:
             counting = np.flatnonzero(run.counts)
             share = max(round(most * counting.size / total), min(2, counting.size))
             chosen = counting[np.linspace(0, counting.size - 1, share).round().astype(int)]
-            counts = np.zeros_like(run.counts)
-            counts[chosen] = True
-            runs.append(replace(run, counts=counts))
-        return replace(self, runs=tuple(runs))
+            return replace(run, counts=np.isin(np.arange(run.counts.size), chosen))
+
+        return self._changed(thinner)
 
 
 def training_data(

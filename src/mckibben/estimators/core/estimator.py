@@ -68,44 +68,34 @@ MADE_OF_DISPLACEMENT = {
 class Diagnostics:
     """What a fit has to say of itself.
 
-    Parameters
-    ----------
-    rmse : float
-        Free-running RMSE on the samples fitted, in the unit of the output, each run started as fitted;
-        of several outputs the mean of theirs.
-    rmse_by_output : tuple of float
-        The same, of every output.
-    rmse_from_rest : float
-        The same, each run started as a stream or generated code starts: without knowing an output.
-    n_samples : int
-        Samples fitted.
-    n_evaluations : int
-        Times the model was evaluated in the search.
-    seconds : float
-        Wall time.
-    interrupted : bool
-        Whether the user stopped the search; the model is then the best found until there.
-    at_bounds : tuple of int
-        Parameters, by their place in ``model_.pack()``, that ended at a bound.
-    peaks : tuple of float or None
-        For every recording, the input from which it was taken to have come before its first sample.
-    notes : tuple of str
-        What the user should know.
-    uncertainty : callable
-        Gives `condition` and `covariance`, which are computed when first asked for.
+    Errors are those of free runs on the samples fitted, in the unit of the output, each run started as
+    fitted; of several outputs the mean of theirs.
     """
 
     rmse: float
     rmse_by_output: tuple[float, ...]
     rmse_from_rest: float
+    """Each run started as a stream or generated code starts: without knowing an output."""
+
     n_samples: int
     n_evaluations: int
+    """Times the model was evaluated in the search."""
+
     seconds: float
     interrupted: bool
+    """Whether the user stopped the search; the model is then the best found until there."""
+
     at_bounds: tuple[int, ...]
+    """Parameters, by their place in ``model_.pack()``, that ended at a bound."""
+
     peaks: tuple[float | None, ...]
+    """For every recording, the input from which it was taken to have come before its first sample."""
+
     notes: tuple[str, ...]
+    """What the user should know."""
+
     uncertainty: Callable[[], tuple[float, Array]] = field(repr=False)
+    """Gives `condition` and `covariance`, which are computed when first asked for."""
 
     @cached_property
     def _uncertainty(self) -> tuple[float, Array]:
@@ -227,8 +217,8 @@ class Estimator(ABC):
         return self
 
     def __repr__(self) -> str:
-        values = ((field.name, repr(getattr(self, field.name)), field) for field in fields(self))
-        changed = [f"{name}={text}" for name, text, field in values if text != repr(field.default)]
+        values = [(each, repr(getattr(self, each.name))) for each in fields(self)]
+        changed = [f"{each.name}={text}" for each, text in values if text != repr(each.default)]
         return f"{type(self).__name__}({', '.join(changed)})"
 
     def __sklearn_tags__(self) -> Any:
@@ -382,12 +372,9 @@ class Estimator(ABC):
             progress(1.0, diagnostics.rmse)
         self.model_, self.diagnostics_ = block, diagnostics
         settings = self.get_params()
-        if (
-            self.solves_starts
-            and settings["initial"] == "fitted"
-            and not tracker.interrupted
-            and diagnostics.rmse_from_rest > np.ptp(data.target)
-        ):
+        fits_starts = self.solves_starts and settings["initial"] == "fitted"
+        missed = diagnostics.rmse_from_rest > np.ptp(data.target)
+        if fits_starts and missed and not tracker.interrupted:
             at_rest = type(self)(**settings | {"initial": "first_sample"})
             at_rest._fit(recordings, rows, validation, progress)
             vars(self).update(vars(at_rest) | settings)
@@ -423,9 +410,8 @@ class Estimator(ABC):
         given = [channel.name for channel in self.fitted.outputs]
         measured = np.concatenate([recording.matrix(given) for recording in every])
         residual = measured - predicted.reshape(measured.shape)
-        unexplained = (residual**2).sum(axis=0) / ((measured - measured.mean(axis=0)) ** 2).sum(
-            axis=0
-        )
+        around = measured - measured.mean(axis=0)
+        unexplained = (residual**2).sum(axis=0) / (around**2).sum(axis=0)
         return float(1 - unexplained.mean())
 
     @property

@@ -100,14 +100,9 @@ def covariance_of(
 
 
 def told_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[float, Array]:
-    """Return the condition of slopes and the covariance that they and residuals make.
+    """Return the condition of slopes, (n, k), and the covariance that they and residuals, (n,), make.
 
-    Parameters
-    ----------
-    slopes : array, shape (n, k)
-        At the samples that count, as `TrainingData.target`.
-    residual : array, shape (n,)
-        Likewise.
+    Both at the samples that count, as `TrainingData.target`.
     """
     if not (np.isfinite(slopes).all() and np.isfinite(residual).all()):
         return np.inf, np.full(2 * slopes.shape[1:], np.nan)
@@ -183,16 +178,9 @@ def relative_sizes(parameters: Array) -> Array:
 def sensitivities(
     block: Block, places: Sequence[int], sizes: Array, run: Callable[[list[Block]], Array]
 ) -> Array:
-    """Return how outputs move with some parameters, each in units of its size, shape (n, k).
+    """Return how outputs move with k parameters, each in units of its size, shape (n, k).
 
-    Parameters
-    ----------
-    places : sequence of int, length k
-        Of the parameters.
-    sizes : array, shape (k,)
-        Their sizes.
-    run : callable
-        Gives the outputs of blocks, shape (blocks, n).
+    ``run`` gives the outputs of blocks, shape (blocks, n).
     """
     parameters = block.pack()
     perturbed: list[Block] = [block]
@@ -231,21 +219,14 @@ def blanked(covariance: Array, told: NDArray[np.bool_]) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
-    """Residuals as an autoregression: e_t = a_1 e_{t-1} + ... + shock.
-
-    Parameters
-    ----------
-    coefficients : array, shape (k,)
-        a.
-    shock : float
-        Standard deviation of what is new in every sample.
-    variance : float
-        Of the residuals.
-    """
+    """Residuals as an autoregression: e_t = a_1 e_{t-1} + ... + shock."""
 
     coefficients: Array
     shock: float
+    """Standard deviation of what is new in every sample."""
+
     variance: float
+    """Of the residuals."""
 
     @property
     def _whitener(self) -> Array:
@@ -273,13 +254,9 @@ class Autoregression:
 
 
 def autoregression(series: Sequence[Array]) -> Autoregression:
-    """Return the autoregression of pieces of one series, of as many terms as BIC asks for.
+    """Return the autoregression of pieces of one series, each of shape (n,), by Burg's method.
 
-    By Burg's method, which is always stable.
-
-    Parameters
-    ----------
-    series : sequence of array, shape (n,)
+    Its number of terms is chosen by BIC; it is always stable.
     """
     n = sum(map(len, series))
     variance = float(np.mean(np.concatenate(series) ** 2)) if n else 0.0

@@ -126,8 +126,7 @@ class Consequents:
 
     def fit(self, x: Array, columns: Array, y: Array) -> Array:
         """Return consequents by damped least squares, shape (rules * terms, outputs)."""
-        n_terms = x.shape[1] + self.constants
-        return self.solve(columns.T @ columns, columns.T @ y, n_terms)
+        return self.solve(columns.T @ columns, columns.T @ y, x.shape[1] + self.constants)
 
 
 @dataclass(frozen=True)
@@ -165,22 +164,12 @@ class Problem:
 
 @dataclass(frozen=True)
 class Search:
-    """How antecedents are searched.
-
-    Parameters
-    ----------
-    method : {"ls", "pso"}
-        By variable projection, or by the paper's particle swarm.
-    samples : int
-        On how many samples, spread evenly.
-    swarm : Swarm
-        Of the particle swarm.
-    seed : int
-        Of the particle swarm.
-    """
+    """How antecedents are searched: by variable projection, or by the paper's particle swarm."""
 
     method: Method
     samples: int
+    """On how many samples, spread evenly."""
+
     swarm: Swarm
     seed: int
 
@@ -215,14 +204,13 @@ def fit_network(
     else:
         held = None if validation is None else thinned(*validation)
         sets = project(problem, n_sets, x.min(axis=0), x.max(axis=0), held, tracker)
-    gram: Array | float = 0.0
-    right: Array | float = 0.0
+    gram, right = np.zeros(()), np.zeros(())
     for start in range(0, len(x), PART):
         part = slice(start, start + PART)
         columns = Problem(x[part], y[part], solver).columns(sets)
         gram, right = gram + columns.T @ columns, right + columns.T @ y[part]
     n_terms = x.shape[1] + solver.constants
-    return Fitted(sets, solver.solve(np.asarray(gram), np.asarray(right), n_terms))
+    return Fitted(sets, solver.solve(gram, right, n_terms))
 
 
 def project(

@@ -119,13 +119,9 @@ class MPINarmaxEstimator(CoupledEstimator):
         """Return the hysteresis from runs without load."""
         u, y = data.inputs[0], data.outputs[0]
         free = f"{y.name}_free"
+        units = {u.name: u.unit, free: y.unit}
         recordings = [
-            Recording(
-                {u.name: run.driven[:, 0], free: run.outputs[:, 0]},
-                run.sample_time,
-                {u.name: u.unit, free: y.unit},
-            )
-            for run in data.runs
+            Recording({u.name: run.u, free: run.y}, run.sample_time, units) for run in data.runs
         ]
         settings = {"input": u.name, "output": free, "seed": self.seed}
         if self.memory == "rdpi":
@@ -212,9 +208,7 @@ class RecurrentProblem:
         """Return the network whose consequents are solved for with given past outputs."""
         e, constants = self.settings, self.settings.constants
         solver = Consequents(constants, e.ridge)
-        gram: Array | float = 0.0
-        right: Array | float = 0.0
-        n_terms = 0
+        gram, right, n_terms = np.zeros(()), np.zeros(()), 0
         for inputs, past, y in zip(self.inputs, pasts, self.targets, strict=True):
             x = self.regress(inputs, past)
             phi = np.empty((len(x), *sets.centres.shape))
@@ -225,7 +219,7 @@ class RecurrentProblem:
             gram = gram + columns.T @ columns
             right = right + columns.T @ y[:, np.newaxis]
             n_terms = x.shape[1] + constants
-        consequents = solver.solve(np.asarray(gram), np.asarray(right), n_terms)
+        consequents = solver.solve(gram, right, n_terms)
         if not constants:
             consequents = np.pad(consequents.reshape(-1, n_terms), ((0, 0), (0, 1)))
         return RecurrentFuzzyNetwork(
@@ -248,10 +242,6 @@ class RecurrentProblem:
         network.bind(self.step, network.initial_state(inputs[0]), inputs, output)()
         return output[:, 0]
 
-    def free_runs(self, network: RecurrentFuzzyNetwork) -> list[Array]:
-        """Return the network's own outputs over all runs."""
-        return [self.free_run(network, inputs) for inputs in self.inputs]
-
     def cost(self, outputs: list[Array]) -> float:
         """Return the RMSE of free runs; infinite where they leave all bounds."""
         errors = np.concatenate([z - y for z, y in zip(outputs, self.targets, strict=True)])
@@ -271,7 +261,7 @@ class RecurrentProblem:
         found, least = None, np.inf
         for _ in range(ROUNDS):
             network = self.solved(sets, feedbacks, pasts)
-            outputs = self.free_runs(network)
+            outputs = [self.free_run(network, inputs) for inputs in self.inputs]
             cost = self.cost(outputs)
             if cost < least:
                 found, least = network, cost
@@ -328,7 +318,7 @@ class RecurrentProblem:
         def cost(place: Array) -> float:
             try:
                 network = thin.solved(*split(place), thin.targets)
-                return thin.cost(thin.free_runs(network))
+                return thin.cost([thin.free_run(network, inputs) for inputs in thin.inputs])
             except (MckibbenError, np.linalg.LinAlgError):
                 return np.inf
 

@@ -16,29 +16,22 @@ WORST = float(np.finfo(np.float64).max)
 
 @dataclass(frozen=True)
 class Swarm:
-    """Settings of particle swarm optimisation.
-
-    Parameters
-    ----------
-    particles, iterations : int
-        Size of the swarm and number of moves.
-    inertia : (float, float)
-        At the first and last move, linear between; equal for a constant.
-    c1, c2 : float
-        Pull towards a particle's own best and the swarm's best.
-    fastest : float
-        How far a particle moves at a time, at most, relative to the bounds.
-    stops : bool
-        Whether a particle at a bound loses the speed that took it there.
-    """
+    """Settings of particle swarm optimisation."""
 
     particles: int = 20
     iterations: int = 50
     inertia: tuple[float, float] = (0.9, 0.4)
+    """At the first and last move, linear between."""
+
     c1: float = 2.0
     c2: float = 2.0
+    """Pull towards a particle's own best and the swarm's best."""
+
     fastest: float = 0.2
+    """How far a particle moves at a time, at most, relative to the bounds."""
+
     stops: bool = True
+    """Whether a particle at a bound loses the speed that took it there."""
 
     @property
     def budget(self) -> int:

@@ -15,9 +15,9 @@ from mckibben.blocks.compose import Parallel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Initial, resting
-from mckibben.estimators.core.uncertainty import inverted, simulate_all, told_by_runs, unknown
+from mckibben.estimators.core.uncertainty import inverted, told_by_runs, unknown
 from mckibben.estimators.coupled.base import schedules
 from mckibben.estimators.dynamics.prediction_error import (
     Orders,
@@ -214,17 +214,13 @@ class PredictionErrorEstimator(Estimator):
         centre = np.mean(data.stacked("driven"), axis=0)
         middle = float(np.mean(data.target))
         given, wanted = np.ptp(data.stacked("driven"), axis=0), float(np.ptp(data.target))
-        known, runs = (
-            [
-                replace(
-                    run,
-                    driven=(run.driven - centre) / given,
-                    outputs=(run.outputs - middle) / wanted,
-                )
-                for run in pieces
-            ]
-            for pieces in (data.stretches(orders.size).runs, data.runs)
-        )
+
+        def relative(run: Run) -> Run:
+            driven, outputs = (run.driven - centre) / given, (run.outputs - middle) / wanted
+            return replace(run, driven=driven, outputs=outputs)
+
+        runs = list(map(relative, data.runs))
+        known = list(map(relative, data.stretches(orders.size).runs))
         if orders.a or orders.c or orders.d:
             if not known:
                 raise DataError(
@@ -287,10 +283,6 @@ class PredictionErrorEstimator(Estimator):
     def starting(self) -> Start:
         """The state before the first sample; of several inputs none is fitted."""
         return "first_sample" if self.initial == "fitted" and not self.single else self.initial
-
-    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks where samples count, started by their rule."""
-        return super().free_runs(blocks, data) if self.single else simulate_all(blocks, data)
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]

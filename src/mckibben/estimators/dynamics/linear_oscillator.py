@@ -1,17 +1,20 @@
-"""The linear oscillator nearest to recordings, from which others start."""
+"""What searches of oscillating models share: a linear start, and inputs in steps finer than samples."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.blocks.dynamics.process_model import ProcessModel
+from mckibben.blocks.dynamics.repeating import BETWEEN
 from mckibben.errors import DataError
-from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.dynamics.process_model import ProcessModelEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.signals.periodic import band_limited
 
 FORGOTTEN = 3 * np.log(1e8)
 """Times the decay after which a start counts as forgotten.
@@ -76,3 +79,56 @@ def linear_oscillator(data: TrainingData, channels: dict[str, Any]) -> Linear:
         )
     (time,), stiffness = model.time_constants, 1.0 / model.gain
     return Linear(1e3 * stiffness * time**2, 2.0 * model.damping * time * stiffness, stiffness)
+
+
+@dataclass(frozen=True)
+class Path:
+    """The input of a run in steps; steps from sample to sample; samples before the first that counts."""
+
+    run: Run
+    inputs: Array
+    every: int
+    skipped: int
+
+
+def paths(data: TrainingData, substeps: int, warm: int | None, at_rest: bool) -> list[Path]:
+    """Return the inputs of all runs in steps.
+
+    Parameters
+    ----------
+    data : TrainingData
+    substeps : int
+        From sample to sample; `BETWEEN` times as many in periodic runs.
+    warm : int or None
+        Samples to be run before those of a period; None where runs are not periodic: then the input goes
+        in straight lines from sample to sample.
+    at_rest : bool
+        Whether a run that is not periodic begins with its first input, instead of with none.
+    """
+    found = []
+    for run in data.runs:
+        n = run.u.size
+        if warm is None:
+            steps = np.arange(1 + substeps * n) / substeps
+            before = run.u[0] if at_rest else 0.0
+            u = np.interp(steps, np.arange(n + 1), np.append(before, run.u))
+            found.append(Path(run, u, substeps, 0))
+            continue
+        ratio = BETWEEN * substeps
+        places = np.arange(-(warm + 1) * ratio, (n - 1) * ratio + 1) % (n * ratio)
+        found.append(Path(run, band_limited(run.u, ratio)[places], ratio, warm))
+    return found
+
+
+def averaged(data: TrainingData) -> TrainingData:
+    """Return periodic runs of one input as one, with their mean output; others as they are.
+
+    What runs free is the same in all, so their squared errors are that of the mean, but for a constant.
+    """
+    first, *others = data.runs
+    if not all(np.array_equal(run.driven, first.driven) and run.counts.all() for run in data.runs):
+        return data
+    if not others:
+        return data
+    mean = np.mean([run.outputs for run in data.runs], axis=0)
+    return replace(data, runs=(replace(first, outputs=mean),))

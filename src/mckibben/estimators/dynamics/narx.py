@@ -146,8 +146,7 @@ class NarxEstimator(SearchEstimator):
         def settle(path: list[Narx]) -> None:
             # what is refined last is best, if it stays within bounds
             options = (m for m in reversed(path) if self.allow_unstable or stable(m, data))
-            best = next(options, None)
-            if best is not None:
+            if (best := next(options, None)) is not None:
                 tried.append((free_run_rmse(best, data), best))
 
         with tracker.searching():
@@ -339,16 +338,7 @@ def one_step_pairs(fields: Mapping[str, Any], data: TrainingData, most: int) -> 
 
 
 def select(columns: Array, target: Array, most: int) -> list[int]:
-    """Return columns in the order in which they explain the target, at most so many.
-
-    Parameters
-    ----------
-    columns : array, shape (n, k)
-        Candidates.
-    target : array, shape (n,)
-    most : int
-        Columns to choose.
-    """
+    """Return columns, (n, k), in the order in which they explain the target, (n,), at most so many."""
     left, rest = columns.copy(), target.copy()
     power = np.maximum((columns**2).sum(axis=0), 1e-300)
     chosen: list[int] = []
@@ -369,22 +359,12 @@ def select(columns: Array, target: Array, most: int) -> list[int]:
 
 @dataclass(frozen=True)
 class HiddenLayers:
-    """One-step errors of networks by their hidden layers; all behind these is solved for.
-
-    Parameters
-    ----------
-    x, y : arrays, shapes (n, k) and (n,)
-        Regressors, and the outputs to give.
-    fields : mapping
-        Of the networks.
-    units : int
-        Of the hidden layer.
-    tracker : Tracker
-        Counts evaluations.
-    """
+    """One-step errors of networks by their hidden layers; all behind these is solved for."""
 
     x: Array
     y: Array
+    """Regressors, shape (n, k), and the outputs to give, shape (n,)."""
+
     fields: Mapping[str, Any]
     units: int
     tracker: Tracker
@@ -430,7 +410,7 @@ class HiddenLayers:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of a run: the state before it, outputs, which of them count, and what drives them.
+    """A stretch of a run: the state before it, and inputs, outputs, which count, and regressors over it.
 
     ``regressors`` are those that depend on inputs alone.
     """
@@ -441,12 +421,6 @@ class Stretch:
     counts: Mask
     regressors: Array
 
-    @classmethod
-    def of(cls, run: Run, samples: slice, state: Array, regressors: Array) -> Stretch:
-        """Return the stretch of some samples of a run, of which all regressors are given."""
-        given = np.ascontiguousarray(run.driven[samples])
-        return cls(state, given, run.y[samples], run.counts[samples], regressors[samples])
-
 
 def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stretch]:
     """Return stretches of so many samples, each started from measured outputs; or whole runs.
@@ -454,15 +428,20 @@ def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stre
     Of short ones no more than `HORIZON_SAMPLES` take, spread evenly. A whole run whose first sample does
     not count starts at rest, since its output may not be looked at.
     """
-    found = []
+    found: list[Stretch] = []
     n, m = model.output_lags, model.past_inputs
+
+    def add(samples: slice, state: Array) -> None:
+        inputs = np.ascontiguousarray(run.driven[samples])
+        parts = (run.y[samples], run.counts[samples], regressors[samples])
+        found.append(Stretch(state, inputs, *parts))
+
     for run in data.runs:
         regressors = driven(model, run)
         if horizon is None:
-            state = model.state_at(run.driven[0], run.y[:1]) if run.counts[0] else None
-            if state is None:
-                state = model.initial_state(run.driven[0])
-            found.append(Stretch.of(run, slice(None), state, regressors))
+            first = run.driven[0]
+            state = model.state_at(first, run.y[:1]) if run.counts[0] else None
+            add(slice(None), model.initial_state(first) if state is None else state)
             continue
         x, y = scaled(run.u, model.input_scale), scaled(run.y, model.output_scale)
         played = operators(model, x)
@@ -470,8 +449,7 @@ def stretches(model: Narx, data: TrainingData, horizon: int | None) -> list[Stre
             before = start - 1 - np.arange(max(n, m))
             if run.counts[before[:n]].all():
                 state = np.concatenate([y[before[:n]], x[before[:m]], played[start - 1]])
-                samples = slice(start, start + horizon)
-                found.append(Stretch.of(run, samples, state, regressors))
+                add(slice(start, start + horizon), state)
     if horizon is None:
         return found
     few = min(len(found), -(-HORIZON_SAMPLES // horizon))
@@ -494,17 +472,7 @@ def feed_back(slopes: Array, by_past: Array) -> None:
 
 
 class FreeRuns:
-    """Free runs over stretches of data, of models that differ in their parameters alone.
-
-    Parameters
-    ----------
-    model : Narx
-        One of them.
-    stretches : sequence of Stretch
-        One or more; their outputs follow one another.
-    tracker : Tracker
-        Counts evaluations.
-    """
+    """Free runs over stretches of data, one after another, of models that differ in parameters alone."""
 
     def __init__(self, model: Narx, stretches: Sequence[Stretch], tracker: Tracker) -> None:
         self.model, self.stretches, self.tracker = model, stretches, tracker

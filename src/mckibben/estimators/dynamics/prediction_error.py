@@ -9,8 +9,8 @@ from nothing.
 The start of every run is linear in the errors and solved for in each evaluation, so the search runs in
 the polynomials alone. A polynomial with a leading 1 has its roots within the unit circle where its
 reflection coefficients lie between -1 and 1: in their inverse hyperbolic tangents no step leaves what is
-stable. Starts are the high-order ARX model reduced by Steiglitz and McBride's iteration, slow and fast
-lags, and random stable poles, each with the noise model that its residuals ask for.
+stable. Starts are the high-order ARX model reduced by Steiglitz and McBride's iteration, lags and
+oscillations of a few speeds, and random lags, each with the noise model that its residuals ask for.
 
 Sources: Ljung, "System Identification", 1999, chapters 4 and 7; Monahan, "A note on enforcing
 stationarity in autoregressive-moving average models", 1984.
@@ -73,21 +73,7 @@ samples, which have none before them, are left out of account by a start that is
 
 @dataclass(frozen=True)
 class Orders:
-    """How many coefficients each polynomial has, beside the leading ones.
-
-    Parameters
-    ----------
-    b : int
-        Coefficients of the B of every input, at least 1.
-    a, f, c, d : int
-        Orders of the others; of F, for every input.
-    delay : int
-        Samples before B's first coefficient.
-    lags : tuple of int, optional
-        Of B's coefficients, in samples, instead of the next ones after the delay.
-    inputs : int
-        How many there are.
-    """
+    """How many coefficients each polynomial has, beside the leading ones."""
 
     b: int
     a: int = 0
@@ -95,8 +81,13 @@ class Orders:
     c: int = 0
     d: int = 0
     delay: int = 0
+    """Samples before B's first coefficient."""
+
     lags: tuple[int, ...] | None = None
+    """Of B's coefficients, in samples, instead of the next ones after the delay."""
+
     inputs: int = 1
+    """Of which each has a B and, where there is one, an F."""
 
     @property
     def input_lags(self) -> tuple[int, ...]:
@@ -421,7 +412,7 @@ def filtered(run: Run, numerator: Sequence[float], denominator: Sequence[float])
 def starting_points(
     runs: Sequence[Run], known: Sequence[Run], orders: Orders, n_starts: int, seed: int
 ) -> list[Array]:
-    """Return parameters to start from: reduced ARX, lags of a few speeds, random stable poles.
+    """Return parameters to start from: reduced ARX, lags and oscillations of a few speeds, random lags.
 
     ARX looks at past outputs, so it is found on what is known: stretches whose samples all count.
 
@@ -438,12 +429,14 @@ def starting_points(
     if known:
         candidates += [(_steiglitz_mcbride(known, orders, k), runs) for k in (0, 1, 3, 10)]
     plain = white[0] if white else runs
-    for speed in ([0.2], [0.9], [0.99, 0.9], [0.9995, 0.97]):
-        spread = np.resize(np.array(speed), n) * (1 - 1e-3 * np.arange(n))
-        candidates.append((np.asarray(np.poly(spread)[1:], dtype=np.float64), plain))
-    while len(candidates) < n_starts:
-        poles = 1 - 10 ** rng.uniform(-4, 0, n)
-        candidates.append((np.asarray(np.poly(poles)[1:], dtype=np.float64), plain))
+    speeds = [[0.2], [0.9], [0.99, 0.9], [0.9995, 0.97]]
+    turns = np.exp(1j * np.array([0.03, 0.2, 1.0]))
+    oscillating = [[0.98 * z, 0.98 * z.conj(), 0.97, 0.2] for z in turns] if n > 1 else []
+    tried = [np.resize(speed, n) * (1 - 1e-3 * np.arange(n)) for speed in speeds]
+    tried += [np.append(poles, np.full(max(n - 4, 0), 0.2))[:n] for poles in oscillating]
+    while len(candidates) + len(tried) < n_starts:
+        tried.append(1 - 10 ** rng.uniform(-4, 0, n))
+    candidates += [(np.real(np.poly(poles))[1:], plain) for poles in tried]
     stable = [(poles, data) for poles, data in candidates if spectral_radius(poles) < STABLE]
     found = [_complete(poles, data, runs, orders) for poles, data in stable]
     if not coloured:

@@ -26,9 +26,10 @@ from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
 from mckibben.estimators.dynamics.linear_oscillator import (
     MOST_SUBSTEPS,
     Linear,
+    averaged,
     linear_oscillator,
+    paths,
 )
-from mckibben.estimators.dynamics.paths import averaged, paths
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
@@ -171,19 +172,10 @@ class StateNetworkEstimator(SearchEstimator):
 
 
 class NetworkRuns:
-    """Errors of networks on all runs, and their derivatives, which are computed with them.
+    """Errors of networks of one structure on all runs, and their derivatives, computed with them.
 
-    Parameters
-    ----------
-    template : StateNetwork
-        Whose structure is searched.
-    data : TrainingData
-    warm : int or None
-        Samples before those of a period; None where runs are not periodic.
-        Others begin as after their first input has long been held, unless the template's start is
-        virgin: all zeros.
-    tracker : Tracker
-        Told of the best.
+    ``warm`` is the number of samples before those of a period, None where runs are not periodic: these
+    begin as after their first input has long been held, unless the template's start is virgin.
     """
 
     def __init__(

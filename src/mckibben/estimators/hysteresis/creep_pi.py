@@ -223,16 +223,13 @@ class CreepPIEstimator(SeparableEstimator):
                     guesses.append(np.concatenate([weights, [offset], taus, np.full(k, 0.07)]))
         return guesses
 
-    def memory(self, theta: Array, data: TrainingData) -> tuple[float, Array]:
-        """Return the offset of the logarithm, and the thresholds on it."""
+    def memory(self, theta: Array, data: TrainingData) -> tuple[float, Array, Array, Array]:
+        """Return the logarithm's offset, thresholds on it, its ends, and the operators' sums there."""
         offset = float(np.exp(theta[self.n_operators]))
-        low, high = self._logs(offset, data)
-        return offset, self.threshold_share * spread(self.n_operators, (low, high))
-
-    @staticmethod
-    def _logs(offset: float, data: TrainingData) -> tuple[float, float]:
         ends = Logarithm(offset).simulate(np.array(data.input_range))
-        return float(ends[0]), float(ends[1])
+        radii = self.threshold_share * spread(self.n_operators, (ends[0], ends[1]))
+        sums = [float(theta[: self.n_operators] @ (end - radii)) for end in ends]
+        return offset, radii, ends, np.array(sums)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the pieces of the map over the run's history, with their creep."""
@@ -244,14 +241,10 @@ class CreepPIEstimator(SeparableEstimator):
 
     def argument(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
         """Return the argument of the map, 0 to 1, and its derivatives by the relative weights."""
-        weights = theta[: self.n_operators]
-        offset, radii = self.memory(theta, data)
-        low, high = self._logs(offset, data)
-        operators = play_operators(
-            Logarithm(offset).simulate(run.history), radii, self.starting_rule
-        )
-        bottom, top = float(weights @ (low - radii)), float(weights @ (high - radii))
-        x = (operators @ weights - bottom) / (top - bottom)
+        offset, radii, (low, high), (bottom, top) = self.memory(theta, data)
+        logarithm = Logarithm(offset).simulate(run.history)
+        operators = play_operators(logarithm, radii, self.starting_rule)
+        x = (operators @ theta[: self.n_operators] - bottom) / (top - bottom)
         above = operators - (low - radii)
         return x, (above - x[:, np.newaxis] * (high - low)) / (top - bottom)
 
@@ -285,25 +278,23 @@ class CreepPIEstimator(SeparableEstimator):
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
         """Return the series: logarithm, memory, map and creep."""
-        linear = linear[: self.map_size]
-        weights = theta[: self.n_operators]
-        raised, radii = self.memory(theta, data)
-        low, high = self._logs(raised, data)
-        bottom, top = float(weights @ (low - radii)), float(weights @ (high - radii))
-        compliances = self.creep(theta)[1]
-        given = data.inputs[0]
-        result = data.outputs[0]
-        scale = 1.0 / (top - bottom)
-        memory = (vector(radii), vector(weights * scale), -bottom * scale, (low, high))
-        settled = offset / (1.0 + compliances.sum())
-        return Series(
-            (
-                Logarithm(raised, given, given),
-                PI(*memory, self.starting_rule, given, result),
-                PolynomialMap(self.map_size).build(linear, settled, 0.0, 1.0, result),
-                *self.creep_parts(theta, result),
-            )
+        given, result = data.inputs[0], data.outputs[0]
+        added, radii, (low, high), (bottom, top) = self.memory(theta, data)
+        weights = theta[: self.n_operators] / (top - bottom)
+        memory = PI(
+            vector(radii),
+            vector(weights),
+            float(-bottom / (top - bottom)),
+            (float(low), float(high)),
+            self.starting_rule,
+            given,
+            result,
         )
+        settled = offset / (1.0 + self.creep(theta)[1].sum())
+        output_map = PolynomialMap(self.map_size)
+        increasing = output_map.build(linear[: self.map_size], settled, 0.0, 1.0, result)
+        creep = self.creep_parts(theta, result)
+        return Series((Logarithm(added, given, given), memory, increasing, *creep))
 
 
 def elapsed(run: Run) -> Array:

@@ -35,7 +35,6 @@ class DuhemEstimator(SeparableEstimator):
         "Minor loops are not congruent and need not close; the inverse exists only where the "
         "slopes stay positive."
     )
-    inverse_kind = "exact where stable"
     makes = ("duhem",)
     effort: ClassVar[float] = 1.1
 

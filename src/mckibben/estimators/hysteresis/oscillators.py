@@ -31,8 +31,13 @@ from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.estimator import SearchEstimator
 from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
-from mckibben.estimators.dynamics.linear_oscillator import MOST_SUBSTEPS, linear_oscillator
-from mckibben.estimators.dynamics.paths import Path, averaged, paths
+from mckibben.estimators.dynamics.linear_oscillator import (
+    MOST_SUBSTEPS,
+    Path,
+    averaged,
+    linear_oscillator,
+    paths,
+)
 from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
@@ -196,25 +201,18 @@ def duhem_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[Osci
 
 @dataclass(frozen=True)
 class Element:
-    """How oscillators with one kind of element are searched.
-
-    Parameters
-    ----------
-    n_positive : int
-        Parameters of the block, the first ones, that are searched by their logarithms.
-    order : int
-        The others have the unit of this power of a force, over displacement.
-    follows : function
-        What runs the model with its derivatives.
-    starts : function
-        Models to start from, by the element's slope about no force, the share of it that 1 mm takes
-        away, and all other fields.
-    """
+    """How oscillators with one kind of element are searched."""
 
     n_positive: int
+    """Parameters of the block, the first ones, that are searched by their logarithms."""
+
     order: int
+    """The others have the unit of this power of a force, over displacement."""
+
     follows: Callable[..., None]
     starts: Callable[[float, float, dict[str, Any]], list[Oscillator]]
+    """Models to start from, by the element's slope about no force, the share of it that 1 mm takes
+    away, and all other fields."""
 
 
 ELEMENTS = {
@@ -224,21 +222,9 @@ ELEMENTS = {
 
 
 class FreeRuns:
-    """Errors of a model on all runs, and their derivatives, which are computed with them.
+    """Errors of models of one structure on all runs, and their derivatives, computed with them.
 
-    Parameters
-    ----------
-    template : Oscillator
-        Whose structure is searched.
-    data : TrainingData
-    paths : sequence of Path
-        Of all runs.
-    estimator : OscillatorEstimator
-        Says how the model is searched and run.
-    tracker : Tracker
-        Counts evaluations.
-    told : bool
-        Whether it is told of the best, too.
+    A tracker counts evaluations, and is told of the best where ``told``.
     """
 
     def __init__(

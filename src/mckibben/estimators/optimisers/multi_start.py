@@ -24,15 +24,7 @@ EXCHANGES = 3
 
 @dataclass(frozen=True)
 class Choice:
-    """Values that some of the parameters may be exchanged for, together.
-
-    Parameters
-    ----------
-    places : array of int, shape (k,)
-        Which parameters.
-    values : array, shape (n, k)
-        What to try for them.
-    """
+    """Values, shape (n, k), that some of the parameters may be exchanged for, together."""
 
     places: NDArray[np.intp]
     values: Array
@@ -131,20 +123,10 @@ def follow_best(
     most: int,
     same: float = -1.0,
 ) -> None:
-    """Begin at many starts, and follow those that promise most, the best first.
+    """Begin at many starts, and follow those that promise most, the best first, ``most`` of them.
 
-    Parameters
-    ----------
-    starts : iterable of array
-    begun : callable
-        A start to a place not far from it, and the cost there.
-    followed : callable
-        Such a place to whatever comes of it.
-    most : int
-        Places followed.
-    same : float
-        Relative difference of costs up to which two starts have come to one place, which is followed
-        once.
+    ``begun`` leads from a start to a place not far from it, and the cost there. Starts whose costs
+    differ by up to ``same``, relatively, have come to one place, which is followed once.
     """
     tried = sorted((begun(start) for start in starts), key=lambda found: found[1])
     costs: list[float] = []

@@ -33,18 +33,12 @@ def whole_searches() -> Iterator[None]:
 
 @dataclass
 class Tracker:
-    """Keeps the best point of a search, reports progress, and survives an interrupt.
-
-    Parameters
-    ----------
-    progress : callable or None
-        Told the share done and the best cost.
-    budget : int
-        Evaluations expected, for the share done.
-    """
+    """Keeps the best point of a search, reports progress, and survives an interrupt."""
 
     progress: Progress | None = None
     budget: int = 1
+    """Evaluations expected, for the share done."""
+
     evaluations: int = 0
     best_cost: float = np.inf
     best: Array | None = None

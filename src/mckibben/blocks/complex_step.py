@@ -93,7 +93,6 @@ def _carried(name: str, slope: Callable[[float, float], float]) -> Callable[[Any
         value = own(z.real)
         return complex(value, z.imag * by(z.real, value))
 
-    carried.__qualname__ = f"carried_{name}"  # by which it is cached
     return deferred(carried)
 
 

@@ -127,7 +127,6 @@ def step(function: Callable[..., None], **options: Any) -> Step:
             one(coefficients, state, scratch, inputs[t], outputs[t])
 
     loop = batch_in_scratch if "scratch" in signature(function).parameters else batch
-    loop.__qualname__ = f"{function.__module__}.{function.__qualname__}"  # by which it is cached
     one.batch = deferred(loop, **options)
     return cast("Step", one)
 

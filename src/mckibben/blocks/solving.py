@@ -130,7 +130,6 @@ def solved_inverse(
         advance(u, coefficients[:-2], state[:-2])
         outputs[0] = u
 
-    inverse_step.__qualname__ = f"{trial.__module__}.{trial.__qualname__}.inverse"
     return step(inverse_step), solved_start(trial, start)
 
 
@@ -144,7 +143,6 @@ def solved_kernels(
         outputs[0] = trial(inputs[0], (coefficients, state))
         advance(inputs[0], coefficients, state)
 
-    forward_step.__qualname__ = f"{trial.__module__}.{trial.__qualname__}.step"
     return step(forward_step), *solved_inverse(trial, advance, start)
 
 
@@ -194,7 +192,6 @@ def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> 
         start(forward, own, u, virgin)
         state[-1] = 0.0
 
-    inverse_start.__qualname__ = f"{trial.__module__}.{trial.__qualname__}.start"
     return kernel(inverse_start)
 
 

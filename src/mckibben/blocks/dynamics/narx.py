@@ -113,8 +113,6 @@ def narx_kernels(regression: Callable[[Array, Array], float]) -> tuple[Step, Sta
                 before, last = change, y
         state[:n] = found
 
-    narx_step.__qualname__ = f"{regression.__qualname__}.step"
-    narx_start.__qualname__ = f"{regression.__qualname__}.start"
     return step(narx_step), kernel(narx_start)
 
 

@@ -54,24 +54,24 @@ def loop_kernels(
     The model gives two compiled functions: ``moved(u, coefficients, state)``, its memory after the input
     has gone on to u, and ``output(u, z, coefficients)``.
     """
-    place = f"{moved.__module__}.{moved.__qualname__}"
 
     @kernel
     def advance(u: float, c: Array, state: Array) -> None:
         state[0] = moved(u, c, state)
         state[1] = u
 
+    @kernel
     def trial(u: float, memory: tuple[Array, Array]) -> float:
         c, state = memory
         return output(u, moved(u, c, state), c)
 
+    @step
     def loop_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
         """Move the memory with the input; the state is [memory, previous input]."""
         advance(inputs[0], coefficients, state)
         outputs[0] = output(inputs[0], state[0], coefficients)
 
-    trial.__qualname__, loop_step.__qualname__ = f"{place}.trial", f"{place}.step"
-    return step(loop_step), *solved_inverse(kernel(trial), advance, start)
+    return loop_step, *solved_inverse(trial, advance, start)
 
 
 def many_peaks(model: Invertible) -> Array:

@@ -45,7 +45,6 @@ def envelope_kernel(function: Callable[[float, Array], float]) -> EnvelopeKernel
         for t in range(arguments.size):
             values[t] = one(arguments[t], coefficients)
 
-    batch.__qualname__ = f"{function.__module__}.{function.__qualname__}"  # by which it is cached
     one.batch = kernel(batch)
     return cast("EnvelopeKernel", one)
 

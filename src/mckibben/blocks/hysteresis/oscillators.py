@@ -112,8 +112,6 @@ def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[S
             z += step / 6.0 * (share1 + 2.0 * share2 + 2.0 * share3 + share4)
         state[0], state[1], state[2], state[3] = (force - z) / k, 0.0, z, force
 
-    oscillator_step.__qualname__ = f"{slope.__qualname__}.step"
-    oscillator_start.__qualname__ = f"{slope.__qualname__}.start"
     return step(oscillator_step), kernel(oscillator_start)
 
 

@@ -151,7 +151,6 @@ def following(element: Any) -> Callable[..., None]:
                 if wanted:
                     slopes[j] = moved[0]
 
-    follow.__qualname__ = f"{element.__qualname__}.follow"
     return deferred(follow)
 
 

@@ -19,6 +19,7 @@ from sklearn.base import clone
 import mckibben
 from mckibben import Block, ModelError
 from mckibben.blocks.hysteresis.envelopes import Envelope
+from mckibben.blocks.parameters import Parametrised
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.presets import Chosen, preset
@@ -39,7 +40,7 @@ def modules_under(folder: str) -> Iterator[ModuleType]:
 
 
 def concrete(base: type, folder: str) -> set[Any]:
-    """Return the concrete subclasses of a class that the modules of a folder define."""
+    """Return the subclasses that the modules of a folder define, but those that others begin with."""
     return {
         value
         for module in modules_under(folder)
@@ -47,6 +48,7 @@ def concrete(base: type, folder: str) -> set[Any]:
         if value.__module__ == module.__name__
         and issubclass(value, base)
         and not inspect.isabstract(value)
+        and (hasattr(value, "kind") or not issubclass(value, Parametrised))
     }
 
 

@@ -177,8 +177,8 @@ def in_python(block: Block, form: str, settings: Mapping[str, Any]) -> list[str]
     if form == "inverse" and ForceFeedforward.of(block) is None:
         return ["inverse = model.inverse()"]
     where, name, asked = {
-        "adaptive": ("adaptive.adaptive", "adaptive", "(model"),
-        "predictive": ("predictive.predictive", "Predictive", "(model.inverse()"),
+        "adaptive": ("adaptive", "adaptive", "(model"),
+        "predictive": ("predictive", "Predictive", "(model.inverse()"),
         "inverse": ("force.feedforward", "ForceFeedforward", ".of(model"),
     }[form]
     return [f"from mckibben.blocks.{where} import {name}", "", f"inverse = {name}{asked}{given})"]

@@ -69,7 +69,8 @@ def pid_start(
     n = state.size // 4
     state[: 2 * n] = 0.0
     for k in range(n):
-        state[2 * n + k] = state[3 * n + k] = inputs[n + k]
+        state[2 * n + k] = inputs[n + k]
+        state[3 * n + k] = inputs[n + k]
     scratch[:] = 0.0
 
 

@@ -95,7 +95,8 @@ class Trial:
         self.outputs = self.run(self.inputs)
         # where outputs hardly move, rounding of their size is all there is to see
         least = 1e-4 * np.abs(self.outputs).max(axis=0) + np.finfo(float).tiny
-        self.span = np.maximum(np.ptp(self.outputs, axis=0), least)
+        with np.errstate(invalid="ignore"):  # outputs that are not finite break a law
+            self.span = np.maximum(np.ptp(self.outputs, axis=0), least)
         self.n_driven = self.block.n_driven
 
     @classmethod

@@ -37,7 +37,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.hysteresis.play_operators import follow
-from mckibben.blocks.kernels import Step, kernel, step
+from mckibben.blocks.kernels import Step, fill, kernel, step
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block, Start
@@ -365,10 +365,9 @@ def start_learning(c: Array, learnt: Array) -> None:
     """Start what is learnt, [theta, used, root, senses], with the fitted parameters."""
     p, noise = int(c[0]), c[2]
     fitted, fresh = c[4 + 2 * p : 4 + 3 * p], c[4 + 3 * p : family_at(c)]
-    for j in range(p):
-        learnt[j] = learnt[p + j] = fitted[j]
-    for i in range(fresh.size):
-        learnt[2 * p + i] = fresh[i]
+    fill(learnt[:p], fitted)
+    fill(learnt[p : 2 * p], fitted)
+    fill(learnt[2 * p : 2 * p + fresh.size], fresh)
     senses = learnt[2 * p + fresh.size :]
     senses[:] = 0.0
     for first in range(0, senses.size, SENSES):

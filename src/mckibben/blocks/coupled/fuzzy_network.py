@@ -243,7 +243,8 @@ def fuzzy_network_inverse_step(
 ) -> None:
     """Solve for the driven inputs from the last ones; the state is these, and samples clipped."""
     m = state.size - 1
-    if solve_driven(coefficients, state[:m], scratch, inputs, outputs) > SLACK:
+    error = solve_driven(coefficients, state[:m], scratch, inputs, outputs)
+    if error > SLACK:
         state[m] += 1.0
     fill(state[:m], outputs)
 

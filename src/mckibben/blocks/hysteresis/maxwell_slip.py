@@ -63,7 +63,8 @@ def _advance(u: float, c: Array, state: Array, lost: Array) -> None:
     du = u - state[n]
     change = stretch(du, c[0])
     for i in range(n):
-        state[i] = slip(accumulate(state[i], change, lost, i), du, c[4 + i], c[1])
+        moved = accumulate(state[i], change, lost, i)
+        state[i] = slip(moved, du, c[4 + i], c[1])
     state[n] = u
 
 

@@ -121,9 +121,11 @@ def follow(
     missing = target - total
     slack = SLACK * abs(highest - lowest)
     if target > previous and missing > ROUNDING * size:
-        return 1.0, move_to(target, 1.0, highest, r, w, s) > highest + slack
+        z = move_to(target, 1.0, highest, r, w, s)
+        return 1.0, z > highest + slack
     if target < previous and missing < -ROUNDING * size:
-        return -1.0, move_to(target, -1.0, lowest, r, w, s) < lowest - slack
+        z = move_to(target, -1.0, lowest, r, w, s)
+        return -1.0, z < lowest - slack
     above = missing > w[0] * slack and s[0] >= highest
     below = missing < -w[0] * slack and s[0] <= lowest
     return 0.0, above or below

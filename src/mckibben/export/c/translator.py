@@ -502,6 +502,7 @@ class _Translator:
                 value, f"a copy of {ast.unparse(value)!r}", "call `fill(to, numbers)`"
             )
         view, k, given = self.view(target), self._spare("k"), self.value(value).to(REAL).text
+        self.function.written |= {*view.roots}
         if not isinstance(value, ast.Constant | ast.Name):  # computed once, as in Python
             self._emit(f"const mck_real {(same := self._spare('same'))} = {given};")
             given = same

@@ -109,11 +109,11 @@ def test_settings_are_read_as_json_or_words() -> None:
     said = [
         "n_operators=7",
         "nonnegative=false",
-        "spacing=dense",
+        "initial=virgin",
         "thresholds=[0,0.5]",
         "pi.seed=3",
     ]
-    read = {"n_operators": 7, "nonnegative": False, "spacing": "dense", "seed": 3}
+    read = {"n_operators": 7, "nonnegative": False, "initial": "virgin", "seed": 3}
     assert settings_of("pi", said) == read | {"thresholds": (0, 0.5)}
     with pytest.raises(ModelError, match="n_operators"):
         settings_of("pi", ["n_operators"])

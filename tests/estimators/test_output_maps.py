@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mckibben.blocks.fields import DISPLACEMENT
-from mckibben.estimators.hysteresis.output_maps import MAPS, output_map
+from mckibben.estimators.hysteresis.output_maps import MAPS
 
 weights = arrays(float, 5, elements=st.floats(1e-3, 10))
 
@@ -13,7 +13,7 @@ weights = arrays(float, 5, elements=st.floats(1e-3, 10))
 @pytest.mark.parametrize("name", MAPS)
 @given(weights, st.floats(-5, 5))
 def test_block_equals_the_sum_of_the_pieces(name: str, w: np.ndarray, offset: float) -> None:
-    family = output_map(name, 5)
+    family = MAPS[name](5)
     x = np.linspace(0, 1, 41)
     pieces = family.pieces(x)
     w = w[: pieces.shape[1]]
@@ -27,7 +27,7 @@ def test_block_equals_the_sum_of_the_pieces(name: str, w: np.ndarray, offset: fl
 @pytest.mark.parametrize("name", ["piecewise-linear", "polynomial"])
 @given(weights)
 def test_increasing_maps_increase_and_invert(name: str, w: np.ndarray) -> None:
-    block = output_map(name, 5).build(w, 0.0, 0.0, 1.0, DISPLACEMENT)
+    block = MAPS[name](5).build(w, 0.0, 0.0, 1.0, DISPLACEMENT)
     y = block.simulate(np.linspace(0, 1, 101))
     assert np.all(np.diff(y) > 0)
     np.testing.assert_allclose(
@@ -39,7 +39,7 @@ def test_bernstein_pieces_are_integrals_of_bernstein_polynomials() -> None:
     from scipy.stats import binom
 
     x = np.linspace(0.0, 1.0, 20_001)
-    pieces = output_map("polynomial", 4).pieces(x)
+    pieces = MAPS["polynomial"](4).pieces(x)
     for k in range(4):
         density = np.asarray(binom.pmf(k, 3, x))
         integral = np.concatenate([[0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(x))])

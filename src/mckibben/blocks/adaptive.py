@@ -27,7 +27,6 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import (
     Block,
-    Board,
     Cost,
     Run,
     Start,
@@ -453,7 +452,7 @@ class Adaptive(Block):
         run = Layout(self).bind if self.parts else super().bind
         return run(sample_time, state, inputs, outputs)
 
-    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         """Lay out the parts; those behind the core twice."""
         if not self.parts:
             return super().wired(board, taken)

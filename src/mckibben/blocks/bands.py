@@ -18,8 +18,8 @@ from pydantic import BeforeValidator, Field, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Board, Ports, Start, needs_sample_time
-from mckibben.blocks.compose import Composition
+from mckibben.blocks.base import Block, Ports, Start, needs_sample_time
+from mckibben.blocks.compose import Composition, Layout
 from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vector
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
@@ -395,7 +395,7 @@ class Banded(Composition):
         own = self.forward.initial_state(first, initial)
         return np.concatenate([own, self.band.initial_state(first)])
 
-    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         return self.band.wired(board, [*taken, *self.forward.wired(board, taken)])
 
     def joined(self, parts: Sequence[str]) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +28,9 @@ from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.system.compiling import bound
 from mckibben.system.showing import DrawsItself
+
+if TYPE_CHECKING:
+    from mckibben.blocks.compose import Layout
 
 Run = Callable[[], None]
 Start = Callable[..., None]
@@ -59,28 +62,6 @@ class Cost:
         """Return the cost of one pass: about two operations a number, four a state."""
         operations = 2 * numbers.size + 4 * n_states
         return cls(operations, operations)
-
-
-class Board(Protocol):
-    """Where blocks are laid out as calls in order, on signals that it names as it likes.
-
-    Attributes
-    ----------
-    from_rest : bool
-        Whether blocks are started by what those before them give at rest, as in C, where these cannot
-        be run before the start.
-    """
-
-    from_rest: bool
-
-    def call(self, block: Block, taken: Sequence[Any]) -> list[Any]:
-        """Run a block on signals, and return those that it gives."""
-
-    def add(self, terms: Sequence[Any]) -> Any:
-        """Return the sum of signals."""
-
-    def resume(self, state: Sequence[float]) -> None:
-        """Start the blocks called last from a state of them all."""
 
 
 class Block(DrawsItself, Parametrised):
@@ -312,7 +293,7 @@ class Block(DrawsItself, Parametrised):
         for name in self.increasing:
             yield name, getattr(self, name)
 
-    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         """Lay the block out on a board, run on signals, and return those that it gives."""
         return board.call(self, taken)
 

@@ -19,7 +19,7 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block, Board, Run, explicit_state
+from mckibben.blocks.base import Block, Run, explicit_state
 from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.linear import LinearSystem
 from mckibben.blocks.saving import nested
@@ -52,7 +52,8 @@ class Layout:
     block : Block
         What is laid out.
     from_rest : bool
-        As of `Board`.
+        Whether blocks are started by what those before them give at rest, as in C, where these cannot
+        be run before the start.
     """
 
     def __init__(self, block: Block, *, from_rest: bool = False) -> None:
@@ -71,7 +72,9 @@ class Layout:
         return self._append(block, taken, len(block.outputs))
 
     def add(self, terms: Sequence[int]) -> int:
-        """Append a sum of signals, and return the signal that it gives."""
+        """Append a sum, unless it is of one signal, and return the signal that it gives."""
+        if len(terms) == 1:
+            return terms[0]
         return self._append(None, terms, 1)[0]
 
     def resume(self, state: Sequence[float]) -> None:
@@ -87,7 +90,7 @@ class Layout:
 
     def initial_state(self, first: Array, initial: Initial | None) -> Array:
         """Return the states of all blocks, each started from the first sample that reaches it."""
-        signals = np.empty(self.n_signals)
+        signals = np.zeros(self.n_signals)
         signals[: self.n_inputs] = first
         passed_on: set[int] = set()
         for step in reversed(self.steps):
@@ -273,7 +276,7 @@ class Series(Composition):
     def outputs(self) -> tuple[Channel, ...]:
         return self.parts[-1].outputs
 
-    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         by_name = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
         signals = list(taken)
         for number, part in enumerate(self.parts):
@@ -365,7 +368,7 @@ class Parallel(Composition):
         taken = [names.index(channel.name) for channel in part.inputs]
         return taken, [given.index(channel.name) for channel in part.outputs]
 
-    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         terms: list[list[Any]] = [[] for _ in self.outputs]
         for part in self.parts:
             own, places = self._places(part)
@@ -424,7 +427,7 @@ class PerChannel(Composition):
     def outputs(self) -> tuple[Channel, ...]:
         return tuple(part.outputs[0] for part in self.parts)
 
-    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         pairs = zip(self.parts, taken, strict=True)
         return [part.wired(board, [signal])[0] for part, signal in pairs]
 

@@ -20,8 +20,8 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Block, Board, Ports, Start, needs_sample_time
-from mckibben.blocks.compose import Composition
+from mckibben.blocks.base import SEVERAL, Block, Ports, Start, needs_sample_time
+from mckibben.blocks.compose import Composition, Layout
 from mckibben.blocks.fields import STRICT, Channel, Channels, Vector
 from mckibben.blocks.kernels import Step, accumulate, kernel, step
 from mckibben.blocks.notation import Notation
@@ -262,7 +262,7 @@ class FeedforwardFeedback(Composition):
         """All inputs but the references."""
         return tuple(channel.name for channel in self.inputs[len(self.feedback.driven) :])
 
-    def wired(self, board: Board, taken: Sequence[Any]) -> list[Any]:
+    def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
         own = [self.inputs.index(channel) for channel in self.compensator.inputs]
         bases = self.compensator.wired(board, [taken[place] for place in own])
         return self.feedback.wired(board, [*taken[: 2 * len(self.feedback.driven)], *bases])

@@ -10,7 +10,6 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.dynamics.repeating import Repeating
 from mckibben.blocks.dynamics.starts import fitted_places, fitted_state
 from mckibben.comparison.splits import Mask, predecessor
 from mckibben.errors import ModelError, ModelWarning
@@ -98,7 +97,7 @@ def refuse_runaway(block: Block, recording: Recording, modelled: Array, measured
 
 def _repeated(block: Block, recording: Recording, outputs: Sequence[str]) -> Array:
     """Return the response to a period that comes again and again: at least the second."""
-    if isinstance(block, Repeating):
+    if hasattr(block, "steady_state"):
         return block.steady_state(recording).matrix(outputs)
     names = [channel.name for channel in block.inputs]
     twice = np.tile(recording.matrix(names), (2, 1))

@@ -27,7 +27,6 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Cost, Ports, Start, needs_sample_time
-from mckibben.blocks.coupled.balance_equations import balance_of_forces
 from mckibben.blocks.coupled.balance_fields import check_fields, number_name, tell_clipped
 from mckibben.blocks.coupled.balance_law import (
     NEARLY,
@@ -223,7 +222,27 @@ class Balance(Invertible):
 
     def equations(self) -> tuple[str, ...]:
         """Return the balance of forces, without what this one lacks; then area and elasticity."""
-        return balance_of_forces(self)
+        springs = r"S_{k0} + \sum_j S_{kj} y_j"
+        if len(self.scheduled) > self.n_loads:
+            springs = r"\sum_q x^q \left(S_{kq0} + \sum_j S_{kqj} y_j\right)"
+        terms = {
+            r"\sum_l C_{kl} F_l": any(map(any, self.loads)),
+            springs: True,
+            "E_k(y_k)": True,
+            r"\sum_m h_{km} s_{km}": any(map(any, self.friction)),
+            r"\sum_l \kappa_{kl} q_{kl}": any(map(any, self.relaxation)),
+            r"d_k \dot{y}_k": any(self.damping),
+            r"l_k \left(\frac{A_k}{a_{k0}}\right)^2 \dot{y}_k": any(self.lines),
+            r"m_k \ddot{y}_k": any(self.mass),
+        }
+        memory = {
+            r"s_{km} \text{ follows } y_k + w_k p_k \text{ up to } \pm r_m (p_k + p_0)": self.limits,
+            r"\dot{q}_{kl} = \dot{y}_k - q_{kl} / \tau_l": self.lags,
+        }
+        remembered = r",\quad ".join(line for line, numbers in memory.items() if numbers)
+        forces = " + ".join(term for term, there in terms.items() if there)
+        lines = (f"p_k A_k(y_k) = {forces}", *self.notation.equations, remembered)
+        return tuple(line for line in lines if line)
 
     @property
     def n_loads(self) -> int:

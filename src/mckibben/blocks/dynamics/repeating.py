@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, Literal, Protocol, runtime_checkable
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -21,14 +21,6 @@ PERIODS, REPEATS = 100, 1e-9
 
 BETWEEN = 2
 """Samples put into a substep where the input is band-limited: straight lines join them."""
-
-
-@runtime_checkable
-class Repeating(Protocol):
-    """What has a response to inputs that repeat."""
-
-    def steady_state(self, recording: Recording) -> Recording:
-        """Return the response to a recording that repeats for ever; see `steady_state`."""
 
 
 def steady_state(block: Any, recording: Recording) -> Recording:

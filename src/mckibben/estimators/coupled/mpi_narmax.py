@@ -38,7 +38,7 @@ from mckibben.recording import Recording
 UNLOADED = 0.05
 """A run is without load where its largest stays below this share of the largest of all runs."""
 
-SWARM = Swarm(20, 30, (0.9, 0.4), 2.0, 2.0, fastest=0.5, stops=False)
+SWARM = Swarm(20, 30, (0.9, 0.4), 2.0, 2.0, fastest=0.5)
 """Both attractions and the inertia are the paper's, which does not print the size."""
 
 ROUNDS = 8

@@ -30,9 +30,6 @@ class Swarm:
     fastest: float = 0.2
     """How far a particle moves at a time, at most, relative to the bounds."""
 
-    stops: bool = True
-    """Whether a particle at a bound loses the speed that took it there."""
-
     @property
     def budget(self) -> int:
         """Evaluations: of all particles before the first move, and after every one."""
@@ -46,7 +43,7 @@ def particle_swarm(
     swarm: Swarm,
     tracker: Tracker,
     seed: int | np.random.Generator,
-    start: Array | None = None,
+    start: Array,
 ) -> Array:
     """Return the best point of a particle swarm within bounds, which may be infinite.
 
@@ -58,18 +55,14 @@ def particle_swarm(
     ----------
     costs : callable
         Maps points, shape (particles, m), to their costs, shape (particles,), all at once.
-    start : array, shape (particles, m), optional
-        Where the particles are at rest at first; default anywhere within the bounds, moving.
+    start : array, shape (particles, m)
+        Where the particles are at rest at first.
     """
     rng = np.random.default_rng(seed)
     tracker.budget = swarm.budget
     shape = (swarm.particles, lower.size)
     span = upper - lower
-    if start is None:
-        position = rng.uniform(lower, upper, shape)
-        velocity = rng.uniform(-1, 1, shape) * 0.1 * span
-    else:
-        position, velocity = start, np.zeros(shape)
+    position, velocity = start, np.zeros(shape)
     own, own_cost = position.copy(), np.full(swarm.particles, np.inf)
     first, last = swarm.inertia
     with tracker.searching():
@@ -88,9 +81,6 @@ def particle_swarm(
                 + swarm.c2 * pulls[1] * (leader - position)
             )
             velocity = np.clip(velocity, -swarm.fastest * span, swarm.fastest * span)
-            position = position + velocity
-            if swarm.stops:
-                velocity[(position < lower) | (position > upper)] = 0.0
-            position = np.clip(position, lower, upper)
+            position = np.clip(position + velocity, lower, upper)
     assert tracker.best is not None
     return tracker.best

@@ -16,7 +16,7 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
-from mckibben.estimators.hysteresis.pi import Spacing, spread
+from mckibben.estimators.hysteresis.pi import spread
 
 CUBIC = PolynomialMap(3)
 
@@ -32,8 +32,6 @@ class EUPIEstimator(SeparableEstimator):
     ----------
     n_operators : int
         Unparallel play operators.
-    spacing : {"even", "dense"}
-        How thresholds spread over half the input range.
     """
 
     title = "Extended unparallel Prandtl–Ishlinskii model (EUPI)"
@@ -45,7 +43,6 @@ class EUPIEstimator(SeparableEstimator):
     effort: ClassVar[float] = 0.3
 
     n_operators: Operators = 10
-    spacing: Spacing = "even"
     n_starts: Annotated[int, Ge(1)] = 16
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
@@ -60,7 +57,7 @@ class EUPIEstimator(SeparableEstimator):
         """Return the pieces of the cubic, then the operators, over the run's history."""
         low, high = data.input_range
         x = np.ascontiguousarray(run.history - low)
-        radii = spread(self.n_operators, data.input_range, self.spacing)
+        radii = spread(self.n_operators, data.input_range)
         operators = np.empty((x.size, radii.size))
         state = started(radii, x[0], x[0], self.starting_rule)
         eupi_matrix(x, theta[0], theta[1], radii, state, operators)
@@ -76,7 +73,7 @@ class EUPIEstimator(SeparableEstimator):
         slope, ratio = theta.tolist()
         a, b, c = (CUBIC.powers(linear[:3])[1:] / (high - low) ** np.arange(1, 4)).tolist()
         return EUPI(
-            vector(spread(self.n_operators, data.input_range, self.spacing)),
+            vector(spread(self.n_operators, data.input_range)),
             vector(linear[3:]),
             slope,
             ratio,

@@ -18,7 +18,7 @@ from mckibben.blocks.hysteresis.play_operators import play_matrix, started
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Grid
 from mckibben.estimators.core.separable import SeparableEstimator
-from mckibben.estimators.hysteresis.pi import Spacing, spread
+from mckibben.estimators.hysteresis.pi import spread
 
 Shape = tuple[Array, Array, list[Array], Callable[[Array], list[Envelope]]]
 """Lower and upper bounds of shape parameters, guesses, and the envelopes, rising then falling."""
@@ -101,8 +101,6 @@ class GPIEstimator(SeparableEstimator):
         Thresholds spread over half the envelopes' range; or r_i = (i/N) p_max as in "Modeling and
         Compensation of Stiffness-Dependent Hysteresis Coupling Behavior ...", Eq. (7), where those
         beyond half the envelopes' range never move.
-    spacing : {"even", "dense"}
-        How thresholds spread under the first rule.
     """
 
     title = "Generalised Prandtl–Ishlinskii model (GPI)"
@@ -122,7 +120,6 @@ class GPIEstimator(SeparableEstimator):
     envelope: Literal["tanh", "piecewise-linear", "exponential"] = "tanh"
     n_knots: Annotated[int, Interval(ge=3, le=100)] = 6
     threshold_rule: Literal["envelope", "paper"] = "envelope"
-    spacing: Spacing = "even"
 
     @property
     def solves_offset(self) -> bool:
@@ -167,9 +164,7 @@ class GPIEstimator(SeparableEstimator):
         low, high = data.input_range
         if self.threshold_rule == "paper" and self.n_operators > 0:
             return np.arange(self.n_operators + 1) / self.n_operators * high
-        return spread(
-            self.n_operators + 1, (float(rising(low)), float(falling(high))), self.spacing
-        )
+        return spread(self.n_operators + 1, (float(rising(low)), float(falling(high))))
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the generalised play operators over the run's history, shape (n, N + 1)."""

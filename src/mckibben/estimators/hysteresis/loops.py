@@ -23,7 +23,7 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.output_maps import PolynomialMap
-from mckibben.estimators.hysteresis.pi import Spacing, spread
+from mckibben.estimators.hysteresis.pi import spread
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 
@@ -205,8 +205,6 @@ class MaxwellSlipEstimator(SeparableEstimator):
         Of the reversible polynomial.
     n_operators : int
         Springs.
-    spacing : {"even", "dense"}
-        How the deflections at which they slip spread over half the input range.
     asymmetric : bool
         Whether rising and falling differ in stiffness and in slip, by ratios that are searched.
     """
@@ -217,7 +215,6 @@ class MaxwellSlipEstimator(SeparableEstimator):
 
     degree: Degree = 5
     n_operators: Operators = 8
-    spacing: Spacing = "even"
     asymmetric: bool = False
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
@@ -244,7 +241,7 @@ class MaxwellSlipEstimator(SeparableEstimator):
         n, (low, high) = self.n_operators, data.input_range
         kappa, ratio = np.exp(theta) if theta.size else (1.0, 1.0)
         return MaxwellSlip(
-            vector(spread(n + 1, (low, high), self.spacing)[1:]),
+            vector(spread(n + 1, (low, high))[1:]),
             (0.0,) * n,
             (0.0,),
             float(kappa),

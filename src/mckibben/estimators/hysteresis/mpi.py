@@ -16,8 +16,8 @@ from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.estimator import Operators
 from mckibben.estimators.core.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
-from mckibben.estimators.hysteresis.output_maps import OutputMap, output_map
-from mckibben.estimators.hysteresis.pi import Spacing, play_operators, spread
+from mckibben.estimators.hysteresis.output_maps import MAPS, OutputMap
+from mckibben.estimators.hysteresis.pi import play_operators, spread
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
@@ -40,8 +40,6 @@ class MPIEstimator(SeparableEstimator):
     ----------
     n_operators : int
         Play operators, the one without dead zone included.
-    spacing : {"even", "dense"}
-        How thresholds spread over half the input range.
     output_map : {"piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"}
         Map behind the operators. The first two increase, and so have an inverse, whatever the data;
         the last two are the papers' and may not.
@@ -72,7 +70,6 @@ class MPIEstimator(SeparableEstimator):
     effort: ClassVar[float] = 0.2
 
     n_operators: Operators = 10
-    spacing: Spacing = "even"
     output_map: Literal["piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"] = (
         "polynomial"
     )
@@ -116,11 +113,11 @@ class MPIEstimator(SeparableEstimator):
     @property
     def map(self) -> OutputMap:
         """The family of maps."""
-        return output_map(self.output_map, self.map_size)
+        return MAPS[self.output_map](self.map_size)
 
     def radii(self, data: TrainingData) -> Array:
         """Return the thresholds, shape (n_operators,)."""
-        return spread(self.n_operators, data.input_range, self.spacing)
+        return spread(self.n_operators, data.input_range)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the relative weights, then of those by rate relative to the fastest."""
@@ -174,7 +171,7 @@ class MPIEstimator(SeparableEstimator):
 
     def _operators(self, data: TrainingData) -> Array:
         rate = (self.rate_dependent, self.rate_time_constant)
-        key = ("operators", self.n_operators, self.spacing, self.initial, *rate)
+        key = ("operators", self.n_operators, self.initial, *rate)
         return data.once(key, lambda: counting(data, lambda run: self.operators(run, data)))
 
     def _pieces(self, theta: Array, operators: Array, data: TrainingData) -> Array:

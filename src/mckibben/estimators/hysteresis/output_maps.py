@@ -7,7 +7,8 @@ inverse.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.memoryless import PiecewiseLinear, Polynomial
-from mckibben.errors import ModelError
 
 
 class OutputMap(ABC):
@@ -144,17 +144,9 @@ class FreePolynomialMap(OutputMap):
         return Polynomial(vector(polynomial), middle, half, (low, high), channel, channel)
 
 
-MAPS = ("piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial")
-
-
-def output_map(name: str, size: int) -> OutputMap:
-    """Return a family of maps by name."""
-    if name == "piecewise-linear":
-        return PiecewiseLinearMap(size)
-    if name == "polynomial":
-        return PolynomialMap(size)
-    if name == "free-polynomial":
-        return FreePolynomialMap(size)
-    if name == "odd-polynomial":
-        return FreePolynomialMap(size, odd=True)
-    raise ModelError(f"there is no output map {name!r}. Remedy: use one of {', '.join(MAPS)}.")
+MAPS: dict[str, Callable[[int], OutputMap]] = {
+    "piecewise-linear": PiecewiseLinearMap,
+    "polynomial": PolynomialMap,
+    "free-polynomial": FreePolynomialMap,
+    "odd-polynomial": partial(FreePolynomialMap, odd=True),
+}

@@ -21,10 +21,8 @@ from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.optimisers.tracker import Tracker
 
-Spacing = Literal["even", "dense"]
 
-
-def spread(n: int, ends: tuple[float, float], spacing: Spacing = "even") -> Array:
+def spread(n: int, ends: tuple[float, float]) -> Array:
     """Return ``n`` thresholds from 0 to below half of a range.
 
     An operator of threshold r only moves when the input moves by more than 2 r after a reversal, so
@@ -36,14 +34,12 @@ def spread(n: int, ends: tuple[float, float], spacing: Spacing = "even") -> Arra
         Number of thresholds, at least 1.
     ends : (float, float)
         Of the range of what the operators act on.
-    spacing : {"even", "dense"}
-        Equal steps, or steps that grow from 0, for loops that bend right after a reversal.
 
     >>> spread(4, (1.0, 9.0)).tolist()
     [0.0, 1.0, 2.0, 3.0]
     """
     share = np.arange(n) / n
-    return 0.5 * (ends[1] - ends[0]) * (share if spacing == "even" else share**1.5)
+    return 0.5 * (ends[1] - ends[0]) * share
 
 
 def play_operators(u: Array, radii: Array, rule: str) -> Array:
@@ -74,8 +70,6 @@ class PIEstimator(SeparableEstimator):
         Least squares, or the rule.
     n_operators : int
         Play operators, the one without dead zone included.
-    spacing : {"even", "dense"}
-        How thresholds spread over half the input range.
     thresholds : sequence of float, optional
         Thresholds themselves, instead.
     """
@@ -92,7 +86,6 @@ class PIEstimator(SeparableEstimator):
 
     method: Literal["ls", "slopes"] = "ls"
     n_operators: Operators = 10
-    spacing: Spacing = "even"
     thresholds: Annotated[Sequence[float], Len(1)] | None = None
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -104,7 +97,7 @@ class PIEstimator(SeparableEstimator):
         """Return the thresholds to use, shape (number of operators,)."""
         if self.thresholds is not None:
             return np.asarray(self.thresholds, dtype=np.float64)
-        return spread(self.n_operators, data.input_range, self.spacing)
+        return spread(self.n_operators, data.input_range)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the play operators over the run's history, shape (n, N)."""

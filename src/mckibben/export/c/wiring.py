@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block, Cost
+from mckibben.blocks.compose import Layout
 from mckibben.errors import DataError, ModelError
 
 
@@ -46,9 +47,8 @@ class Sum:
     output: int
 
 
-@dataclass
 class Wiring:
-    """What a model does in a step, in order.
+    """What a model does in a step, in order, as C has it.
 
     Parameters
     ----------
@@ -56,71 +56,40 @@ class Wiring:
         The model.
     sample_time : float or None
         Time between steps [s].
-    from_rest : bool
-        As of `mckibben.blocks.base.Board`.
+
+    Raises
+    ------
+    ModelError
+        If a part has no kernel of a start.
     """
 
-    block: Block
-    sample_time: float | None
-    from_rest: bool = True
-    steps: list[Call | Sum] = field(default_factory=list)
-    n_signals: int = 0
-    n_numbers: int = 0
+    def __init__(self, block: Block, sample_time: float | None) -> None:
+        layout, n = Layout(block, from_rest=True), len(block.inputs)
 
-    def __post_init__(self) -> None:
-        given = [f"in[{index}]" for index in range(len(self.block.inputs))]
-        self.outputs = self.block.wired(self, given)
+        def named(signals: Iterable[int]) -> tuple[str, ...]:
+            return tuple(f"in[{k}]" if k < n else f"signals[{k - n}]" for k in signals)
 
-    @property
-    def calls(self) -> list[Call]:
-        """The blocks that are run, in order."""
-        return [step for step in self.steps if isinstance(step, Call)]
-
-    @property
-    def cost(self) -> Cost:
-        """What a step costs."""
-        costs = (call.block.cost(self.sample_time) for call in self.calls)
-        return sum(costs, start=Cost(0, 0))
-
-    def call(self, block: Block, taken: Sequence[str]) -> list[str]:
-        """Append a block, and return the signals that it gives.
-
-        Raises
-        ------
-        ModelError
-            If it has no kernel of a start.
-        """
-        if not block.c_kernels:
-            raise ModelError(
-                f"{block.title!r} has no C. Remedy: declare a start_kernel beside its kernel, as blocks "
-                "of the package do."
-            )
-        zeros = np.zeros(len(block.inputs))
-        state = None if isinstance(block.start, str) else block.initial_state(zeros)
-        numbers, places = block.coefficients(self.sample_time), (self.n_signals, self.n_numbers)
-        self.steps.append(Call(block, numbers, state, tuple(taken), *places))
-        self.n_numbers += block.n_states + block.n_scratch
-        return self._new_signals(len(block.outputs))
-
-    def add(self, terms: Sequence[str]) -> str:
-        """Append a sum, unless it is of one signal, and return the signal that it gives."""
-        if len(terms) == 1:
-            return terms[0]
-        self.steps.append(Sum(tuple(terms), self.n_signals))
-        return self._new_signals(1)[0]
-
-    def resume(self, state: Sequence[float]) -> None:
-        """Start the blocks called last from the memory of them all."""
-        left = np.array(state, dtype=np.float64)
-        for place, step in reversed(list(enumerate(self.steps))):
-            if isinstance(step, Call) and left.size:
-                left, own = np.split(left, [left.size - step.block.n_states])
-                self.steps[place] = replace(step, state=own)
-
-    def _new_signals(self, count: int) -> list[str]:
-        first = self.n_signals
-        self.n_signals += count
-        return [f"signals[{first + index}]" for index in range(count)]
+        self.steps: list[Call | Sum] = []
+        self.outputs, self.n_signals = list(named(layout.given)), layout.n_signals - n
+        self.n_numbers, self.cost = 0, Cost(0, 0)
+        for step in layout.steps:
+            part, taken, first = step.block, named(step.taken), step.given[0] - n
+            if part is None:
+                self.steps.append(Sum(taken, first))
+                continue
+            if not part.c_kernels:
+                raise ModelError(
+                    f"{part.title!r} has no C. Remedy: declare a start_kernel beside its kernel, as "
+                    "blocks of the package do."
+                )
+            state = step.state
+            if state is None and not isinstance(part.start, str):
+                state = part.initial_state(np.zeros(len(part.inputs)))
+            numbers = part.coefficients(sample_time)
+            self.steps.append(Call(part, numbers, state, taken, first, self.n_numbers))
+            self.n_numbers += part.n_states + part.n_scratch
+            self.cost += part.cost(sample_time)
+        self.calls = [step for step in self.steps if isinstance(step, Call)]
 
 
 def state_of(block: Block, memory: ArrayLike, sample_time: float | None) -> Array:

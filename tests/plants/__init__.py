@@ -6,18 +6,12 @@ finished, and nothing else.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
-from tests.plants import antagonistic_joint, load_rig, lugre_muscle, three_muscle_arm
-from tests.plants.plant import Bench, Fact, Plant, Respond
+from tests.plants.plant import Bench, Fact, Plant, Respond, drawn
 
 __all__ = ["DEVELOP", "PLANTS", "SEALED", "Bench", "Fact", "Plant", "Respond"]
 
-PLANTS: dict[str, Callable[[int], Plant]] = {
-    "lugre_muscle": lugre_muscle.plant,
-    "load_rig": load_rig.plant,
-    "antagonistic_joint": antagonistic_joint.plant,
-    "three_muscle_arm": three_muscle_arm.plant,
-}
-DEVELOP = ("lugre_muscle", "antagonistic_joint")
-SEALED = ("load_rig", "three_muscle_arm")
+DEVELOP = ("lugre_muscle", "antagonistic_joint", "continuum_section", "soft_finger")
+SEALED = ("load_rig", "three_muscle_arm", "lifter", "pushing_rig")
+PLANTS = {name: partial(drawn, name) for name in DEVELOP + SEALED}

@@ -1,17 +1,18 @@
 """Two McKibben muscles that pull a pulley to either side, against a payload.
 
-Equations, in SI units and with the joint's angle q and the muscles' lengths L1 = L - r q and
-L2 = L + r q:
+Equations, in SI units and with the joint's angle q and the muscles' lengths L1 = L - r q and L2 = L + r
+q:
 
-- Pull of braid and bladder by virtual work, F = -p dV/dL + Vb dW/dL (Klute and Hannaford 2000):
-  threads of length b in n turns (Chou and Hannaford 1996) around a Mooney-Rivlin bladder,
-  W = C10 (I1 - 3) + C01 (I2 - 3), that keeps its volume Vb. Cables cannot push, so F >= 0.
-- Dry friction in the joint's bearing and in both braids, Coulomb's with Stribeck (Armstrong-
-  Hélouvry et al. 1994): g(v) = Fc + (Fs - Fc) exp(-(v/vs)²); it sticks truly, by the implicit step
-  of Moreau (1988).
-- J d²q/dt² = r (F1 - F2) - payload - viscous torque - friction. The payload hangs on a pulley of
-  its own, so that its torque is known and does not depend on the angle.
-  The angle can fall while one pressure rises: where the other rises faster, or the payload grows.
+- Pull of braid and bladder by virtual work, F = -p dV/dL + Vb dW/dL (Klute and Hannaford, ASME J.
+  Dynamic Systems, Measurement, and Control 122(2), 2000): threads of length b in n turns (Chou and
+  Hannaford, IEEE Trans. Robotics and Automation 12(1), 1996) around a Mooney-Rivlin bladder, W = C10
+  (I1 - 3) + C01 (I2 - 3), that keeps its volume Vb. Cables cannot push, so F >= 0.
+- Dry friction in the joint's bearing and in both braids, Coulomb's with Stribeck (Armstrong-Hélouvry et
+  al., Automatica 30(7), 1994): g(v) = Fc + (Fs - Fc) exp(-(v/vs)²); it sticks truly, by the implicit
+  step of Moreau (Nonsmooth Mechanics and Applications, 1988).
+- J d²q/dt² = r (F1 - F2) - payload - viscous torque - friction. The payload hangs on a pulley of its
+  own, so that its torque is known and does not depend on the angle. The angle can fall while one
+  pressure rises: where the other rises faster, or the payload grows.
 - Each muscle fills with one time constant from the pressure that is recorded at its valve.
 """
 
@@ -20,21 +21,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from scipy.optimize import brentq
 
-from mckibben import Recording
 from mckibben.arrays import Array
+from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Plant
+from tests.plants.plant import Bench, Fact, Record, Runs, numbered
 
 BENCH = Bench(
-    pressures=("pressure_1", "pressure_2"),
-    loads=("torque",),
-    outputs=("angle",),
-    sample_time=0.02,
-    pressure_noise=0.003,
-    output_noise=0.001,
+    numbered("pressure", 2), ("torque",), ("angle",), 0.02, high=6.0, noise=(0.003, 0.001)
 )
 SUBSTEPS = 40
 
@@ -51,7 +46,7 @@ JOINT_COULOMB, JOINT_STATIC, JOINT_STRIBECK = 0.06, 1.3, 0.25  # N m, share, rad
 INERTIA, VISCOUS = 0.008, 0.15  # kg m², N m s/rad
 
 
-@njit(cache=True)
+@deferred
 def _pull(pressure: float, length: float, rest: float, wall: float) -> float:
     """Return the pull of one muscle [N] at a gauge pressure [Pa]; below 0 it would push."""
     thread = rest / math.cos(ANGLE)
@@ -68,7 +63,7 @@ def _pull(pressure: float, length: float, rest: float, wall: float) -> float:
     return braid + wall * (C10 * d_i1 + C01 * d_i2)
 
 
-@njit(cache=True)
+@deferred
 def _dry(speed: float) -> float:
     """Return the largest torque of dry friction [N m] at a joint's speed [rad/s]."""
     dip = math.exp(-((speed * PULLEY / MUSCLE_STRIBECK) ** 2))
@@ -77,7 +72,7 @@ def _dry(speed: float) -> float:
     return muscles + JOINT_COULOMB * (1.0 + (JOINT_STATIC - 1.0) * dip)
 
 
-@njit(cache=True)
+@deferred
 def _run(commands: Array, payloads: Array, step: float, substeps: int) -> Array:
     angle = speed = 0.0
     first, second = commands[0, 0] * BAR, commands[0, 1] * BAR
@@ -104,12 +99,12 @@ def _run(commands: Array, payloads: Array, step: float, substeps: int) -> Array:
 
 def respond(pressures: Array, loads: Array) -> Array:
     """Return angles [rad], shape (n, 1), at two pressures [bar] and a payload's torque [N m]."""
-    commands, lead = motions.from_empty(pressures, BENCH.sample_time)
+    commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
     payloads = np.append(np.linspace(0.0, loads[0, 0], lead), loads[:, 0])
     return _run(commands, payloads, BENCH.sample_time, SUBSTEPS)[lead:, None]
 
 
-def _facts() -> dict[str, Fact]:
+def facts() -> dict[str, Fact]:
     middle, nudge = 3.0 * BAR, 1e-5
     pairs = tuple(zip(LENGTHS, WALLS, strict=True))
 
@@ -137,18 +132,16 @@ def _facts() -> dict[str, Fact]:
         "friction_grows_with_pressure": False,
         "static_stiffness": (both, both),
         "joint_stiffness": 1e3 * both * PULLEY**2,
+        "loop_width": 2 * whole / (1e3 * both * PULLEY**2),
         "relaxation_times": (),
         "dead_zone": max(opens) / BAR,
         "line_lag": FILLING,
-        "pressure_noise": BENCH.pressure_noise,
-        "output_noise": BENCH.output_noise,
         "pulley": 1e3 * PULLEY,
     }
 
 
-def plant(seed: int) -> Plant:
-    """Return the joint with its runs, each drawn anew from ``seed``."""
-    rng = np.random.default_rng(seed)
+def runs(rng: np.random.Generator, record: Record) -> Runs:
+    """Return what is recorded to fit and to check."""
     step, low, high = BENCH.sample_time, 0.8, 5.0
 
     def apart(seconds: float) -> Array:
@@ -160,33 +153,17 @@ def plant(seed: int) -> Plant:
         swing = motions.wander(rng, seconds, step, -1.4, 1.4)
         return np.column_stack([both + swing, both - swing])
 
-    def record(name: str, pressures: Array, torque: float | Array) -> Recording:
-        loads = np.broadcast_to(torque, len(pressures)).astype(np.float64)[:, None]
-        return BENCH.record(name, respond, pressures, loads, rng)
-
     nested = motions.swell(30.0, step, -1.6, 1.6, 5.0)
     changing = motions.stairs(rng, 30.0, step, -0.8, 1.6, (4.0, 8.0), 1.0)
-    return Plant(
-        name="antagonistic_joint",
-        title="Two muscles on a pulley, with a payload",
-        sources=(
-            "Klute & Hannaford 2000, ASME J. Dynamic Systems, Measurement, and Control 122(2) 386-388",
-            "Chou & Hannaford 1996, IEEE Trans. Robotics and Automation 12(1) 90-102",
-            "Armstrong-Hélouvry, Dupont & Canudas de Wit 1994, Automatica 30(7) 1083-1138",
-            "Moreau 1988, Nonsmooth Mechanics and Applications, CISM Courses 302",
-        ),
-        bench=BENCH,
-        train=(
-            record("apart, free", apart(40.0), 0.0),
-            record("apart, payload", apart(40.0), 0.8),
-            record("against, payload", against(30.0), -0.5),
-        ),
-        test={
-            "patterns": (record("nested loops", 3.0 + np.column_stack([nested, -nested]), 0.0),),
-            "other payloads": (record("against", against(30.0), 0.4),),
-            "payloads beyond training": (record("apart", apart(30.0), 1.4),),
-            "changing payload": (record("against, changing", against(30.0), changing),),
-        },
-        respond=respond,
-        facts=_facts(),
+    train = (
+        record("apart, free", apart(40.0), 0.0),
+        record("apart, payload", apart(40.0), 0.8),
+        record("against, payload", against(30.0), -0.5),
     )
+    test = {
+        "patterns": (record("nested loops", 3.0 + np.column_stack([nested, -nested]), 0.0),),
+        "other payloads": (record("against", against(30.0), 0.4),),
+        "payloads beyond training": (record("apart", apart(30.0), 1.4),),
+        "changing payload": (record("against, changing", against(30.0), changing),),
+    }
+    return train, test

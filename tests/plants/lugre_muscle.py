@@ -1,15 +1,15 @@
-"""One hanging McKibben muscle behind an air line.
+"""One hanging muscle behind an air line.
 
 Equations, in SI units and with the contraction x (the weight's rise):
 
 - Pull of the braid by virtual work, F = -p dV/dL, with threads of length b in n turns (Chou and
-  Hannaford 1996): D = sqrt(b² - L²) / (n pi). End caps hold the ends at their first diameter, so
-  that a cone of 45° leads from each cap to the cylinder.
+  Hannaford, IEEE Trans. Robotics and Automation 12(1), 1996): D = sqrt(b² - L²) / (n pi). End caps hold
+  the ends at their first diameter, so that a cone of 45° leads from each cap to the cylinder.
 - The bladder has to reach the braid first: only pressure beyond ``TOUCH`` pulls.
-- Rubber as a generalised Maxwell body, a Prony series of three relaxations (Ferry 1980):
-  F = k x + sum k_i (x - q_i), dq_i/dt = (x - q_i) / tau_i.
-- LuGre friction with Stribeck (Canudas de Wit et al. 1995): F = s0 z + s1 dz/dt + s2 v,
-  dz/dt = v - s0 |v| z / g(v), g(v) = Fc + (Fs - Fc) exp(-(v/vs)²).
+- Rubber as a generalised Maxwell body, a Prony series of three relaxations (Ferry, Viscoelastic
+  Properties of Polymers, 1980): F = k x + sum k_i (x - q_i), dq_i/dt = (x - q_i) / tau_i.
+- LuGre friction with Stribeck (Canudas de Wit et al., IEEE Trans. Automatic Control 40(3), 1995): F =
+  s0 z + s1 dz/dt + s2 v, dz/dt = v - s0 |v| z / g(v), g(v) = Fc + (Fs - Fc) exp(-(v/vs)²).
 - Air at constant temperature: d(pV)/dt = R T (mass flow); a tube with laminar flow (Hagen and
   Poiseuille) and half-way volume, then an orifice as in ISO 6358. Pressure is recorded at the
   regulator, before the tube.
@@ -20,22 +20,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from scipy.optimize import brentq
 
-from mckibben import Recording
 from mckibben.arrays import Array
+from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Plant
+from tests.plants.plant import Bench, Fact, Record, Runs, one_muscle
 
-BENCH = Bench(
-    pressures=("pressure",),
-    loads=(),
-    outputs=("displacement",),
-    sample_time=0.01,
-    pressure_noise=0.002,
-    output_noise=0.03,
-)
+BENCH = Bench(("pressure",), (), ("displacement",), 0.01, high=6.0, noise=(0.002, 0.03))
 SUBSTEPS = 40
 
 BAR, ATMOSPHERE, GRAVITY = 1e5, 1.013e5, 9.81
@@ -57,7 +49,7 @@ TUBE_RESISTANCE, TUBE_VOLUME = 2.9e8, 3.5e-6  # Pa s/m³, m³: 2 m of 1.5 mm bor
 ORIFICE, CRITICAL, LAMINAR = 2.0e-9, 0.3, 0.98  # m³/(s Pa), pressure ratios (ISO 6358)
 
 
-@njit(cache=True)
+@deferred
 def _volume_slope(length: float) -> tuple[float, float]:
     """Return the volume within the braid [m³] and its slope dV/dL [m²]."""
     wide = math.sqrt(THREAD**2 - length**2) / (TURNS * math.pi)
@@ -72,7 +64,7 @@ def _volume_slope(length: float) -> tuple[float, float]:
     return volume, 0.25 * math.pi * wide**2 - by_wide * length / (wide * (TURNS * math.pi) ** 2)
 
 
-@njit(cache=True)
+@deferred
 def _pull(pressure: float, length: float) -> float:
     """Return the pull of the braid [N] at a gauge pressure [Pa]."""
     beyond = (pressure - TOUCH) / TOUCHING
@@ -80,7 +72,7 @@ def _pull(pressure: float, length: float) -> float:
     return -acting * _volume_slope(length)[1]
 
 
-@njit(cache=True)
+@deferred
 def _orifice(here: float, there: float) -> float:
     """Return the flow times R T [Pa m³/s] from one absolute pressure [Pa] to the other."""
     high, low = max(here, there), min(here, there)
@@ -95,7 +87,7 @@ def _orifice(here: float, there: float) -> float:
     return flow if here > there else -flow
 
 
-@njit(cache=True)
+@deferred
 def _run(commands: Array, step: float, substeps: int) -> Array:
     mass = WEIGHT / GRAVITY + FITTING
     x = -WEIGHT / STOP
@@ -132,12 +124,12 @@ def _run(commands: Array, step: float, substeps: int) -> Array:
 
 def respond(pressures: Array, loads: Array) -> Array:
     """Return displacements [mm], shape (n, 1), at pressures of the regulator [bar]; no loads."""
-    commands, lead = motions.from_empty(pressures, BENCH.sample_time)
+    commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
     moved = _run(np.ascontiguousarray(commands[:, 0]), BENCH.sample_time, SUBSTEPS)
     return 1e3 * moved[lead:, None]
 
 
-def _facts() -> dict[str, Fact]:
+def facts() -> dict[str, Fact]:
     middle, nudge = 3.0 * BAR, 1e-5
 
     def net(x: float) -> float:
@@ -146,51 +138,29 @@ def _facts() -> dict[str, Fact]:
     rest = brentq(net, 0.0, 0.25 * LENGTH)
     lifting = brentq(lambda p: _pull(p, LENGTH) - WEIGHT, 0.0, 3.0 * BAR)
     volume = _volume_slope(LENGTH - rest)[0]
+    stiffness = 1e-3 * (net(rest - nudge) - net(rest + nudge)) / (2 * nudge)
     opening = _orifice(1.0, LAMINAR) / (1.0 - LAMINAR)  # m³/s per unit of pressure ratio
-    return {
-        "identical_muscles": True,
-        "friction_share": (1.0,),
-        "friction": (COULOMB,),
-        "friction_grows_with_pressure": False,
-        "static_stiffness": (1e-3 * (net(rest - nudge) - net(rest + nudge)) / (2 * nudge),),
-        "relaxation_times": TIMES,
-        "relaxing_share": sum(RELAXING) / (RUBBER + sum(RELAXING)),
-        "dead_zone": TOUCH / BAR,
-        "lifts_from": lifting / BAR,
-        "line_lag": volume * (1.0 / opening + TUBE_RESISTANCE / (middle + ATMOSPHERE)),
-        "pressure_noise": BENCH.pressure_noise,
-        "output_noise": BENCH.output_noise,
-        "weight": WEIGHT,
-    }
-
-
-def plant(seed: int) -> Plant:
-    """Return the hanging muscle with its runs, each drawn anew from ``seed``."""
-    rng = np.random.default_rng(seed)
-    step, low, high = BENCH.sample_time, 0.2, 5.5
-
-    def record(name: str, pressure: Array) -> Recording:
-        return BENCH.record(name, respond, pressure[:, None], np.empty((pressure.size, 0)), rng)
-
-    return Plant(
-        name="lugre_muscle",
-        title="One hanging muscle behind an air line",
-        sources=(
-            "Chou & Hannaford 1996, IEEE Trans. Robotics and Automation 12(1) 90-102",
-            "Canudas de Wit et al. 1995, IEEE Trans. Automatic Control 40(3) 419-425",
-            "Ferry 1980, Viscoelastic Properties of Polymers",
-            "ISO 6358, flow rates of pneumatic components",
-        ),
-        bench=BENCH,
-        train=(
-            record("wandering", motions.wander(rng, 60.0, step, low, high)),
-            record("nested loops", motions.swell(40.0, step, low, high, 5.0)),
-        ),
-        test={
-            "patterns": (record("patterns", motions.wander(rng, 40.0, step, low, high)),),
-            "holds": (record("holds", motions.stairs(rng, 40.0, step, low, high)),),
-            "fast": (record("fast", motions.chirp(20.0, step, 1.0, 4.5, (0.2, 1.5))),),
-        },
-        respond=respond,
-        facts=_facts(),
+    return one_muscle(
+        COULOMB,
+        stiffness,
+        relaxation_times=TIMES,
+        relaxing_share=sum(RELAXING) / (RUBBER + sum(RELAXING)),
+        dead_zone=TOUCH / BAR,
+        lifts_from=lifting / BAR,
+        line_lag=volume * (1.0 / opening + TUBE_RESISTANCE / (middle + ATMOSPHERE)),
     )
+
+
+def runs(rng: np.random.Generator, record: Record) -> Runs:
+    """Return what is recorded to fit and to check."""
+    step, low, high = BENCH.sample_time, 0.2, 5.5
+    train = (
+        record("wandering", motions.wander(rng, 60.0, step, low, high)),
+        record("nested loops", motions.swell(40.0, step, low, high, 5.0)),
+    )
+    test = {
+        "patterns": (record("patterns", motions.wander(rng, 40.0, step, low, high)),),
+        "holds": (record("holds", motions.stairs(rng, 40.0, step, low, high)),),
+        "fast": (record("fast", motions.waves(rng, 20.0, step, 1.0, 4.5, (0.2, 1.5))),),
+    }
+    return train, test

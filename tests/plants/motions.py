@@ -1,6 +1,12 @@
-"""Pressure patterns of virtual plants, one column; `from_empty` leads into every run."""
+"""Patterns that drive virtual plants, one column each.
+
+Those of some plants begin anywhere, and `from_empty` leads into every run; those of others begin and
+end at zero, as `framed` has it.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,9 +22,10 @@ def from_empty(pressures: Array, sample_time: float) -> tuple[Array, int]:
     return np.concatenate([lead[:, None] * pressures[0], pressures]), lead.size
 
 
-def held(value: float, like: Array) -> Array:
-    """Return one constant load through a whole run, shape (n, 1)."""
-    return np.full((len(like), 1), value)
+def framed(samples: Array, sample_time: float, seconds: float = 1.5) -> Array:
+    """Return samples that grow out of zero and go back to it."""
+    time = sample_time * np.arange(samples.size)
+    return samples * np.clip(np.minimum(time, time[-1] - time) / seconds, 0.0, 1.0)
 
 
 def wander(
@@ -39,6 +46,32 @@ def wander(
     return points[at] + (points[at + 1] - points[at]) * 0.5 * (1.0 - np.cos(np.pi * part))
 
 
+def ramps(
+    rng: np.random.Generator,
+    seconds: float,
+    sample_time: float,
+    low: float,
+    high: float,
+    speed: tuple[float, float],
+    rest: float,
+) -> Array:
+    """Go between random levels at random speeds, with rests of up to ``rest`` [s]; framed."""
+    times, levels = [0.0], [0.0]
+    while times[-1] < seconds:
+        level = float(rng.uniform(low, high))
+        arrives = times[-1] + abs(level - levels[-1]) / float(rng.uniform(*speed)) + 1e-3
+        times += [arrives, arrives + float(rng.uniform(0.0, rest)) + 1e-3]
+        levels += [level, level]
+    return framed(np.interp(_time(seconds, sample_time), times, levels), sample_time)
+
+
+def through(levels: Sequence[float], seconds: float, sample_time: float) -> Array:
+    """Go by ramps of one speed from zero through levels to zero."""
+    corners = np.array([0.0, *levels, 0.0])
+    times = np.append(0.0, np.cumsum(np.abs(np.diff(corners))))
+    return np.interp(_time(seconds, sample_time) / seconds * times[-1], times, corners)
+
+
 def stairs(
     rng: np.random.Generator,
     seconds: float,
@@ -56,6 +89,24 @@ def stairs(
     return np.interp(_time(seconds, sample_time), np.append(0.0, times), np.repeat(levels, 2)[:-1])
 
 
+def waves(
+    rng: np.random.Generator,
+    seconds: float,
+    sample_time: float,
+    low: float,
+    high: float,
+    band: tuple[float, float],
+) -> Array:
+    """Sum seven sines of random phases in a band of frequencies [Hz], scaled to a range; framed."""
+    time = _time(seconds, sample_time)
+    frequencies = np.geomspace(*band, 7) * rng.uniform(0.93, 1.07, 7)
+    phases = rng.uniform(0.0, 2.0 * np.pi, 7)
+    # slower sines are larger, as in most motions
+    sines = np.sin(2.0 * np.pi * frequencies * time[:, None] + phases) / np.sqrt(frequencies)
+    wave = sines.sum(axis=1)
+    return framed(low + (high - low) * (wave - wave.min()) / np.ptp(wave), sample_time)
+
+
 def swell(
     seconds: float,
     sample_time: float,
@@ -70,15 +121,6 @@ def swell(
     size = np.interp(time, [0.0, seconds], sizes)
     swing = size * np.sin(2 * np.pi * time / period + phase)
     return 0.5 * (low + high) + 0.5 * (high - low) * swing
-
-
-def chirp(
-    seconds: float, sample_time: float, low: float, high: float, rates: tuple[float, float]
-) -> Array:
-    """Swing over a range, ever faster: ``rates`` [Hz] at begin and end."""
-    time = _time(seconds, sample_time)
-    turns = rates[0] * time + 0.5 * (rates[1] - rates[0]) * time**2 / seconds
-    return 0.5 * (low + high) - 0.5 * (high - low) * np.cos(2 * np.pi * turns)
 
 
 def _time(seconds: float, sample_time: float) -> Array:

@@ -2,14 +2,16 @@
 
 Equations, in SI units and with the section's mean contraction c and the tilts A and B of its tip:
 
-- The section bends as one arc (Webster and Jones 2010), so that muscle i, at radius d and azimuth
-  f_i, contracts by x_i = c + d (A cos f_i + B sin f_i). What couples the muscles are a backbone
-  that resists c and bending, and a weight at the tip, which hangs at (L - c) sin(T)/T, T² = A² + B².
-- Pull of each braid, F = p (3 L² - b²) / (4 pi n²) (Chou and Hannaford 1996), less its rubber:
-  an elastic part and two relaxations in parallel (generalised Maxwell body, Ferry 1980).
-- Dry friction of each braid after Dahl (1976): F = s z, dz/dt = v - s |v| z / limit. The limit grows
-  with the muscle's own pressure and, as muscles swell against each other, with the pressures of
-  both neighbours: a motion of two muscles loses more where the third is filled.
+- The section bends as one arc (Webster and Jones, Int. J. Robotics Research 29(13), 2010), so that
+  muscle i, at radius d and azimuth f_i, contracts by x_i = c + d (A cos f_i + B sin f_i). What couples
+  the muscles are a backbone that resists c and bending, and a weight at the tip, which hangs at (L - c)
+  sin(T)/T, T² = A² + B².
+- Pull of each braid, F = p (3 L² - b²) / (4 pi n²) (Chou and Hannaford, IEEE Trans. Robotics and
+  Automation 12(1), 1996), less its rubber: an elastic part and two relaxations in parallel (generalised
+  Maxwell body; Ferry, Viscoelastic Properties of Polymers, 1980).
+- Dry friction of each braid after Dahl (AIAA Journal 14(12), 1976): F = s z, dz/dt = v - s |v| z /
+  limit. The limit grows with the muscle's own pressure and, as muscles swell against each other, with
+  the pressures of both neighbours: a motion of two muscles loses more where the third is filled.
 - Each muscle fills with one time constant from the pressure that is recorded at its valve.
 """
 
@@ -18,21 +20,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from scipy.optimize import brentq
 
-from mckibben import Recording
 from mckibben.arrays import Array
+from mckibben.system.compiling import deferred
 from tests.plants import motions
-from tests.plants.plant import Bench, Fact, Plant
+from tests.plants.plant import Bench, Fact, Record, Runs, numbered
 
 BENCH = Bench(
-    pressures=("pressure_1", "pressure_2", "pressure_3"),
-    loads=(),
-    outputs=("displacement_1", "displacement_2", "displacement_3"),
-    sample_time=0.02,
-    pressure_noise=0.004,
-    output_noise=0.05,
+    numbered("pressure", 3), (), numbered("displacement", 3), 0.02, high=6.0, noise=(0.004, 0.05)
 )
 SUBSTEPS = 40
 
@@ -55,20 +51,20 @@ FRICTION, OWN, NEIGHBOUR = 4.0, 1.6 / BAR, 1.4 / BAR  # N, N/Pa, N/Pa
 BRISTLE = 1.6e4  # N/m
 
 
-@njit(cache=True)
+@deferred
 def _braid(pressure: float, x: float) -> float:
     """Return the pull of one braid [N] at a gauge pressure [Pa]."""
     return pressure * (3.0 * (LENGTH - x) ** 2 - THREAD**2) / (4.0 * math.pi * TURNS**2)
 
 
-@njit(cache=True)
+@deferred
 def _limit(pressures: Array, i: int) -> float:
     """Return the dry friction of one muscle that slides [N]."""
     neighbours = pressures[(i + 1) % 3] + pressures[(i + 2) % 3]
     return FRICTION + OWN * pressures[i] + NEIGHBOUR * neighbours
 
 
-@njit(cache=True)
+@deferred
 def _run(commands: Array, step: float, substeps: int) -> Array:
     pose, speed, force, pressures = np.zeros((4, 3))  # the first three of c, A and B
     bristles, relaxed = np.zeros(3), np.zeros((3, len(TIMES)))
@@ -111,11 +107,11 @@ def _run(commands: Array, step: float, substeps: int) -> Array:
 
 def respond(pressures: Array, loads: Array) -> Array:
     """Return contractions [mm], shape (n, 3), at three pressures [bar]; no loads."""
-    commands, lead = motions.from_empty(pressures, BENCH.sample_time)
+    commands, lead = motions.from_empty(BENCH.allowed(pressures), BENCH.sample_time)
     return 1e3 * _run(commands, BENCH.sample_time, SUBSTEPS)[lead:]
 
 
-def _facts() -> dict[str, Fact]:
+def facts() -> dict[str, Fact]:
     middle, nudge = 3.0 * BAR, 1e-5
 
     def net(x: float) -> float:
@@ -128,6 +124,7 @@ def _facts() -> dict[str, Fact]:
     hanging = TIP * GRAVITY * (LENGTH - x) / 3
     sideways = 1.5 * slope + (BENDING + hanging) / RADIUS**2
     limit = _limit(np.full(3, middle), 0)
+    stiffness = 1e-3 / (1 / lengthwise + 1 / sideways)
     return {
         "identical_muscles": True,
         "friction_share": (1 / 3, 1 / 3, 1 / 3),
@@ -135,24 +132,19 @@ def _facts() -> dict[str, Fact]:
         "friction_grows_with_pressure": True,
         "friction_per_bar": OWN * BAR,
         "friction_per_bar_of_neighbours": NEIGHBOUR * BAR,
-        "static_stiffness": (1e-3 / (1 / lengthwise + 1 / sideways),) * 3,
+        "static_stiffness": (stiffness,) * 3,
+        "loop_width": 2 * limit / stiffness,
         "muscle_stiffness": 1e-3 * slope,
         "relaxation_times": TIMES,
         "relaxing_share": sum(RELAXING) / (RUBBER + sum(RELAXING)),
         "dead_zone": 0.0,
         "line_lag": FILLING,
-        "pressure_noise": BENCH.pressure_noise,
-        "output_noise": BENCH.output_noise,
     }
 
 
-def plant(seed: int) -> Plant:
-    """Return the section with its runs, each drawn anew from ``seed``."""
-    rng = np.random.default_rng(seed)
+def runs(rng: np.random.Generator, record: Record) -> Runs:
+    """Return what is recorded to fit and to check."""
     step, low, high = BENCH.sample_time, 0.3, 5.0
-
-    def record(name: str, pressures: Array) -> Recording:
-        return BENCH.record(name, respond, pressures, np.empty((len(pressures), 0)), rng)
 
     def wander(seconds: float, strokes: tuple[float, float]) -> Array:
         drawn = [motions.wander(rng, seconds, step, low, high, strokes) for _ in range(3)]
@@ -170,25 +162,13 @@ def plant(seed: int) -> Plant:
         swing = motions.swell(20.0, step, -2.0, 2.0, 5.0, (1.0, 0.4))
         return np.column_stack([2.7 + swing, 2.7 - swing, np.full(swing.size, third)])
 
-    return Plant(
-        name="three_muscle_arm",
-        title="Three coupled muscles in parallel",
-        sources=(
-            "Webster & Jones 2010, Int. J. Robotics Research 29(13) 1661-1683",
-            "Chou & Hannaford 1996, IEEE Trans. Robotics and Automation 12(1) 90-102",
-            "Dahl 1976, AIAA Journal 14(12) 1675-1682",
-            "Ferry 1980, Viscoelastic Properties of Polymers",
-        ),
-        bench=BENCH,
-        train=(
-            record("wandering", wander(70.0, (0.8, 4.0))),
-            record("wandering slowly", wander(40.0, (2.0, 6.0))),
-        ),
-        test={
-            "patterns": (record("patterns", wander(40.0, (0.8, 4.0))),),
-            "joint motion": (record("circles", circles(40.0, 5.0)),),
-            "third held": (record("third low", pair(0.8)), record("third high", pair(4.5))),
-        },
-        respond=respond,
-        facts=_facts(),
+    train = (
+        record("wandering", wander(70.0, (0.8, 4.0))),
+        record("wandering slowly", wander(40.0, (2.0, 6.0))),
     )
+    test = {
+        "patterns": (record("patterns", wander(40.0, (0.8, 4.0))),),
+        "joint motion": (record("circles", circles(40.0, 5.0)),),
+        "third held": (record("third low", pair(0.8)), record("third high", pair(4.5))),
+    }
+    return train, test

@@ -18,6 +18,7 @@ from mckibben.estimators.core.uncertainty import (
     autoregressions,
     relative_sizes,
     sandwich,
+    vanishing,
 )
 from mckibben.recording import Recording
 from mckibben.system.threads import cores
@@ -31,9 +32,6 @@ solved; of longer recordings the beginnings are taken, as if the rest told as mu
 
 SOLVED = 10
 """Operations of a step, for every parameter, above which a model is solved rather than computed."""
-
-NOTHING = 1e-9
-"""Share of its size below which a parameter is 0."""
 
 UNFELT = 1e-6
 """Share of the most felt parameter's sensitivity below which one is not felt."""
@@ -117,7 +115,7 @@ def parameters(block: Block, sure: Sureness) -> tuple[Parameter, ...]:
     found = []
     deviations = np.sqrt(np.diag(sure.covariance))
     values = block.pack()
-    shown = np.where(np.abs(values) <= NOTHING * relative_sizes(values), 0.0, values).tolist()
+    shown = np.where(vanishing(values), 0.0, values).tolist()
     for what, value, own, said in zip(
         quantities(block), shown, deviations.tolist(), sure.said, strict=True
     ):
@@ -200,12 +198,10 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
 def fixed(block: Block) -> list[str]:
     """Return for every parameter why no fit finds it: chosen, or at a bound; empty where one does."""
     values, found = block.pack(), []
-    for name, value, size in zip(
-        block.parameter_names, values, relative_sizes(values), strict=True
-    ):
+    for name, value, none in zip(block.parameter_names, values, vanishing(values), strict=True):
         if name.endswith("input offset"):
             found.append("chosen: the point about which the model is linear")
-        elif abs(value) <= NOTHING * size:
+        elif none:
             found.append("0: at a bound, or left out")
         elif value == 1:
             found.append("exactly 1: chosen, as what others are relative to")

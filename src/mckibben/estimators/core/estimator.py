@@ -25,6 +25,7 @@ from mckibben.estimators.core.uncertainty import (
     simulate_all,
     simulate_started,
     unknown,
+    vanishing,
 )
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
 from mckibben.recording import Recording, listed
@@ -484,7 +485,7 @@ class Estimator(ABC):
 
     def at_bounds(self, block: Block) -> tuple[int, ...]:
         """Return the places of parameters that ended at a bound: by default those that are zero."""
-        return tuple(np.flatnonzero(block.pack() == 0).tolist())
+        return tuple(np.flatnonzero(vanishing(block.pack())).tolist())
 
 
 @dataclass(kw_only=True, repr=False, eq=False)

@@ -36,6 +36,9 @@ LEAST, DETERMINED = 1e-6, 0.99
 """Share of the largest singular value of sensitivities that tells anything; share of a parameter's own
 direction that must be told."""
 
+NOTHING = 1e-9
+"""Share of its size below which a parameter is 0."""
+
 MOST_TERMS = 40
 """Of an autoregression of residuals."""
 
@@ -173,6 +176,11 @@ def _pieces(series: Array) -> list[Array]:
 def relative_sizes(parameters: Array) -> Array:
     """Return the sizes by which parameters are scaled; none is counted as very small."""
     return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
+
+
+def vanishing(parameters: Array) -> Array:
+    """Return which parameters are 0 but for rounding, beside the others."""
+    return np.asarray(np.abs(parameters) <= NOTHING * relative_sizes(parameters))
 
 
 def sensitivities(

@@ -207,3 +207,5 @@ def test_clipped_samples_are_counted_as_by_the_inverse_that_does_not_learn(model
     assert block.n_clipped(state) == count
     with pytest.warns(ModelWarning, match=f"^{count} sample"):
         block.report(state)
+    resumed = block.resumed(state)
+    assert resumed.n_clipped(resumed.initial_state(silent[0])) == 0

@@ -410,7 +410,10 @@ class Adaptive(Block):
 
         Without ``memory`` of its hysteresis it keeps what is learnt alone: muscles were vented since.
         """
-        numbers = np.asarray(state, dtype=np.float64)
+        numbers = np.array(state, dtype=np.float64)
+        for part, own in self.shares(numbers) or [(self, numbers)]:
+            if part.n_clipped(own):  # in the run before, by the last number of an inverse
+                own[getattr(part, "fixed", part).n_states - 1] = 0.0
         return replace(
             self, memory=vector(numbers if memory else self._core_state(numbers)[-self.n_learnt :])
         )

@@ -54,8 +54,11 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
 
 
 def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
-    """Return the same with the states that are solved for at a start fitted to every run."""
-    if not any(map(fitted_places, blocks)):
+    """Return the same with the states that are solved for at a start fitted to every run.
+
+    Models of several outputs have no such states.
+    """
+    if len(blocks[0].outputs) > 1 or not any(map(fitted_places, blocks)):
         return simulate_all(blocks, data)
     outputs = []
     for run in data.runs:

@@ -29,7 +29,6 @@ from mckibben.estimators.coupled.balance_checks import (
     check_directions,
     moving,
     not_at_rest,
-    of_channels,
     one_speed,
     other_zeros,
     telling,
@@ -55,7 +54,7 @@ from mckibben.estimators.coupled.balance_stages import Stages, acted, acting
 from mckibben.estimators.coupled.balance_starts import simulate_started
 from mckibben.estimators.coupled.balance_structure import APART, Structure
 from mckibben.estimators.coupled.balance_words import held_back, missed, sentences
-from mckibben.estimators.coupled.base import LOADS, CoupledEstimator, schedules
+from mckibben.estimators.coupled.base import LOADS, CoupledEstimator, of_channels, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
 
@@ -211,8 +210,7 @@ class BalanceEstimator(CoupledEstimator):
         """Return the block found, and the data without what tells nothing."""
         data, notes = without_held(data)
         tracker.notes += notes
-        block = self.identify(data, tracker)
-        return block, of_channels(data, block.scheduling)
+        return super().find(data, tracker)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""

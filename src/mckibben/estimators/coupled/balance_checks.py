@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -78,14 +77,6 @@ def telling(data: TrainingData) -> tuple[TrainingData, list[str]]:
     runs = tuple(replace(run, scheduled=run.scheduled[:, kept]) for run in data.runs)
     scheduled = tuple(data.scheduled[place] for place in kept)
     return replace(data, runs=runs, scheduled=scheduled), notes
-
-
-def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
-    """Return data with some of the channels that schedule, in that order."""
-    known = [channel.name for channel in data.scheduled]
-    places = [known.index(name) for name in names]
-    runs = tuple(replace(run, scheduled=run.scheduled[:, places]) for run in data.runs)
-    return replace(data, runs=runs, scheduled=tuple(data.scheduled[place] for place in places))
 
 
 def turned(data: TrainingData, ways: list[tuple[float, float]]) -> TrainingData:

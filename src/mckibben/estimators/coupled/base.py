@@ -199,12 +199,21 @@ class CoupledEstimator(Estimator):
         return None
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found."""
-        return self.identify(data, tracker), data
+        """Return the block found, and the data without channels that it does not use."""
+        block = self.identify(data, tracker)
+        return block, of_channels(data, block.scheduling)
 
     @abstractmethod
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the block found."""
+
+
+def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
+    """Return data with some of the channels that schedule, in that order."""
+    known = [channel.name for channel in data.scheduled]
+    places = [known.index(name) for name in names]
+    runs = tuple(replace(run, scheduled=run.scheduled[:, places]) for run in data.runs)
+    return replace(data, runs=runs, scheduled=tuple(data.scheduled[place] for place in places))
 
 
 def bridged(data: TrainingData) -> TrainingData:

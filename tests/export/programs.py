@@ -471,6 +471,25 @@ def stays(a: Array) -> float:
     return a[0]
 
 
+@kernel
+def sizes_a_count(a: Array) -> float:
+    n = int(a[1])
+    n += 1
+    return abs(-n) + abs(-3 * n)
+
+
+@kernel
+def counts_from_the_end(a: Array) -> float:
+    m = a.reshape((1, a.size))
+    return m[-1, -1] + 10.0 * m[0, LAST] + 100.0 * m[-1][0]
+
+
+@kernel
+def counts_from_a_number(a: Array) -> float:
+    n = int(a[1])
+    return a[-n]
+
+
 EDGES: dict[Any, int | None] = {
     counts_down_by_name: None,
     shifts_up: 1,
@@ -498,5 +517,8 @@ EDGES: dict[Any, int | None] = {
     counts_beyond_single: 1,
     halves_a_count: 1,
     stays: 1,
+    sizes_a_count: None,
+    counts_from_the_end: None,
+    counts_from_a_number: 2,
 }
 """Kernels where Python and C part easily: None where C has Python's numbers, else the line refused."""

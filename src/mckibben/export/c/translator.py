@@ -498,9 +498,7 @@ class _Translator:
 
     def _fill(self, target: ast.expr, value: ast.expr) -> None:
         if self._is_array(value):
-            raise self.refusal(
-                value, f"a copy of {ast.unparse(value)!r}", "call `fill(to, numbers)`"
-            )
+            raise self.refusal(value, f"a copy of {ast.unparse(value)!r}", "call fill(to, numbers)")
         view, k, given = self.view(target), self._spare("k"), self.value(value).to(REAL).text
         self.function.written |= {*view.roots}
         if not isinstance(value, ast.Constant | ast.Name):  # computed once, as in Python
@@ -537,15 +535,18 @@ class _Translator:
                         high = self._at(above, base.size) if above else base.size
                         return replace(base, size=high.plus(low, -1), begin=base.begin.plus(low))
                     case ast.expr(), Value() as length if not isinstance(part, ast.Slice):
-                        begin = base.begin.plus(self._product(part, length))
+                        begin = base.begin.plus(self._at(part, base.size, length))
                         return replace(base, size=self._terms(length), begin=begin, columns=None)
         instead = "use arrays that are passed in, their rows, and parts without a step"
         raise self.refusal(node, f"{ast.unparse(node)!r} for an array", instead)
 
-    def _at(self, place: ast.expr, size: Whole) -> Whole:
-        """Return a place in an array; one below 0 is counted from the end."""
-        below = isinstance(place, ast.UnaryOp) or (self.source.number(place) or 0) < 0
-        return size.plus(self._whole(place)) if below else self._whole(place)
+    def _at(self, place: ast.expr, size: Whole, row: Value | None = None) -> Whole:
+        """Return where a number or a row is; a place below 0, written out, is counted from the end."""
+        number = self.source.number(place)
+        if number is None and isinstance(place, ast.UnaryOp):
+            raise self.refusal(place, f"a place {ast.unparse(place)!r}", "count from a.size")
+        at = self._product(place, row) if row else self._whole(place)
+        return size.plus(at) if (number or 0) < 0 else at
 
     def _whole(self, node: ast.expr) -> Whole:
         """Return a whole number as a sum."""
@@ -579,7 +580,8 @@ class _Translator:
             return base.element(self._at(at, base.size))
         if base.columns is None or len(at.elts) != 2:
             raise self.refusal(node, f"{ast.unparse(node)!r}", "use one place")
-        return base.element(self._product(at.elts[0], base.columns).plus(self._whole(at.elts[1])))
+        row = self._at(at.elts[0], base.size, base.columns)
+        return base.element(row.plus(self._at(at.elts[1], self._terms(base.columns))))
 
     def value(self, node: ast.expr) -> Value:
         """Return a number as C."""
@@ -591,10 +593,7 @@ class _Translator:
             case ast.UnaryOp(op=ast.Not()):
                 return Value(f"!{self.value(node.operand).within(UNARY)}", UNARY, BOOL)
             case ast.UnaryOp(op=ast.USub()):
-                inner = self.value(node.operand)
-                text = inner.within(UNARY)
-                text = f"({text})" if text.startswith("-") else text
-                return Value(f"-{text}", UNARY, _widest(inner.type, INT))
+                return _negative(self.value(node.operand))
             case ast.BinOp():
                 return self._arithmetic(node, self.value(node.left), self.value(node.right))
             case ast.BoolOp():
@@ -713,7 +712,7 @@ class _Translator:
         if name == "abs" and real:
             return Value(f"fabs{'f' * self.whole.single}({one.text})", ATOM, REAL)
         if name == "abs":
-            name, values = "max", [one, Value(f"-{one.within(UNARY)}", UNARY)]
+            name, values = "max", [one, _negative(one)]
         for other in values[1:]:
             if real:
                 text = f"mck_{name}({one.to(REAL).text}, {other.to(REAL).text})"
@@ -825,6 +824,13 @@ def _alone(node: ast.stmt) -> ast.expr | None:
     targets = (each for target in getattr(node, "targets", []) for each in ast.walk(target))
     places = [each for each in targets if isinstance(each, ast.Subscript)]
     return None if isinstance(node, ast.AugAssign) or len(places) > 1 else value
+
+
+def _negative(one: Value) -> Value:
+    text = one.within(UNARY)
+    return Value(
+        f"-({text})" if text.startswith("-") else f"-{text}", UNARY, _widest(one.type, INT)
+    )
 
 
 def _without_idle(text: str) -> str:

@@ -670,7 +670,7 @@ class _Translator:
             raise self.refusal(node, "this operator", "use + - * / // % and ** 2 of a name")
         one, other, kind = _alike(one, other, REAL if isinstance(node.op, ast.Div) else INT)
         if kind == REAL and isinstance(node.op, ast.FloorDiv | ast.Mod):
-            raise self.refusal(node, "// or % of real numbers", "use math.floor or math.fmod")
+            raise self.refusal(node, "// or % of real numbers", "use math.floor(x / y)")
         word = ARITHMETIC[type(node.op)]
         binds = PLUS if word in "+-" else TIMES
         return Value(f"{one.within(binds)} {word} {other.within(binds + 1)}", binds, kind)

@@ -83,6 +83,8 @@ BAD = [
     ("invert pi.json --for force -o out.json", "'pi'"),
     ("plot run.csv -o out.png --kind pie", "pie"),
     ("info", "--models"),
+    ("info gpi", "--models"),
+    ("info run.csv gpi", "--models"),
     # Bands
     ("simulate model.json run.csv -o out.csv --interval 0.9", "model.json"),
     ("simulate banded.json run.csv -o out.csv --interval 0.9", "66.7 %"),

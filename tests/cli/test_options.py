@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,6 +11,7 @@ from typing import Any
 import pytest
 import typer
 
+import mckibben
 from mckibben.cli.main import app
 from tests.cli.calls import CALLS, files
 from tests.cli.conftest import Cli
@@ -150,3 +153,9 @@ def test_raw_volts_are_calibrated(cli: Cli, tmp_path: Path) -> None:
     ):
         path.write_text("t_s,A0,x_mm\n" + 9 * rows)
         assert cli("info", path, option).code == 2
+
+
+def test_the_package_runs_as_a_module() -> None:
+    command = [sys.executable, "-m", "mckibben", "--version"]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout.strip()) == (0, mckibben.__version__)

@@ -31,6 +31,7 @@ LAYERS = (
     {"report"},
     {"app"},
     {"cli"},
+    {"__main__"},
 )
 """Lowest first."""
 

@@ -180,6 +180,12 @@ def test_identify_chooses_orders_by_cross_validation() -> None:
     assert len(choice.tried) == 2
 
 
+@pytest.mark.parametrize(("family", "named"), [("rdpi", "'n_operators'"), ("air", "to try.$")])
+def test_identify_asks_for_orders_that_the_model_has(family: str, named: str) -> None:
+    with pytest.raises(ModelError, match=f"'{family}'.*{named}"):
+        identify(recorded(0, 300), family)
+
+
 def test_affine_match_by_both_rules() -> None:
     recording = recorded(10, 400, noise=0.0)
     model = TransferFunction((0.5, 0.3), F, STEP)

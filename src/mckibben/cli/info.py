@@ -42,11 +42,24 @@ def info(
         raise DataError("there is nothing to tell about", remedy="give a file, or --models")
     elif len(files) == 1 and files[0].suffix.lower() == ".json" and not _is_columns(files[0]):
         _model(files[0], as_json)
+    elif known := _named(files):
+        raise DataError(
+            f"{known!r} is a model, and there is no file of that name",
+            remedy="say mckibben info --models for the models, or give a file",
+        )
     else:
         named = [*(inputs or ()), *(outputs or ())] or None
         recordings, columns = reading.look(files, named)
         gaps = _untold(recordings, inputs, outputs, model)
         _recordings(recordings, columns, gaps, as_json)
+
+
+def _named(files: list[Path]) -> str:
+    """Return the first that is no file, but a model's name; empty if there is none."""
+    from mckibben import registry
+
+    models = {*registry.names("estimators"), *registry.names("blocks")}
+    return next((str(file) for file in files if str(file) in models and not file.exists()), "")
 
 
 def _is_columns(file: Path) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from itertools import product
 from typing import Any
 
@@ -90,9 +90,11 @@ def identify(
     estimator_class = registry.load("estimators", family)
     grid = orders or estimator_class.param_grid
     if not grid:
+        own = _own_order(estimator_class)
+        instance = f", for instance of {own!r}" if own else ""
         raise ModelError(
-            f"there are no usual orders of {family!r}. Remedy: give orders, for instance "
-            "{'n_operators': (5, 10)}."
+            f"there are no usual orders of {family!r}. Remedy: give orders, a setting with the values "
+            f"to try{instance}."
         )
     runs = listed(recordings)
     channels = _channels(estimator_class(**settings), runs)
@@ -116,6 +118,19 @@ def identify(
         raise ModelError(f"every order of {family!r} failed: {reason}")
     fitted: Estimator = estimator_class(**settings, **chosen).fit(runs)
     return Choice(fitted, chosen, tuple(tried))
+
+
+def _own_order(estimator_class: Any) -> str:
+    """Return a setting of a model's own that counts something; empty where it has none."""
+    cls = getattr(estimator_class, "of", estimator_class)
+    bases = [base for base in cls.__mro__ if ".estimators.core." in base.__module__]
+    shared = {field.name for base in bases if is_dataclass(base) for field in fields(base)}
+    counts = [
+        field.name
+        for field in fields(cls)
+        if type(field.default) is int and field.name not in shared
+    ]
+    return next(iter(counts), "")
 
 
 def _channels(estimator: Estimator, recordings: Sequence[Recording]) -> Channels:

@@ -53,7 +53,8 @@ class SeparableEstimator(Estimator):
         Memory before the first sample of every recording: as if the input had only risen; as if nothing
         had ever happened; or fitted with the rest, one number a recording: the input from which it fell.
     nonnegative : bool
-        Whether weights must be at least 0, which guarantees an exact inverse.
+        Whether each linear parameter is held at or above what `least` returns: by default 0, the first a
+        little above it. Of most models that gives an inverse.
     n_starts : int
         Starting points tried for the non-linear parameters.
     n_refined : int

@@ -667,7 +667,11 @@ class _Translator:
         if squared and other.text == "2" and "(" not in one.text:
             return Value(f"{one.within(UNARY)} * {one.within(UNARY)}", TIMES, one.type)
         if type(node.op) not in ARITHMETIC:
-            raise self.refusal(node, "this operator", "use + - * / // % and ** 2 of a name")
+            raise self.refusal(
+                node,
+                "this operator",
+                "use + - * / // %, ** 2 of a name, and math.pow for other powers",
+            )
         one, other, kind = _alike(one, other, REAL if isinstance(node.op, ast.Div) else INT)
         if kind == REAL and isinstance(node.op, ast.FloorDiv | ast.Mod):
             raise self.refusal(node, "// or % of real numbers", "use math.floor(x / y)")

@@ -1,0 +1,6 @@
+"""The command line, as ``python -m mckibben``."""
+
+from mckibben.cli.entry import run
+
+if __name__ == "__main__":
+    run()

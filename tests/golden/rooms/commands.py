@@ -119,6 +119,7 @@ NUMBERS = 24
 """Longer lists are compared by their length and ends, those of numbers by their RMS as well."""
 
 TOLERANCES = {
+    "*n_effective": 0.005,  # no whole number
     "n_*": 0.0,
     "*/n_*": 0.0,
     "*interval*": 0.01,  # of a bootstrap, which is seeded: one of its samples more or less

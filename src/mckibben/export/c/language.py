@@ -26,7 +26,7 @@ BOOL, INT, REAL = "bool", "int", "float"
 TYPES = {BOOL: "int", INT: "int", REAL: "mck_real"}
 """What they are in C."""
 
-_FUNCTIONS = """acos acosh asin asinh atan atan2 atanh ceil copysign cos cosh exp expm1 fabs floor fmod
+_FUNCTIONS = """acos acosh asin asinh atan atan2 atanh ceil copysign cos cosh exp expm1 fabs floor
 log log10 log1p log2 pow sin sinh sqrt tan tanh trunc"""
 
 FUNCTIONS = frozenset(_FUNCTIONS.split())

@@ -667,11 +667,7 @@ class _Translator:
         if squared and other.text == "2" and "(" not in one.text:
             return Value(f"{one.within(UNARY)} * {one.within(UNARY)}", TIMES, one.type)
         if type(node.op) not in ARITHMETIC:
-            raise self.refusal(
-                node,
-                "this operator",
-                "use + - * / // %, ** 2 of a name, and math.pow for other powers",
-            )
+            raise self.refusal(node, "this operator", "use + - * / // %, ** 2 of a name, math.pow")
         one, other, kind = _alike(one, other, REAL if isinstance(node.op, ast.Div) else INT)
         if kind == REAL and isinstance(node.op, ast.FloorDiv | ast.Mod):
             raise self.refusal(node, "// or % of real numbers", "use math.floor(x / y)")
@@ -832,9 +828,8 @@ def _alone(node: ast.stmt) -> ast.expr | None:
 
 def _negative(one: Value) -> Value:
     text = one.within(UNARY)
-    return Value(
-        f"-({text})" if text.startswith("-") else f"-{text}", UNARY, _widest(one.type, INT)
-    )
+    text = f"({text})" if text.startswith("-") else text
+    return Value(f"-{text}", UNARY, _widest(one.type, INT))
 
 
 def _without_idle(text: str) -> str:

@@ -80,30 +80,6 @@ class ModelError(MckibbenError):
     """A model, or a file with one, that cannot do what was asked; the text ends with a remedy."""
 
 
-class ReachError(ModelError):
-    """A model without an inverse, as it reaches no output whatever happened before.
-
-    Attributes
-    ----------
-    kind : str
-        Of the model.
-    lowest, highest : tuple of float
-        Outputs that it reaches at worst; of some output, the lowest is not below the highest.
-    """
-
-    def __init__(self, kind: str, lowest: tuple[float, ...], highest: tuple[float, ...]) -> None:
-        self.kind, self.lowest, self.highest = kind, lowest, highest
-        super().__init__(kind, lowest, highest)
-
-    def __str__(self) -> str:
-        ends = zip(self.lowest, self.highest, strict=True)
-        listed = ", ".join(f"{low:.6g} to {high:.6g}" for low, high in ends)
-        return (
-            f"{self.kind!r} has no inverse: no output is reached whatever happened before ({listed}). "
-            "Remedy: widen its input range, or invert another model."
-        )
-
-
 class ContractError(ModelError):
     """A block or a rig that breaks a law of its contract."""
 

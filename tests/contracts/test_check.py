@@ -96,16 +96,6 @@ BROKEN: dict[str, tuple[Any, str, Make]] = {
         "initial_state",
         lambda original: lambda self, first, initial=None: original(self, first, None),
     ),
-    "inverts: an inverse that remembers what is not known": (
-        PI,
-        "inverse_remembers",
-        instead("state"),
-    ),
-    "inverts: nothing to reach": (
-        PI,
-        "reachable",
-        instead(lambda self: (np.array([2.0]), np.array([1.0]))),
-    ),
     "inverts: clipping in silence": (Inverse, "report", instead(lambda self, state: None)),
 }
 """Law and fault -> the member of a class that is replaced, and what makes the faulty one."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -17,9 +16,6 @@ from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.blocks.hysteresis.envelopes import Exponential, Tanh
 from mckibben.blocks.hysteresis.envelopes import PiecewiseLinear as Lines
-from mckibben.blocks.inverse import Invertible
-from mckibben.blocks.laws import examples
-from mckibben.errors import ReachError
 from mckibben.registry import load
 
 Make = Callable[[], object]
@@ -203,25 +199,6 @@ def test_what_is_no_model_is_refused(kind: str, fields: dict[str, Any], about: s
 def test_what_has_no_inverse_is_refused_one(what: str) -> None:
     block, about = NO_INVERSE[what]
     refused(block.inverse, about)
-
-
-@pytest.mark.parametrize(
-    "block",
-    [block for block in examples().values() if isinstance(block, Invertible)],
-    ids=lambda block: block.title,
-)
-def test_what_reaches_no_output_is_refused_an_inverse(
-    block: Invertible, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    low, high = (np.full(len(block.outputs), end) for end in (2.0, 2.0 + 1e-9))
-    monkeypatch.setattr(type(block), "reachable", lambda self: (low, high))
-    block.inverse()
-    monkeypatch.setattr(type(block), "reachable", lambda self: (low, low))
-    with pytest.raises(ReachError, match="Remedy: ") as error:
-        block.inverse()
-    copy = pickle.loads(pickle.dumps(error.value))
-    for told in (error.value, copy):
-        assert (told.kind, told.lowest, told.highest) == (block.kind, tuple(low), tuple(low))
 
 
 @pytest.mark.parametrize("what", OTHERS)

@@ -20,7 +20,7 @@ from mckibben.blocks.kernels import Step, kernel
 from mckibben.blocks.notation import lettered
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
-from mckibben.errors import ModelError, ModelWarning, ReachError
+from mckibben.errors import ModelError, ModelWarning
 from mckibben.registry import load
 
 if TYPE_CHECKING:
@@ -57,17 +57,13 @@ class Invertible(Block):
     """Whether it matters how a reference goes from one turning point to the next."""
 
     inverse_remembers: ClassVar[Literal["input", "output"] | None] = None
-    """What the inverse knows of the last sample beside this block's state, in one number behind it.
-
-    One that is solved for starts its search from "input"; of "output", `remembered` gives the first."""
+    """What the inverse knows of the last sample beside this block's state."""
 
     counts_clipped: ClassVar[bool] = True
     """Whether the last of the inverse's state counts the samples that `inverse_complaint` is about."""
 
     solved: ClassVar[bool] = False
-    """Whether the inverse is solved for by trials in every sample, having no closed form.
-
-    Then `check_invertible` demands a range and a slope, and leaderboards and costs count it so."""
+    """Whether the inverse is solved for by trials in every sample, having no closed form."""
 
     def inverse(self) -> Block:
         """Return the block that undoes this one; refused where `check_invertible` does."""
@@ -91,12 +87,6 @@ class Invertible(Block):
                 f"slope {steepness:.3g}). Remedy: identify it with nonnegative=true where it has that "
                 "setting, or invert another model."
             )
-
-    def check_reachable(self) -> None:
-        """Refuse to be undone where no output can be reached whatever happened before."""
-        low, high = self.reachable()
-        if (low >= high).any():
-            raise ReachError(self.kind, tuple(low.tolist()), tuple(high.tolist()))
 
     def least_slope(self) -> float:
         """Return a lower bound of the slope of the output by the input."""
@@ -203,7 +193,6 @@ class Inverse(Block):
 
     def __post_init__(self) -> None:
         self.forward.check_invertible()
-        self.forward.check_reachable()
 
     @property
     def title(self) -> str:

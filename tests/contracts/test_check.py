@@ -96,6 +96,11 @@ BROKEN: dict[str, tuple[Any, str, Make]] = {
         "initial_state",
         lambda original: lambda self, first, initial=None: original(self, first, None),
     ),
+    "inverts: nothing to reach": (
+        PI,
+        "reachable",
+        instead(lambda self: (np.array([2.0]), np.array([1.0]))),
+    ),
     "inverts: clipping in silence": (Inverse, "report", instead(lambda self, state: None)),
 }
 """Law and fault -> the member of a class that is replaced, and what makes the faulty one."""

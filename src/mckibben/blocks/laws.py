@@ -118,7 +118,7 @@ class Trial:
         if not holds:
             raise ContractError(
                 f"{self.block.kind!r} breaks the contract of blocks: {law}. "
-                "Remedy: mend the block; mckibben.check_block lists the laws."
+                "Remedy: mend the block; docs/templates/README.md has a table of where to look."
             )
 
     def same(self, outputs: Array, references: Array, law: str) -> None:
@@ -323,6 +323,7 @@ def _inverts(trial: Trial) -> None:
     trial.agree(again, trial.outputs, 1e-12, "the inverse of the inverse is the block")
     _tracks(trial, inverse, trial.outputs)
     low, high = block.reachable()
+    trial.demand(bool((low < high).all()), "the lowest output of reachable is below the highest")
     if np.isfinite([*low, *high]).all() and not block.undoing:
         _tracks(trial, inverse, wander(*narrowed(low, high), trial.rng, trial.pace))
         _recovers(trial, inverse, low, high)

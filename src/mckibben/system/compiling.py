@@ -61,12 +61,19 @@ class Deferred:
 
             with _lock:  # one of them, however many threads ask
                 if self._dispatcher is None:
-                    compiled = numba.njit(**self.targetoptions)(_apart(self))
-                    if compiled is not self.py_func:  # as where compiling is disabled
-                        _compile_alike(compiled)
-                        _keep(compiled, self)
-                    self._dispatcher = compiled
+                    config: Any = numba.config
+                    self._dispatcher = self.py_func if config.DISABLE_JIT else self._compiled()
         return self._dispatcher
+
+    def _compiled(self) -> Callable[..., Any]:
+        import numba
+
+        digest = made_of(self)  # once: it looks at all that is called
+        compiled = numba.njit(**self.targetoptions)(_apart(self.py_func, digest))
+        _compile_alike(compiled)
+        if folder := place():
+            compiled._cache = _Kept(folder, self.py_func.__qualname__, digest)
+        return cast("Callable[..., Any]", compiled)
 
     @property
     def _numba_type_(self) -> Any:
@@ -114,23 +121,17 @@ def deferred(function: Function, **options: Any) -> Function:
     return cast("Function", Deferred(function, _OPTIONS | options))
 
 
-def _apart(function: Deferred) -> Callable[..., Any]:
-    """Return a function named after all that it is made of, too.
+def _apart(given: Any, digest: str) -> Callable[..., Any]:
+    """Return a function named after the digest of all that it is made of, too.
 
     Numba calls compiled code by name. Two functions of one name, as those that one function makes, would
     be taken for each other where they come from files that two processes wrote.
     """
-    import numba
-
-    given: Any = function.py_func
-    config: Any = numba.config
-    if config.DISABLE_JIT:
-        return cast("Callable[..., Any]", given)
     code, known, closure = given.__code__, given.__globals__, given.__closure__
     own = FunctionType(code, known, given.__name__, given.__defaults__, closure)
     update_wrapper(own, given)
     own.__kwdefaults__ = given.__kwdefaults__
-    own.__qualname__ = f"{given.__qualname__}_{made_of(function)[:32]}"
+    own.__qualname__ = f"{given.__qualname__}_{digest[:32]}"
     return own
 
 
@@ -147,12 +148,6 @@ def _compile_alike(compiled: Any) -> None:
     compiled.get_call_template = alike
 
 
-def _keep(compiled: Any, function: Deferred) -> None:
-    """Let numba keep a function compiled in a folder of this user's alone, if there is one."""
-    if folder := place():
-        compiled._cache = _Kept(folder, function)
-
-
 class _Kept:
     """What numba compiled of a function: a file for every signature, named after all that it is made of.
 
@@ -162,19 +157,23 @@ class _Kept:
     Parameters
     ----------
     folder : Path
-    function : Deferred
+        Of this user's alone.
+    name : str
+        Of the function.
+    digest : str
+        What `made_of` gives.
     """
 
-    def __init__(self, folder: Path, function: Deferred) -> None:
+    def __init__(self, folder: Path, name: str, digest: str) -> None:
         self.cache_path = str(folder)
-        self._stem = folder / re.sub(r"[^\w.]", "", function.py_func.__qualname__)
-        self._made_of = made_of(function)
+        self._stem = folder / re.sub(r"[^\w.]", "", name)
+        self._digest = digest
 
     def _file(self, signature: Any, codegen: Any) -> Path:
         import numba
 
         versions = numba.__version__, sys.version, codegen.magic_tuple()
-        digest = sha256(repr((self._made_of, str(signature), versions)).encode()).hexdigest()
+        digest = sha256(repr((self._digest, str(signature), versions)).encode()).hexdigest()
         return self._stem.with_name(f"{self._stem.name}-{digest[:40]}.nbc")
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:

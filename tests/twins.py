@@ -967,12 +967,6 @@ class _Parallel:
     def push(self, k: int) -> float:
         return self.block.pushes[k] if self.block.pushes else math.inf
 
-    def shortened(self, k: int, y: float, p: float) -> float:
-        """Return how short a muscle is, which is less than its ends are near where it is slack."""
-        if self.resisted(k, y, p) <= self.push(k):
-            return y
-        return bisect(lambda u: self.resisted(k, u, p), self.push(k), y - 1000.0, y)
-
     def excess(self, k: int, y: list[float], x: list[float], p: float) -> float:
         """Return how much more a muscle pulls than it holds."""
         return -self.springs(k, y, x) - min(self.resisted(k, y[k], p), self.push(k))
@@ -1000,8 +994,8 @@ class _Parallel:
 
     def keep(self, y: list[float], p: list[float]) -> None:
         muscles = list(enumerate(zip(y, p, strict=True)))
-        u = [self.shortened(k, *place) for k, place in muscles]
-        self.stops = [self.moved(k, *place) for k, place in enumerate(zip(u, p, strict=True))]
+        u = y
+        self.stops = [self.moved(k, *place) for k, place in muscles]
         self.behind = [self.relaxing(k, here) for k, here in enumerate(u)]
         self.z = [
             here + wall * pressure

@@ -6,7 +6,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.coupled.balance_in import Placed, balance_in
+from mckibben.blocks.coupled.balance import Placed, balance_in
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.running import run_many
 from mckibben.control.identified import known_ranges

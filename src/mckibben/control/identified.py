@@ -9,7 +9,7 @@ import numpy as np
 from mckibben.blocks.bands import Banded, inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.coupled.balance_in import balance_in
+from mckibben.blocks.coupled.balance import balance_in
 from mckibben.errors import ModelError
 
 

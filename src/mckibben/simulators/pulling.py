@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Composition
-from mckibben.blocks.coupled.balance_in import balance_in
+from mckibben.blocks.coupled.balance import balance_in
 from mckibben.blocks.coupled.load_estimate import LoadEstimate, load_of
 from mckibben.errors import ModelError
 

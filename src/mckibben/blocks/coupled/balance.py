@@ -2,13 +2,13 @@
 
 What a muscle's pressure gives over its effective area holds its load, springs (its own and those that
 couple muscles, which stiffen with whatever schedules them), its rubber's elasticity, friction of the
-braid, relaxation, damping and inertia; what has to push harder than it can goes slack. The equation is
-that of `mckibben.blocks.coupled.balance_law`. A load enters once. Springs are symmetric, what rubs and
-relaxes is not negative, areas outweigh friction, and stiffness what areas lose, as identification sees
-to: then pressures hold muscles in one place only, which is found, and friction never makes energy.
+braid, relaxation, damping, inertia and what it meets; what has to push harder than it can goes slack. The
+equation is that of `mckibben.blocks.coupled.balance_law`. A load enters once. Springs are symmetric, what
+rubs and relaxes is not negative, areas outweigh friction, and stiffness what areas lose, as identification
+sees to: then pressures hold muscles in one place only, which is found, and friction never makes energy.
 
-This block gives pressures for displacements, explicitly: the compensator. Its inverse gives
-displacements for pressures. `mckibben.blocks.coupled.load_estimate` gives loads for both.
+This block gives pressures for coordinates, explicitly: the compensator. Its inverse gives coordinates for
+pressures. `mckibben.blocks.coupled.load_estimate` gives loads for both.
 
 The form is this package's own. Friction that breaks away after a travel follows "A Multistate Friction
 Model for the Compensation of the Asymmetric Hysteresis in the Mechanical Response of Pneumatic
@@ -18,7 +18,9 @@ Artificial Muscles"; areas and springs that couple follow what muscles in parall
 from __future__ import annotations
 
 import re
-from typing import Annotated, ClassVar, Self
+import warnings
+from itertools import pairwise
+from typing import Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -26,25 +28,28 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import SEVERAL, Cost, Ports, Start, needs_sample_time
-from mckibben.blocks.coupled.balance_fields import check_fields, number_name, tell_clipped
+from mckibben.blocks.base import SEVERAL, Block, Cost, Ports, Start, needs_sample_time
+from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance_law import (
+    AT_REST,
+    FROM_REST,
+    IN_TIME,
     NEARLY,
     NEVER,
-    begin,
-    keep,
-    press,
-    settle,
+    inverse_step,
+    solve_equilibrium,
+    start_at_rest,
     start_balance,
+    update_state,
 )
 from mckibben.blocks.coupled.balance_learning import learnable_balance
-from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
-from mckibben.blocks.inverse import Invertible
+from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.learning import Learnable
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton_cost
+from mckibben.errors import ModelError, ModelWarning
 
 
 @step
@@ -52,26 +57,25 @@ def balance_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Give pressures; the last state counts samples that muscles cannot reach."""
-    press(coefficients, state, scratch, inputs, outputs)
+    inverse_step(coefficients, state, scratch, inputs, outputs)
 
 
 @step
 def balance_inverse_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Give displacements; the last state counts samples that were not solved."""
+    """Give coordinates; the last state counts samples that were not solved."""
     c = coefficients
-    n, n_x = int(c[0]), int(c[1]) + int(c[3])
-    y, tare = scratch[:n], state[state.size - 2 - n :]
-    p, x = inputs[:n], inputs[n : n + n_x]
-    for k in range(n):
-        y[k] = state[k]
+    n, m, n_x = int(c[0]), int(c[1]), int(c[2]) + int(c[4])
+    q, p, x = scratch[:m], inputs[:n], inputs[n : n + n_x]
+    for j in range(m):
+        q[j] = state[j]
     way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
-    left = settle(c, state, way, y, x, p, scratch[2 * n :])
-    keep(c, state, way, y, p)
+    left = solve_equilibrium(c, state, way, q, x, p, scratch[m:])
+    update_state(c, state, way, q, p, x)
     state[state.size - 2] = 0.0
-    for k in range(n):
-        outputs[k] = y[k] - tare[k]
+    for j in range(m):
+        outputs[j] = q[j] - state[state.size - 2 - m + j]
     if not left < NEARLY:
         state[state.size - 1] += 1.0
 
@@ -82,29 +86,28 @@ def balance_inverse_start(
 ) -> None:
     """Start muscles at rest without pressure, or where the first pressures hold them."""
     c = coefficients
-    n, n_x = int(c[0]), int(c[1]) + int(c[3])
-    p, x = inputs[:n], inputs[n : n + n_x]
-    begin(c, state, x, scratch[:n], scratch[n:])
+    n, m, n_x = int(c[0]), int(c[1]), int(c[2]) + int(c[4])
+    p, x, q = inputs[:n], inputs[n : n + n_x], scratch[:m]
+    start_at_rest(c, state, x, q, scratch[m : m + n], scratch[m + n :])
     if virgin:
-        y = scratch[:n]
-        for k in range(n):
-            y[k] = state[k]
-        settle(c, state, AT_REST, y, x, p, scratch[2 * n :])
-        keep(c, state, AT_REST, y, p)
+        solve_equilibrium(c, state, AT_REST, q, x, p, scratch[m + n :])
+        update_state(c, state, AT_REST, q, p, x)
         state[state.size - 2] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
 class Balance(Invertible):
-    """From displacements of n muscles, and what schedules and loads them, to their pressures.
+    """From coordinates that n muscles move, and what schedules and loads them, to their pressures.
 
-    Forces are in N, or, of a model that knows no force, in bar on muscle 1's area at rest.
+    Forces are in N, or, of a model that knows no force, in bar on muscle 1's area at rest. Coordinates
+    are the displacements of the muscles, or fewer: then each shortens along its direction, and loads and
+    springs act on coordinates.
 
     Parameters
     ----------
-    springs : sequence of n sequences of float
-        A constant force [N], then springs to all displacements [N/mm], of every muscle and for
-        every power of what schedules.
+    springs : sequence of m sequences of float
+        A constant force [N], then springs to all coordinates [N/mm], of every coordinate and for every
+        power of what schedules.
     elasticity : sequence of n sequences of float
         Coefficients of (y / scale)^2 and up [N].
     areas : sequence of n sequences of float
@@ -113,37 +116,36 @@ class Balance(Invertible):
         Stiffness of the stops of every muscle [N/mm], not negative.
     relaxation : sequence of n sequences of float
         Stiffness of what relaxes, of every muscle [N/mm], not negative.
-    loads : sequence of n sequences of float
-        How much of every load pulls at a muscle, usually 1.
+    loads : sequence of m sequences of float
+        How much of every load pulls at a coordinate, usually 1.
     damping : sequence of n float
         Force by velocity [N s/mm], not negative.
-    lines : sequence of n float, optional
-        The same by the resistance of the line to what flows into a muscle: at rest, and elsewhere with
-        the square of its area. Default none.
     walls : sequence of n float
         Stretch of the wall by pressure, which friction feels at held length too [mm/bar].
-    limits : sequence of m float
-        Travel at which every stop breaks away, of pressure above that at which it holds nothing
+    limits : sequence of float
+        Travel at which every stop breaks away, of the pressure that friction is proportional to
         [mm/bar], increasing.
     grip : float
         Pressure below zero at which stops hold nothing [bar]; they break away at ``limits (p + grip)``.
     lags : sequence of float
         Time constants of what relaxes [s].
     hull : sequence of n pairs of float
-        Displacements known [mm]; beyond, elasticity and area go on straight.
+        Shortenings known [mm]; beyond, elasticity and area go on straight.
     scale : float
         Of polynomials [mm].
     degree : int
         Highest power of what schedules.
     driven, scheduled, given : sequence of Channel
-        Displacements; what schedules, then the loads; pressures.
+        Coordinates; what schedules, then the loads; pressures.
+    lines : sequence of n float, optional
+        Force by velocity of the line's resistance to what flows into a muscle, at rest; elsewhere with
+        the square of its area [N s/mm]. Default none.
     bladders : sequence of n float
-        Of every muscle that can go slack, the spring of its own [N/mm], not negative; none for muscles
-        that cannot, whose own springs are among ``springs``.
+        Spring of every muscle's own, which goes slack with it [N/mm], not negative. Default none.
     pushes : sequence of n float
-        Force at which each goes slack [N], not negative.
+        Force at which each goes slack [N], not negative. Default none does.
     tare : bool
-        Whether displacements count from where the muscles rested, without pressure, at the start.
+        Whether coordinates count from where the muscles rested, without pressure, at the start.
     settled : bool
         Whether the muscles have long been where the first sample finds them, so that nothing relaxes
         any more; else they have come there just now.
@@ -153,6 +155,20 @@ class Balance(Invertible):
         Force by acceleration [N s^2/mm], not negative; none by default.
     known : sequence of pairs of float
         Lowest and highest of all that scheduled and loaded it where it was identified, if known.
+    asymmetry : float, optional
+        Ratio of the travel at which stops break away while muscles lengthen to that while they shorten;
+        positive. Default 1.
+    grips : sequence of float
+        How much of all that schedules friction is proportional to, beside pressure; not negative [bar by
+        its unit]. Default none.
+    obstacles : sequence of m sequences of float
+        Where every coordinate meets an obstacle [mm], and its stiffness [N/mm]: a constant, and by each
+        that schedules. Default none.
+    directions : sequence of n sequences of m float
+        Shortening of every muscle by coordinates. Default the identity.
+    preload : float
+        Pressure that muscles share where they are more than coordinates [bar]; the compensator departs
+        from it as little as it can.
     """
 
     kind: ClassVar[str] = "balance"
@@ -166,6 +182,7 @@ class Balance(Invertible):
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
         *("damping", "lines", "walls", "grip", "bladders", "pushes", "mass"),
+        *("asymmetry", "grips", "obstacles"),
     )
     notation: ClassVar[Notation] = Notation(
         r"A_k(y) = \sum_i a_{ki} (y / L)^i,\quad E_k(y) = b_k y + \sum_{i \ge 2} e_{ki} "
@@ -186,6 +203,11 @@ class Balance(Invertible):
         bladders="b_k [N/mm]",
         pushes="P_k [N]",
         mass="m_k [N s^2/mm]",
+        asymmetry=r"\rho",
+        grips="g_i",
+        obstacles="o_{ki}",
+        directions="W_{ki}",
+        preload="p_s [bar]",
         driven="y_i",
         given="p_i",
     )
@@ -215,19 +237,106 @@ class Balance(Invertible):
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
     mass: Vector = ()
     known: Rows = ()
+    asymmetry: Annotated[FiniteFloat, Gt(0)] | None = None
+    grips: Vector = ()
+    obstacles: Rows = ()
+    directions: Rows = ()
+    preload: FiniteFloat = 0.0
 
     def __post_init__(self) -> None:
         self.check_channels()
-        check_fields(self)
+        self._check_sizes()
+        self._check_physics()
+
+    def _check_sizes(self) -> None:
+        """Refuse fields that do not fit one another, by their names."""
+        n, m, n_x = len(self.given), len(self.driven), self.n_schedules
+        if n_x < 0:
+            raise ModelError(
+                f"{self.kind!r} has {self.n_loads} loads, and {len(self.scheduled)} channels that "
+                "schedule or load it. Remedy: give every load a channel, behind what schedules."
+            )
+        if m > n or (m < n and not self.directions):
+            raise ModelError(
+                f"given of {self.kind!r} are {n} pressures of {m} coordinates. Remedy: give a pressure "
+                "for every coordinate, or, of more muscles, their directions."
+            )
+        widths = {
+            "springs": (m, (1 + n_x * self.degree) * (1 + m)),
+            "elasticity": (n, len(self.elasticity[0]) if self.elasticity else 0),
+            "areas": (n, max(len(self.areas[0]) if self.areas else 0, 1)),
+            "friction": (n, len(self.limits)),
+            "relaxation": (n, len(self.lags)),
+            "loads": (m, self.n_loads),
+            "hull": (n, 2),
+        }
+        if self.obstacles:
+            widths["obstacles"] = (m, 2 + n_x)
+        if self.directions:
+            widths["directions"] = (n, m)
+        if self.known:
+            widths["known"] = (len(self.scheduled), 2)
+        for name, (count, width) in widths.items():
+            table = getattr(self, name)
+            if len(table) != count or any(len(row) != width for row in table):
+                raise ModelError(
+                    f"{name} of {self.kind!r} has rows of {[len(row) for row in table]}. "
+                    f"Remedy: give {count} rows of {width}."
+                )
+        optional = ("lines", "bladders", "pushes", "mass")
+        lengths = {name: n for name in ("damping", "walls", *optional)} | {"grips": n_x}
+        for name, count in lengths.items():
+            values = getattr(self, name)
+            if len(values) != count and (values or name in ("damping", "walls")):
+                raise ModelError(
+                    f"{name} of {self.kind!r} has {len(values)} entries. Remedy: give {count}."
+                )
+
+    def _check_physics(self) -> None:
+        """Refuse numbers that would make energy, or mean nothing."""
+        if self.pressure_range is not None and not self.pressure_range[0] < self.pressure_range[1]:
+            raise ModelError(
+                f"pressure_range of {self.kind!r} is {self.pressure_range}. Remedy: the lower end first."
+            )
+        at_rest = [row[0] for row in self.areas]
+        for name, values in {
+            "limits": self.limits,
+            "lags": self.lags,
+            "areas at rest": at_rest,
+        }.items():
+            rises = name != "limits" or all(a < b for a, b in pairwise(values))
+            if any(not value > 0 for value in values) or not rises:
+                raise ModelError(
+                    f"{name} of {self.kind!r} are {values}. Remedy: give positive ones"
+                    f"{', in increasing order' if name == 'limits' else ''}."
+                )
+        stiffnesses = [row[1:] for row in self.obstacles]
+        named = {name: getattr(self, name) for name in NOT_NEGATIVE} | {"obstacles": stiffnesses}
+        for name, values in named.items():
+            if any(value < 0 for value in np.ravel(values)):
+                raise ModelError(
+                    f"{name} of {self.kind!r} has a number below 0, which would make energy. "
+                    "Remedy: give none below 0."
+                )
+        if self.mass and self.pushes:
+            raise ModelError(
+                f"{self.kind!r} has mass and muscles that go slack. Remedy: give one of mass and pushes."
+            )
+        if any(not low < high for low, high in self.hull):
+            raise ModelError(f"hull of {self.kind!r} is {self.hull}. Remedy: lower ends first.")
 
     def equations(self) -> tuple[str, ...]:
         """Return the balance of forces, without what this one lacks; then area and elasticity."""
-        springs = r"S_{k0} + \sum_j S_{kj} y_j"
-        if len(self.scheduled) > self.n_loads:
-            springs = r"\sum_q x^q \left(S_{kq0} + \sum_j S_{kqj} y_j\right)"
-        terms = {
+        schedules, y = self.n_schedules > 0, "q" if self.directions else "y"
+        springs = rf"\sum_j S_{{kj}} {y}_j"
+        if schedules:
+            springs = rf"\sum_q x^q \left(S_{{kq0}} + \sum_j S_{{kqj}} {y}_j\right)"
+        on_coordinates = {
             r"\sum_l C_{kl} F_l": any(map(any, self.loads)),
-            springs: True,
+            springs if schedules else rf"S_{{k0}} + {springs}": True,
+            rf"o_k \max({y}_k - o_{{k1}}, 0)": bool(self.obstacles),
+        }
+        of_muscles = {
             "E_k(y_k)": True,
             r"\sum_m h_{km} s_{km}": any(map(any, self.friction)),
             r"\sum_l \kappa_{kl} q_{kl}": any(map(any, self.relaxation)),
@@ -235,19 +344,38 @@ class Balance(Invertible):
             r"l_k \left(\frac{A_k}{a_{k0}}\right)^2 \dot{y}_k": any(self.lines),
             r"m_k \ddot{y}_k": any(self.mass),
         }
+        outer, inner = (
+            " + ".join(term for term, there in terms.items() if there)
+            for terms in (on_coordinates, of_muscles)
+        )
+        balance = (f"p_k A_k(y_k) = {outer} + {inner}",)
+        if self.directions:
+            pulls = (
+                rf"\sum_k W_{{kj}} \left(p_k A_k(y_k) - R_k\right) = {outer.replace('_k', '_j')}"
+            )
+            balance = (pulls, rf"R_k = {inner},\quad y_k = \sum_j W_{{kj}} q_j")
+        limit = "r_m (p_k + p_0" + (r" + \sum_i g_i x_i)" if any(self.grips) else ")")
+        ends = (
+            rf"\pm {limit}"
+            if self.asymmetry is None
+            else rf"{limit}, \text{{down to }} -\rho {limit}"
+        )
         memory = {
-            r"s_{km} \text{ follows } y_k + w_k p_k \text{ up to } \pm r_m (p_k + p_0)": self.limits,
+            rf"s_{{km}} \text{{ follows }} y_k + w_k p_k \text{{ up to }} {ends}": self.limits,
             r"\dot{q}_{kl} = \dot{y}_k - q_{kl} / \tau_l": self.lags,
         }
         remembered = r",\quad ".join(line for line, numbers in memory.items() if numbers)
-        forces = " + ".join(term for term, there in terms.items() if there)
-        lines = (f"p_k A_k(y_k) = {forces}", *self.notation.equations, remembered)
-        return tuple(line for line in lines if line)
+        return tuple(line for line in (*balance, *self.notation.equations, remembered) if line)
 
     @property
     def n_loads(self) -> int:
         """How many of the scheduling inputs are loads: the last ones."""
-        return len(self.loads[0])
+        return len(self.loads[0]) if self.loads else 0
+
+    @property
+    def n_schedules(self) -> int:
+        """How many of them schedule springs: the first ones."""
+        return len(self.scheduled) - self.n_loads
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
@@ -256,15 +384,16 @@ class Balance(Invertible):
 
     @property
     def n_states(self) -> int:
-        """Displacements, stretches, stops, lags, moves and tare of muscles; a start, samples amiss."""
-        own = 3 + len(self.limits) + len(self.lags) + (2 if self.mass else 0)
-        return len(self.driven) * own + 2
+        """Coordinates and tare; stretch, stops, lags and moves of muscles; a start, samples amiss."""
+        own = 1 + len(self.limits) + len(self.lags) + (2 if self.mass else 0)
+        return len(self.given) * own + 2 * len(self.driven) + 2
 
     @property
     def n_scratch(self) -> int:
-        """Displacements, pressures, four vectors and a matrix."""
-        n = len(self.driven)
-        return n * (n + 6)
+        """Coordinates, pressures, four vectors and a matrix, a muscle's terms, and shares of muscles."""
+        n, m, row = len(self.given), len(self.driven), (self.elasticity, self.areas)
+        terms = 4 + sum(len(table[0]) for table in row) + len(self.limits) + len(self.lags)
+        return 3 * n + 5 * m + m * m + 2 * terms
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return what `mckibben.blocks.coupled.balance_law` says.
@@ -275,32 +404,49 @@ class Balance(Invertible):
             Of a model that depends on rate, without a sample time.
         """
         step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else np.inf
+        n, m, n_x = len(self.given), len(self.driven), self.n_schedules
         low, high = self.pressure_range or (-np.inf, np.inf)
         head = [
-            *(len(self.driven), len(self.scheduled) - self.n_loads, self.degree, self.n_loads),
-            *(len(self.limits), len(self.lags), len(self.elasticity[0]), len(self.areas[0])),
-            *(self.scale, self.grip, low, high, 1.0 / step),
-            *(self.tare, not self.settled, bool(self.mass)),
+            *(n, m, n_x, self.degree, self.n_loads, len(self.limits), len(self.lags)),
+            *(len(self.elasticity[0]), len(self.areas[0]), bool(self.obstacles), self.scale),
+            *(self.grip, self.asymmetry or 1.0, low, high, 1.0 / step, self.tare, not self.settled),
+            *(bool(self.mass), self.preload, bool(self.directions)),
         ]
         lags = np.array(self.lags)
-        decays = np.exp(-step / lags)
         gains = lags / step * -np.expm1(-step / lags)
-        tables = [self.springs, self.elasticity, self.areas]
-        tables += [self.friction, self.relaxation, self.loads]
-        n = len(self.driven)
-        never, none = n * (NEVER,), n * (0.0,)
-        single = [self.walls, self.pushes or never, self.damping]
-        single += [self.lines or none, self.bladders or none, self.mass or none]
-        own = [
-            np.concatenate([self.hull[k], [t[k] for t in single], *(t[k] for t in tables)])
-            for k in range(n)
-        ]
-        return np.concatenate([head, self.limits, decays, gains, *own])
+        shared = (head, self.limits, np.exp(-step / lags), gains, self.grips or n_x * (0.0,))
+        obstacles = self.obstacles or m * ((),)
+        tables = zip(self.springs, self.loads, obstacles, strict=True)
+        none = n * (0.0,)
+        columns = (self.walls, self.pushes or n * (NEVER,))
+        dynamic = (self.damping, self.lines or none, self.mass or none, self.bladders or none)
+        own = (
+            *(
+                self.hull,
+                np.transpose(columns),
+                self.directions or np.eye(n),
+                np.transpose(dynamic),
+            ),
+            *(self.elasticity, self.areas, self.friction, self.relaxation),
+        )
+        flat = np.hstack([np.reshape(table, (n, -1)) for table in own])
+        return np.concatenate([*shared, *(np.concatenate(row) for row in tables), flat.ravel()])
 
     def report(self, state: Array) -> None:
         """Warn of references that would need pressures out of range, or muscles that push."""
+        if not state[-1] > 0:
+            return
+        low, high = self.pressure_range or (-np.inf, np.inf)
+        # what a sensor is off at rest is no end
+        low = 0.0 if abs(low) < 1e-3 * (high - low) else low
+        names = " or ".join(channel.name for channel in self.given)
         pushing = " or muscles to push harder than they can," if self.pushes else ""
-        tell_clipped(state[-1], self.given, self.pressure_range, pushing)
+        warnings.warn(
+            f"{int(state[-1])} samples need {names} beyond {low:.4g} to {high:.4g} {self.given[0].unit} "
+            f"(behind a dead zone, if there is one){pushing} and were clipped there by the compensator",
+            ModelWarning,
+            stacklevel=4,
+        )
 
     def n_clipped(self, state: Array) -> int:
         """Return how many samples needed pressures out of range."""
@@ -338,22 +484,58 @@ class Balance(Invertible):
         """Return the unit of a number: forces are in N, or, of relative areas, in the input's."""
         moved, driving = self.driven[0].unit, self.given[0].unit
         force = driving if self.areas[0][0] == 1.0 else "N"
-        if field == "springs":
-            power, place = divmod(index[-1], 1 + len(self.driven))
-            by, degree = divmod(power - 1, self.degree)
+        below = ""
+        if field in ("springs", "obstacles"):
+            width = 1 + len(self.driven)
+            power, place = divmod(index[-1], width) if field == "springs" else (0, index[-1])
+            if field == "obstacles" and place == 0:
+                return moved
             below = moved * (place > 0)
-            if power > 0:
-                below += f"{' ' if below else ''}{self.scheduled[by].unit}^{degree + 1}"
-            return f"{force}/{below.replace('^1', '')}" if below else force
+            by = (power - 1) // self.degree if field == "springs" else place - 2
+            if by >= 0:
+                degree = (power - 1) % self.degree + 1 if field == "springs" else 1
+                raised = f"{self.scheduled[by].unit}^{degree}".replace("^1", "")
+                below += f"{' ' if below else ''}{raised}"
+            return f"{force}/{below}" if below else force
         if field == "loads":
             return f"{force}/{self.scheduled[index[-1] - self.n_loads].unit}"
+        if field == "grips":
+            return f"{driving}/{self.scheduled[index[-1]].unit}"
         units = {"N": force, "mm": moved, "bar": driving}
         declared = super().unit_of(field, index) or ""
         return re.sub(r"\b(N|mm|bar)\b", lambda unit: units[unit[0]], declared)
 
     def name_of(self, field: str, index: tuple[int, ...]) -> str:
         """Return what a number is called: by its muscle, what it acts on, and what schedules it."""
-        return number_name(self, field, index)
+        if field in ("grip", "asymmetry"):
+            return field
+        on = self.driven if field in ("springs", "loads", "obstacles") else self.given
+        whose = "coordinate" if self.directions and on is self.driven else "muscle"
+        of = f" of {whose} {index[0] + 1}" if len(on) > 1 else ""
+        if field in ONE_EACH:
+            return f"{ONE_EACH[field]}{of}"
+        place = index[-1]
+        if field == "grips":
+            return f"grip by {self.scheduled[place].name}"
+        if field == "springs":
+            power, to = divmod(place, 1 + len(on))
+            name = f"{'constant force' if to == 0 else 'spring'}{of}"
+            name += f" to {whose} {to}" if to not in (0, index[0] + 1) else ""
+            if power == 0:
+                return name
+            by, degree = divmod(power - 1, self.degree)
+            return f"{name} by {self.scheduled[by].name}{f'^{degree + 1}' if degree else ''}"
+        if field == "loads":
+            return f"share{of} of {self.scheduled[place - self.n_loads].name}"
+        if field == "obstacles":
+            by = f" by {self.scheduled[place - 2].name}" if place > 1 else ""
+            return f"{'stiffness' if place else 'place'} of the obstacle{of}{by}"
+        if field in ("friction", "relaxation"):
+            return f"{'stop' if field == 'friction' else field} {place + 1}{of}"
+        if field == "areas" and place == 0:
+            return f"area{of} at rest"
+        raised = f"^{place + 2 * (field == 'elasticity')}".replace("^1", "")
+        return f"{'area' if field == 'areas' else field}{of} by displacement{raised}"
 
     @classmethod
     def example(cls) -> Self:
@@ -380,3 +562,40 @@ class Balance(Invertible):
             scheduled=(Channel("pressure_extensor", "bar"), Channel("force", "N")),
             given=tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2)),
         )
+
+
+NOT_NEGATIVE = (
+    *("friction", "relaxation", "damping", "walls", "lines", "grip", "bladders", "pushes", "mass"),
+    "grips",
+)
+"""Fields without numbers below 0."""
+
+ONE_EACH = {
+    "damping": "damping",
+    "lines": "resistance of the line",
+    "walls": "stretch of the wall",
+    "bladders": "spring of the bladder",
+    "pushes": "force of slackening",
+    "mass": "mass",
+}
+"""Fields that have one number for every muscle, in words."""
+
+
+class Placed(NamedTuple):
+    """A balance, whether the model solves it for coordinates, and what comes before and behind."""
+
+    balance: Balance
+    solved: bool
+    before: tuple[Block, ...]
+    behind: tuple[Block, ...]
+
+
+def balance_in(model: Block) -> Placed | None:
+    """Return the balance of a model, a compensator or its inverse; None if it has none."""
+    parts = model.parts if isinstance(model, Series) else (model,)
+    for place, part in enumerate(parts):
+        solved = isinstance(part, Inverse)
+        balance = part.forward if isinstance(part, Inverse) else part
+        if isinstance(balance, Balance):
+            return Placed(balance, solved, parts[:place], parts[place + 1 :])
+    return None

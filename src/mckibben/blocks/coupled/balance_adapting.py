@@ -17,14 +17,11 @@ from __future__ import annotations
 import math
 
 from mckibben.arrays import Array
-from mckibben.blocks.coupled.balance_law import press, start_balance
-from mckibben.blocks.coupled.balance_terms import (
+from mckibben.blocks.coupled.balance_law import inverse_step as press, start_balance
+from mckibben.blocks.coupled.balance_law import (
     OWN,
     area,
-    elastic,
-    muscle_width,
-    muscles,
-    sprung,
+    NEVER,
 )
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.learning import (

@@ -1,11 +1,27 @@
-"""What holds in every sample of a balance of forces, and its two solutions.
+"""Forces in balance: the terms of every muscle, and the two solutions of their equation.
 
-    loads + S_k(x) (1, y) + min(R_k, b_k) = 0
+Of coordinates q that n muscles move, with y_k = W_k q the shortening of muscle k (W is the identity where
+every coordinate has a muscle of its own), virtual work asks at every coordinate j
 
-Of muscle k: R, in `mckibben.blocks.coupled.balance_terms`, is what it resists shortening with, up to b,
-at which it buckles. Taut, it is as short as its ends are near, u = y; slack, u is where it resists with
-b. Pressures follow from displacements muscle by muscle; displacements from pressures as the minimum of a
-convex energy, by Newton's method with a search along every step.
+    sum_l C_jl F_l + S_j(x) (1, q) + K_j(x) max(q_j - o_j, 0) + sum_k W_kj min(R_k, b_k) = 0,
+
+    R = E(y) + sum_m h_m s_m + sum_l kappa_l v_l + (d + l (A / A_0)^2) y' + m y'' - p A(y),
+
+where R is what a muscle resists shortening with, up to b, at which it goes slack. R is linear in its
+coefficients, and `resistance` fills the terms that they multiply. Stops s follow the stretch y + w p of
+the wall, up to r (p + p_0 + g x) and down to that times a ratio; v, what a lag is behind, relaxes with
+its time constant; the line, which resists a flow of A y', has the area of the last sample; accelerations
+are Houbolt's differences of four samples: of second order, stable, and without echo in pressures.
+
+Pressures follow from coordinates muscle by muscle; coordinates from pressures as the minimum of a convex
+energy, by Newton's method with a search along every step.
+
+Coefficients: the head, r (m), decays and gains of the lags (l each), g (schedules); of every coordinate
+its springs (powers of what schedules by 1 + coordinates), loads, and the obstacle's place and stiffness;
+of every muscle lowest and highest shortening known, w, b, W, then the coefficients of its terms: d, l, m,
+own spring, elasticity, area, friction, relaxation. State: coordinates, stretches, stops (muscle by
+muscle), lags (the same), with mass the last two moves of each muscle, the tare of coordinates, whether
+nothing came before, samples amiss.
 """
 
 from __future__ import annotations
@@ -13,22 +29,24 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.coupled.balance_terms import (
-    AT_REST,
-    FROM_REST,
-    HEAD,
-    IN_TIME,
-    area,
-    elastic,
-    lagging,
-    muscle_width,
-    muscles,
-    resisted,
-    rubbed,
-    sprung,
-)
 from mckibben.blocks.kernels import DERIVED, kernel
 from mckibben.blocks.solving import eliminate
+
+HEAD = 21
+"""Muscles, coordinates, schedules, degree, loads, stops, lags, elastic terms, area's terms, whether there
+are obstacles, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a second,
+whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there is mass,
+pressure shared by muscles that are more than coordinates, whether they are."""
+
+OWN, DYNAMIC = 4, 4
+"""Coefficients of a muscle before its directions; terms before elasticity."""
+
+LEAST_AREA = 0.01
+"""Smallest area, relative to that at rest: a muscle that is as short as it gets pulls no more."""
+
+AT_REST, FROM_REST, IN_TIME = 0, 1, 2
+"""Ways to a sample: without friction and lags; all at once, before anything relaxes or damps; in the
+sample time."""
 
 NEVER = 1e30
 """Force at which what never goes slack would."""
@@ -48,99 +66,279 @@ HAIR = 1e-9
 SINGLE = {"BALANCED": 1e-6, "NEARLY": 1e-4, "SURE": 1e-5, "HAIR": 1e-6}
 
 
+# -- where coefficients are ----------------------------------------------------------------------
+
+
 @kernel
-def shortened(
-    c: Array, own: int, k: int, state: Array, way: int, y: float, p: float
-) -> tuple[float, bool]:
-    """Return how short muscle k is where its ends are y nearer, and whether it is slack."""
-    least = c[own + 3]
-    if least >= NEVER:
-        return y, False
-    excess, slope, _ = resisted(c, own, k, state, way, y, p)
-    excess -= least
-    if not excess > 0.0:
-        return y, False
-    low, high, u = -NEVER, y, y
-    reach = 1e-3 * c[8]
-    for _ in range(MOST_STEPS):
-        guess = u - excess / slope if slope > 0.0 else -NEVER
-        if not low < guess < high:
-            guess = high - reach if low == -NEVER else 0.5 * (low + high)
-            reach *= 2.0
-        u = guess
-        force, slope, size = resisted(c, own, k, state, way, u, p)
-        excess = force - least
-        if abs(excess) <= BALANCED * (size + least):
-            break
-        if excess > 0.0:
-            high = u
+def coordinate_at(c: Array, j: int) -> int:
+    """Return the place of the first coefficient of a coordinate."""
+    springs = (1 + int(c[2]) * int(c[3])) * (1 + int(c[1]))
+    width = springs + int(c[4]) + int(c[9]) * (2 + int(c[2]))
+    return HEAD + int(c[5]) + 2 * int(c[6]) + int(c[2]) + j * width
+
+
+@kernel
+def n_terms(c: Array) -> int:
+    """Return how many terms the resistance of a muscle has."""
+    return DYNAMIC + int(c[7]) + int(c[8]) + int(c[5]) + int(c[6])
+
+
+@kernel
+def muscle_at(c: Array, k: int) -> int:
+    """Return the place of the first coefficient of a muscle."""
+    return coordinate_at(c, int(c[1])) + k * (OWN + int(c[1]) + n_terms(c))
+
+
+@kernel
+def terms_at(c: Array, k: int) -> int:
+    """Return the place of the first coefficient of a muscle's terms."""
+    return muscle_at(c, k) + OWN + int(c[1])
+
+
+@kernel
+def work_size(c: Array) -> int:
+    """Return how many numbers `solve_equilibrium` computes in."""
+    m = int(c[1])
+    return 4 * m + m * m + 2 * n_terms(c)
+
+
+# -- forces --------------------------------------------------------------------------------------
+
+
+@kernel
+def shortening(c: Array, k: int, q: Array) -> float:
+    """Return how much shorter muscle k is at coordinates."""
+    if c[20] == 0.0:
+        return q[k]
+    own = muscle_at(c, k) + OWN
+    total = 0.0
+    for j in range(int(c[1])):
+        total += c[own + j] * q[j]
+    return total
+
+
+@kernel
+def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> float:
+    """Return the force of loads, springs and obstacle on coordinate j, and fill its gradient."""
+    m, n_x, degree, n_loads = int(c[1]), int(c[2]), int(c[3]), int(c[4])
+    place = coordinate_at(c, j)
+    force = c[place]
+    for i in range(m):
+        gradient[i] = c[place + 1 + i]
+        force += gradient[i] * q[i]
+    for s in range(n_x):
+        power = 1.0
+        for _ in range(degree):
+            power *= x[s]
+            place += 1 + m
+            force += power * c[place]
+            for i in range(m):
+                spring = power * c[place + 1 + i]
+                force += spring * q[i]
+                gradient[i] += spring
+    place += 1 + m
+    for i in range(n_loads):
+        force += c[place + i] * x[n_x + i]
+    place += n_loads
+    if c[9] != 0.0 and q[j] > c[place]:
+        stiffness = c[place + 1]
+        for s in range(n_x):
+            stiffness += c[place + 2 + s] * x[s]
+        force += stiffness * (q[j] - c[place])
+        gradient[j] += stiffness
+    return force
+
+
+@kernel
+def area(c: Array, k: int, y: float) -> tuple[float, float]:
+    """Return a muscle's effective area, and its slope; beyond what is known it goes on straight."""
+    own, place = muscle_at(c, k), terms_at(c, k) + DYNAMIC + int(c[7])
+    inside = min(max(y, c[own]), c[own + 1])
+    u = inside / c[10]
+    value, slope = 0.0, 0.0
+    for i in range(int(c[8]) - 1, -1, -1):
+        slope = slope * u + value
+        value = value * u + c[place + i]
+    slope /= c[10]
+    value += slope * (y - inside)
+    least = LEAST_AREA * c[place]
+    if value > least:
+        return value, slope
+    return least, 0.0
+
+
+@kernel
+def friction_pressure(c: Array, p: float, x: Array) -> float:
+    """Return the pressure that the limits of friction are proportional to."""
+    total = p + c[11]
+    place = HEAD + int(c[5]) + 2 * int(c[6])
+    for s in range(int(c[2])):
+        total += c[place + s] * x[s]
+    return max(total, 0.0)
+
+
+@kernel
+def friction(
+    c: Array,
+    k: int,
+    state: Array,
+    way: int,
+    y: float,
+    p: float,
+    x: Array,
+    terms: Array,
+    slopes: Array,
+) -> tuple[float, float]:
+    """Fill the stops of muscle k, and their slopes by y; return their force, and its slope by p."""
+    n, m, n_s = int(c[0]), int(c[1]), int(c[5])
+    first = n_terms(c) - int(c[6]) - n_s
+    place = terms_at(c, k) + first
+    wall, grown = c[muscle_at(c, k) + 2], friction_pressure(c, p, x)
+    moved = y + wall * p - state[m + k]
+    force, by_p = 0.0, 0.0
+    for i in range(n_s):
+        terms[first + i] = 0.0
+        slopes[first + i] = 0.0
+        if way == AT_REST:
+            continue
+        upper = c[HEAD + i] * grown
+        s = state[m + n + k * n_s + i] + moved
+        h = c[place + i]
+        if s > upper:
+            s = upper
+            by_p += h * c[HEAD + i]
+        elif s < -c[12] * upper:
+            s = -c[12] * upper
+            by_p -= h * c[12] * c[HEAD + i]
         else:
-            low = u
-    if DERIVED:
-        u -= excess / slope
-    return u, True
+            slopes[first + i] = 1.0
+            by_p += h * wall
+        terms[first + i] = s
+        force += h * s
+    return force, by_p
 
 
 @kernel
-def keep(c: Array, state: Array, way: int, y: Array, p: Array) -> None:
+def resistance(
+    c: Array,
+    k: int,
+    state: Array,
+    way: int,
+    y: float,
+    p: float,
+    x: Array,
+    terms: Array,
+    slopes: Array,
+) -> tuple[float, float, float]:
+    """Fill the terms of muscle k and their slopes by y; return their force, its slope, and its size."""
+    n, m, n_s, n_l, n_e, n_a = int(c[0]), int(c[1]), int(c[5]), int(c[6]), int(c[7]), int(c[8])
+    own, place, width, rate = muscle_at(c, k), terms_at(c, k), n_terms(c), c[15]
+    first = DYNAMIC + n_e
+    before = shortening(c, k, state)
+    moved = y - before
+    for i in range(first):
+        terms[i] = 0.0
+        slopes[i] = 0.0
+    if way == IN_TIME and rate > 0.0:
+        terms[0] = rate * moved
+        slopes[0] = rate
+        if c[place + 1] > 0.0:
+            flow = area(c, k, min(max(before, c[own]), c[own + 1]))[0] / c[place + first]
+            terms[1] = flow * flow * rate * moved
+            slopes[1] = flow * flow * rate
+        if c[18] != 0.0:
+            past = m + n + n * (n_s + n_l) + 2 * k
+            terms[2] = rate * rate * (2.0 * moved - 3.0 * state[past] + state[past + 1])
+            slopes[2] = 2.0 * rate * rate
+    terms[3] = y
+    slopes[3] = 1.0
+    inside = min(max(y, c[own]), c[own + 1])
+    u, beyond = inside / c[10], y - inside
+    power = u
+    for i in range(DYNAMIC, first):
+        slopes[i] = (i - DYNAMIC + 2) * power / c[10]
+        power *= u
+        terms[i] = power + slopes[i] * beyond
+    power = 1.0
+    terms[first] = -p
+    slopes[first] = 0.0
+    for i in range(first + 1, first + n_a):
+        slopes[i] = -p * (i - first) * power / c[10]
+        power *= u
+        terms[i] = -p * power + slopes[i] * beyond
+    rubbed = friction(c, k, state, way, y, p, x, terms, slopes)[0]
+    for i in range(n_l):
+        gain = c[HEAD + n_s + n_l + i] if way == IN_TIME else c[17]
+        terms[width - n_l + i] = 0.0
+        slopes[width - n_l + i] = 0.0
+        if way != AT_REST:
+            past = state[m + n + n * n_s + k * n_l + i]
+            terms[width - n_l + i] = c[HEAD + n_s + i] * past + gain * moved
+            slopes[width - n_l + i] = gain
+    a, narrowing = area(c, k, y)
+    force, slope, size = rubbed - p * a, -p * narrowing, abs(rubbed) + abs(p * a)
+    for i in range(width):
+        if i < first or i >= first + n_a:
+            slope += c[place + i] * slopes[i]
+        if i < first or i >= width - n_l:
+            part = c[place + i] * terms[i]
+            force += part
+            size += abs(part)
+    return force, slope, size
+
+
+@kernel
+def muscle_force(
+    c: Array,
+    k: int,
+    state: Array,
+    way: int,
+    y: float,
+    p: float,
+    x: Array,
+    terms: Array,
+    slopes: Array,
+) -> tuple[float, float, float]:
+    """Do as `resistance`; of a slack muscle terms are zero, and the force is the most it resists with."""
+    force, slope, size = resistance(c, k, state, way, y, p, x, terms, slopes)
+    most = c[muscle_at(c, k) + 3]
+    if not force > most:
+        return force, slope, size
+    for i in range(n_terms(c)):
+        terms[i] = 0.0
+        slopes[i] = 0.0
+    return most, 0.0, size
+
+
+@kernel
+def update_state(c: Array, state: Array, way: int, q: Array, p: Array, x: Array) -> None:
     """Bring the state to where the muscles are now."""
-    n, m, n_l = int(c[0]), int(c[4]), int(c[5])
+    n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
     for k in range(n):
-        own = muscles(c) + k * muscle_width(c)
-        u = shortened(c, own, k, state, way, y[k], p[k])[0]
-        z = u + c[own + 2] * p[k]
-        grown = max(p[k] + c[9], 0.0) if way != AT_REST else 0.0
-        for i in range(m):
-            s = state[2 * n + k * m + i] + z - state[n + k]
-            limit = c[HEAD + i] * grown
-            state[2 * n + k * m + i] = min(max(s, -limit), limit)
+        y = shortening(c, k, q)
+        moved = y - shortening(c, k, state)
+        stretch = y + c[muscle_at(c, k) + 2] * p[k]
+        grown = friction_pressure(c, p[k], x) if way != AT_REST else 0.0
+        for i in range(n_s):
+            upper = c[HEAD + i] * grown
+            place = m + n + k * n_s + i
+            state[place] = min(max(state[place] + stretch - state[m + k], -c[12] * upper), upper)
         for i in range(n_l):
-            place = 2 * n + n * m + k * n_l + i
-            gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
+            place = m + n + n * n_s + k * n_l + i
+            gain = c[HEAD + n_s + n_l + i] if way == IN_TIME else c[17]
+            state[place] = c[HEAD + n_s + i] * state[place] + gain * moved
             if way == AT_REST:
                 state[place] = 0.0
-            else:
-                state[place] = c[HEAD + m + i] * state[place] + gain * (u - state[k])
-        if c[15] != 0.0:
-            place = 2 * n + n * (m + n_l) + 2 * k
+        if c[18] != 0.0:
+            place = m + n + n * (n_s + n_l) + 2 * k
             state[place + 1] = state[place] if way == IN_TIME else 0.0
-            state[place] = u - state[k] if way == IN_TIME else 0.0
-        state[k] = u
-        state[n + k] = z
+            state[place] = moved if way == IN_TIME else 0.0
+        state[m + k] = stretch
+    for j in range(m):
+        state[j] = q[j]
 
 
-@kernel
-def pressed(
-    c: Array, k: int, state: Array, way: int, y: Array, x: Array, gradient: Array
-) -> tuple[float, bool]:
-    """Return the pressure of muscle k that balances it where all muscles are, and whether one does.
-
-    It is the one root of a function that rises piecewise straight, since areas are larger than what
-    friction grows with pressure. Where the muscle would have to push more than it can, it is the
-    pressure at which it is about to go slack.
-    """
-    own = muscles(c) + k * muscle_width(c)
-    asked = sprung(c, own, k, y, x, gradient)
-    reached = asked >= -c[own + 3]
-    held = max(asked, -c[own + 3]) + elastic(c, own, y[k])[0]
-    held += lagging(c, own, k, state, way, y[k])[0]
-    a = area(c, own, y[k])[0]
-    low, high = -NEVER, NEVER
-    p = held / a
-    for _ in range(MOST_STEPS):
-        force, _, by_p = rubbed(c, own, k, state, way, y[k], p)
-        excess = p * a - held - force
-        if abs(excess) <= BALANCED * (abs(p * a) + abs(held) + abs(force)):
-            break
-        if excess > 0.0:
-            high = p
-        else:
-            low = p
-        slope = a - by_p
-        p -= excess / slope if slope > 0.0 else excess / a
-        if not low < p < high:  # only where friction outgrows the area
-            p = 0.5 * (low + high)
-    return p, reached
+# -- coordinates for pressures -------------------------------------------------------------------
 
 
 @kernel
@@ -148,79 +346,96 @@ def unbalanced(
     c: Array,
     state: Array,
     way: int,
-    y: Array,
+    q: Array,
     x: Array,
     p: Array,
     residual: Array,
     matrix: Array,
-    gradient: Array,
+    sizes: Array,
+    terms: Array,
 ) -> float:
-    """Fill what every muscle's forces lack to a balance, and its slopes; return the largest share.
+    """Fill what forces on every coordinate lack to a balance, and its slopes; return the largest share.
 
-    That is infinite where forces are.
+    That is infinite where forces are. ``terms`` has two numbers a term to compute in.
     """
-    n = int(c[0])
+    m, width = int(c[1]), n_terms(c)
+    for j in range(m):
+        residual[j] = coupling_force(c, j, q, x, matrix[j])
+        sizes[j] = abs(residual[j])
+        for i in range(m):
+            sizes[j] += abs(matrix[j, i] * q[i])
+    for k in range(int(c[0])):
+        y, own = shortening(c, k, q), muscle_at(c, k) + OWN
+        force, slope, size = muscle_force(
+            c, k, state, way, y, p[k], x, terms[:width], terms[width:]
+        )
+        if c[20] == 0.0:
+            residual[k] += force
+            matrix[k, k] += slope
+            sizes[k] += size
+        else:
+            for j in range(m):
+                residual[j] += c[own + j] * force
+                sizes[j] += abs(c[own + j]) * size
+                for i in range(m):
+                    matrix[j, i] += c[own + j] * c[own + i] * slope
     worst = 0.0
-    for k in range(n):
-        own = muscles(c) + k * muscle_width(c)
-        force = sprung(c, own, k, y, x, gradient)
-        resisting, slope, size = resisted(c, own, k, state, way, y[k], p[k])
-        if resisting > c[own + 3]:
-            resisting, slope = c[own + 3], 0.0
-        residual[k] = force + resisting
-        for j in range(n):
-            matrix[k, j] = gradient[j]
-            size += abs(gradient[j] * y[j])
-        matrix[k, k] += slope
-        size += abs(force)
-        if not size < np.inf:
+    for j in range(m):
+        if not sizes[j] < np.inf:
             return np.inf
-        if size > 0.0:
-            worst = max(worst, abs(residual[k]) / size)
+        if sizes[j] > 0.0:
+            worst = max(worst, abs(residual[j]) / sizes[j])
     return worst
 
 
 @kernel
-def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scratch: Array) -> float:
-    """Move the displacements to where pressures hold them; return what is left of the residual.
+def solve_equilibrium(
+    c: Array, state: Array, way: int, q: Array, x: Array, p: Array, work: Array
+) -> float:
+    """Move coordinates to where pressures hold them; return what is left of the residual.
 
-    Where no place is found, they stay where they were. ``scratch`` has n n + 4 n numbers.
+    Where no place is found, they stay where they were. ``work`` has `work_size` numbers; those after
+    the first four vectors begin with the slopes of the residual.
     """
-    n = int(c[0])
-    vectors = scratch[: 4 * n].reshape((4, n))
-    residual, step, start, gradient = vectors[0], vectors[1], vectors[2], vectors[3]
-    matrix = scratch[4 * n : 4 * n + n * n].reshape((n, n))
-    left = unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+    m = int(c[1])
+    residual, step, start, sizes = (
+        work[:m],
+        work[m : 2 * m],
+        work[2 * m : 3 * m],
+        work[3 * m : 4 * m],
+    )
+    matrix, terms = work[4 * m : 4 * m + m * m].reshape((m, m)), work[4 * m + m * m :]
+    left = unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
     before = 2.0 * left + 1.0
     for _ in range(MOST_STEPS):
         if left <= BALANCED or (left >= before and left < NEARLY) or left == np.inf:
             break
         before = left
-        for k in range(n):
-            step[k] = -residual[k]
-            start[k] = y[k]
+        for j in range(m):
+            step[j] = -residual[j]
+            start[j] = q[j]
         eliminate(matrix, step)
         down = 0.0
-        for k in range(n):
-            down += residual[k] * step[k]
+        for j in range(m):
+            down += residual[j] * step[j]
         if not down < 0.0:  # where the energy is not convex: straight down
             down = 0.0
-            for k in range(n):
-                step[k] = -residual[k]
-                down -= residual[k] * residual[k]
+            for j in range(m):
+                step[j] = -residual[j]
+                down -= residual[j] * residual[j]
         if left <= SURE:
-            for k in range(n):
-                y[k] += step[k]
+            for j in range(m):
+                q[j] += step[j]
             break
         low, high, share = 0.0, -1.0, 1.0
         low_rate, high_rate = down, 0.0
         for _ in range(MOST_SEARCHED):
-            for k in range(n):
-                y[k] = start[k] + share * step[k]
-            left = unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+            for j in range(m):
+                q[j] = start[j] + share * step[j]
+            left = unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
             rate = 0.0
-            for k in range(n):
-                rate += residual[k] * step[k]
+            for j in range(m):
+                rate += residual[j] * step[j]
             if left <= BALANCED or abs(rate) <= 0.7 * abs(down) or left == np.inf:
                 break
             if rate > 0.0:
@@ -234,55 +449,153 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
                 width = high - low
                 share = low + width * min(max(-low_rate / (high_rate - low_rate), 0.1), 0.9)
     if DERIVED:
-        unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+        unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
         eliminate(matrix, residual)
-        for k in range(n):
-            y[k] -= residual[k]
+        for j in range(m):
+            q[j] -= residual[j]
     if not left < NEARLY:
-        for k in range(n):
-            y[k] = state[k]
+        for j in range(m):
+            q[j] = state[j]
     return left
 
 
 @kernel
-def begin(c: Array, state: Array, x: Array, p: Array, scratch: Array) -> None:
+def start_at_rest(c: Array, state: Array, x: Array, q: Array, p: Array, work: Array) -> None:
     """Rest without pressure, and take the tare there; nothing has come before the first sample."""
-    n = int(c[0])
     for i in range(state.size):
         state[i] = 0.0
-    y = scratch[:n]
-    for k in range(n):
-        y[k] = 0.0
+    for j in range(q.size):
+        q[j] = 0.0
+    for k in range(p.size):
         p[k] = 0.0
-    settle(c, state, AT_REST, y, x, p, scratch[n:])
-    keep(c, state, AT_REST, y, p)
-    if c[13] != 0.0:
-        for k in range(n):
-            state[state.size - 2 - n + k] = y[k]
+    solve_equilibrium(c, state, AT_REST, q, x, p, work)
+    update_state(c, state, AT_REST, q, p, x)
+    if c[16] != 0.0:
+        for j in range(q.size):
+            state[state.size - 2 - q.size + j] = q[j]
     state[state.size - 2] = 1.0
 
 
+# -- pressures for coordinates -------------------------------------------------------------------
+
+
 @kernel
-def press(c: Array, state: Array, scratch: Array, given: Array, p: Array) -> None:
+def pressure_for(
+    c: Array, k: int, state: Array, way: int, y: float, wanted: float, x: Array, terms: Array
+) -> float:
+    """Return the pressure at which muscle k resists with a force.
+
+    It is the one root of a function that falls piecewise straight, since areas are larger than what
+    friction grows with pressure.
+    """
+    width, place = n_terms(c), terms_at(c, k)
+    first, slopes = DYNAMIC + int(c[7]), terms[width : 2 * width]
+    resistance(c, k, state, way, y, 0.0, x, terms[:width], slopes)
+    held = -wanted
+    for i in range(width):
+        if i < first or i >= width - int(c[6]):
+            held += c[place + i] * terms[i]
+    a = area(c, k, y)[0]
+    low, high = -NEVER, NEVER
+    p = held / a
+    for _ in range(MOST_STEPS):
+        rubbed, by_p = friction(c, k, state, way, y, p, x, terms[:width], slopes)
+        excess = p * a - held - rubbed
+        if abs(excess) <= BALANCED * (abs(p * a) + abs(held) + abs(rubbed)):
+            break
+        if excess > 0.0:
+            high = p
+        else:
+            low = p
+        slope = a - by_p
+        p -= excess / slope if slope > 0.0 else excess / a
+        if not low < p < high:  # only where friction outgrows the area
+            p = 0.5 * (low + high)
+    return p
+
+
+@kernel
+def solve_pressures(
+    c: Array, state: Array, way: int, q: Array, x: Array, p: Array, work: Array
+) -> bool:
+    """Fill the pressures that hold muscles at coordinates; return whether there are such.
+
+    Muscles that are more than coordinates take the forces that they have at the pressure they share, and
+    the least changes of them that balance; those that would leave the range of pressures stay at its end,
+    one by one, and the others take their part. ``work`` has two numbers a muscle more than `work_size`.
+    """
+    n, m = int(c[0]), int(c[1])
+    lacks, gradient = work[:m], work[m : 2 * m]
+    matrix, terms = work[4 * m : 4 * m + m * m].reshape((m, m)), work[4 * m + m * m :]
+    if c[20] == 0.0:
+        reached = True
+        for k in range(n):
+            wanted, most = -coupling_force(c, k, q, x, gradient), c[muscle_at(c, k) + 3]
+            reached = reached and wanted <= most
+            p[k] = pressure_for(c, k, state, way, q[k], min(wanted, most), x, terms)
+        return reached
+    forces, free = (
+        work[work_size(c) : work_size(c) + n],
+        work[work_size(c) + n : work_size(c) + 2 * n],
+    )
+    width, n_free = n_terms(c), n
+    for k in range(n):
+        free[k] = 1.0
+    for _ in range(n):
+        for j in range(m):
+            lacks[j] = -coupling_force(c, j, q, x, gradient)
+            for i in range(m):
+                matrix[j, i] = 0.0
+        for k in range(n):
+            own, y = muscle_at(c, k) + OWN, shortening(c, k, q)
+            if free[k] != 0.0:
+                p[k] = min(max(c[19], c[13]), c[14])
+            forces[k] = muscle_force(c, k, state, way, y, p[k], x, terms[:width], terms[width:])[0]
+            for j in range(m):
+                lacks[j] -= c[own + j] * forces[k]
+                for i in range(m):
+                    matrix[j, i] += free[k] * c[own + j] * c[own + i]
+        eliminate(matrix, lacks)
+        worst, furthest = -1, 0.0
+        for k in range(n):
+            if free[k] == 0.0:
+                continue
+            own, y, wanted = muscle_at(c, k), shortening(c, k, q), forces[k]
+            for j in range(m):
+                wanted += c[own + OWN + j] * lacks[j]
+            p[k] = pressure_for(c, k, state, way, y, min(wanted, c[own + 3]), x, terms)
+            beyond = max(c[13] - p[k], p[k] - c[14]) - HAIR * (1.0 + abs(p[k]))
+            if beyond > furthest:
+                worst, furthest = k, beyond
+        if worst < 0 or n_free == m:
+            return worst < 0
+        p[worst] = min(max(p[worst], c[13]), c[14])
+        free[worst] = 0.0
+        n_free -= 1
+    return False
+
+
+@kernel
+def inverse_step(c: Array, state: Array, scratch: Array, given: Array, p: Array) -> None:
     """Give the pressures of a sample, and bring the state there; then scratch begins with where.
 
     The last state counts samples that muscles cannot reach.
     """
-    n, n_x = int(c[0]), int(c[1]) + int(c[3])
-    y, gradient = scratch[:n], scratch[2 * n : 3 * n]
-    tare, x = state[state.size - 2 - n :], given[n : n + n_x]
+    m, n_x = int(c[1]), int(c[2]) + int(c[4])
+    q, work = scratch[:m], scratch[m:]
+    x = given[m : m + n_x]
     way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
-    amiss = False
-    for j in range(n):
-        y[j] = given[j] + tare[j]
-    for k in range(n):
-        found, reached = pressed(c, k, state, way, y, x, gradient)
-        p[k] = min(max(found, c[10]), c[11])
-        amiss = amiss or not (reached and abs(p[k] - found) <= HAIR * (1.0 + abs(found)))
-    if amiss:  # where the muscles go instead is what friction will remember
-        settle(c, state, way, y, x, p, scratch[2 * n :])
+    for j in range(m):
+        q[j] = given[j] + state[state.size - 2 - m + j]
+    reached = solve_pressures(c, state, way, q, x, p, work)
+    for k in range(p.size):
+        inside = min(max(p[k], c[13]), c[14])
+        reached = reached and abs(p[k] - inside) <= HAIR * (1.0 + abs(p[k]))
+        p[k] = inside
+    if not reached:  # where the muscles go instead is what friction will remember
+        solve_equilibrium(c, state, way, q, x, p, work)
         state[state.size - 1] += 1.0
-    keep(c, state, way, y, p)
+    update_state(c, state, way, q, p, x)
     state[state.size - 2] = 0.0
 
 
@@ -292,15 +605,14 @@ def start_balance(
 ) -> None:
     """Start muscles at rest without pressure, or at the first displacements, with nothing loaded."""
     c = coefficients
-    n, n_x = int(c[0]), int(c[1]) + int(c[3])
-    x, p = inputs[n : n + n_x], scratch[:n]
-    begin(c, state, x, p, scratch[n:])
+    n, m, n_x = int(c[0]), int(c[1]), int(c[2]) + int(c[4])
+    x, q, p, work = inputs[m : m + n_x], scratch[:m], scratch[m : m + n], scratch[m + n :]
+    start_at_rest(c, state, x, q, p, work)
     if virgin:
-        y, gradient = scratch[n : 2 * n], scratch[2 * n : 3 * n]
+        for j in range(m):
+            q[j] = inputs[j] + state[state.size - 2 - m + j]
+        solve_pressures(c, state, AT_REST, q, x, p, work)
         for k in range(n):
-            y[k] = inputs[k] + state[state.size - 2 - n + k]
-        for k in range(n):
-            found, _ = pressed(c, k, state, AT_REST, y, x, gradient)
-            p[k] = min(max(found, c[10]), c[11])
-        keep(c, state, AT_REST, y, p)
+            p[k] = min(max(p[k], c[13]), c[14])
+        update_state(c, state, AT_REST, q, p, x)
         state[state.size - 2] = 0.0

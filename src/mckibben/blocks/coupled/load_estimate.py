@@ -21,12 +21,17 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_in import balance_in
-from mckibben.blocks.coupled.balance_law import begin, keep, unbalanced
-from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
+from mckibben.blocks.coupled.balance import Balance, balance_in
+from mckibben.blocks.coupled.balance_law import (
+    AT_REST,
+    FROM_REST,
+    IN_TIME,
+    start_at_rest,
+    unbalanced,
+    update_state,
+)
 from mckibben.blocks.fields import STRICT, Channel
-from mckibben.blocks.kernels import kernel, step
+from mckibben.blocks.kernels import fill, kernel, step
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
@@ -39,28 +44,40 @@ def load_estimate_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Give loads; behind the balance's coefficients stands the pseudo-inverse."""
-    c = coefficients
-    n, n_x, n_loads = int(c[0]), int(c[1]), int(c[3])
-    solving = c[c.size - n_loads * n :]
-    y, residual, gradient = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n]
-    matrix, x = scratch[3 * n : n * (n + 3)].reshape((n, n)), scratch[n * (n + 6) :]
-    tare = state[state.size - 2 - n :]
-    p = inputs[n : 2 * n]
-    for k in range(n):
-        y[k] = inputs[k] + tare[k]
-    for i in range(n_x):
-        x[i] = inputs[2 * n + i]
-    for i in range(n_loads):
-        x[n_x + i] = 0.0
+    m = int(coefficients[1])
+    q, loads = scratch[:m], scratch[scratch.size - outputs.size :]
+    for j in range(m):
+        q[j] = inputs[j] + state[state.size - 2 - m + j]
     way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
-    unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
-    keep(c, state, way, y, p)
+    estimate(coefficients, state, way, q, inputs, loads, scratch)
+    n, n_x = int(coefficients[0]), int(coefficients[2]) + int(coefficients[4])
+    x = scratch[scratch.size - n_x :]
+    update_state(coefficients, state, way, q, inputs[m : m + n], x)
     state[state.size - 2] = 0.0
+    fill(outputs, loads)
+
+
+@kernel
+def estimate(
+    c: Array, state: Array, way: int, q: Array, inputs: Array, loads: Array, scratch: Array
+) -> None:
+    """Fill the loads that hold muscles at coordinates, the last of what schedules and loads them."""
+    n, m, n_x, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[4])
+    residual, sizes, x = (
+        scratch[m : 2 * m],
+        scratch[2 * m : 3 * m],
+        scratch[scratch.size - n_x - n_loads :],
+    )
+    matrix, terms = scratch[3 * m : 3 * m + m * m].reshape((m, m)), scratch[3 * m + m * m :]
+    for i in range(n_x):
+        x[i] = inputs[m + n + i]
     for i in range(n_loads):
-        load = 0.0
-        for k in range(n):
-            load -= solving[i * n + k] * residual[k]
-        outputs[i] = load
+        loads[i] = 0.0
+    unbalanced(c, state, way, q, x, inputs[m : m + n], residual, matrix, sizes, terms)
+    solving = c[c.size - n_loads * m :]
+    for i in range(n_loads):
+        for j in range(m):
+            loads[i] -= solving[i * m + j] * residual[j]
 
 
 @kernel
@@ -69,29 +86,20 @@ def load_estimate_start(
 ) -> None:
     """Start as the balance does, under the loads that the first sample has without friction."""
     c = coefficients
-    n, n_x, n_loads = int(c[0]), int(c[1]), int(c[3])
-    solving = c[c.size - n_loads * n :]
-    y, p, x = scratch[:n], inputs[n : 2 * n], scratch[n * (n + 6) :]
-    for i in range(n_x):
-        x[i] = inputs[2 * n + i]
+    n, m, n_x, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[4])
+    q, p, x = scratch[:m], scratch[m : m + n], scratch[scratch.size - n_x - n_loads :]
+    loads = x[n_x:]
+    for i in range(state.size):
+        state[i] = 0.0
+    fill(q, inputs)
+    estimate(c, state, AT_REST, q, inputs, loads, scratch)
     for i in range(n_loads):
-        x[n_x + i] = 0.0
-    if c[13] == 0.0:
-        residual, gradient = scratch[n : 2 * n], scratch[2 * n : 3 * n]
-        matrix = scratch[3 * n : n * (n + 3)].reshape((n, n))
-        for i in range(state.size):
-            state[i] = 0.0
-        for k in range(n):
-            y[k] = inputs[k]
-        unbalanced(c, state, AT_REST, y, x, p, residual, matrix, gradient)
-        for i in range(n_loads):
-            for k in range(n):
-                x[n_x + i] -= solving[i * n + k] * residual[k]
-    begin(c, state, x, y, scratch[n : n * (n + 6)])
+        loads[i] = loads[i] if c[16] == 0.0 else 0.0
+    start_at_rest(c, state, x, q, p, scratch[m + n :])
     if virgin:
-        for k in range(n):
-            y[k] = inputs[k] + state[state.size - 2 - n + k]
-        keep(c, state, AT_REST, y, p)
+        for j in range(m):
+            q[j] = inputs[j] + state[state.size - 2 - m + j]
+        update_state(c, state, AT_REST, q, inputs[m : m + n], x)
         state[state.size - 2] = 0.0
 
 

@@ -17,7 +17,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_in import balance_in
+from mckibben.blocks.coupled.balance import balance_in
 from mckibben.blocks.fields import rows
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData

@@ -13,7 +13,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_in import balance_in
+from mckibben.blocks.coupled.balance import balance_in
 from mckibben.blocks.coupled.balance_law import keep, settle
 from mckibben.blocks.coupled.balance_terms import AT_REST
 from mckibben.blocks.running import run_many

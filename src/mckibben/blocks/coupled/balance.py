@@ -284,7 +284,7 @@ class Balance(Invertible):
                     f"Remedy: give {count} rows of {width}."
                 )
         optional = ("lines", "bladders", "pushes", "mass")
-        lengths = {name: n for name in ("damping", "walls", *optional)} | {"grips": n_x}
+        lengths = dict.fromkeys(("damping", "walls", *optional), n) | {"grips": n_x}
         for name, count in lengths.items():
             values = getattr(self, name)
             if len(values) != count and (values or name in ("damping", "walls")):

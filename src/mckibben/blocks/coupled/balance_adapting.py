@@ -17,12 +17,12 @@ from __future__ import annotations
 import math
 
 from mckibben.arrays import Array
-from mckibben.blocks.coupled.balance_law import inverse_step as press, start_balance
 from mckibben.blocks.coupled.balance_law import (
     OWN,
     area,
-    NEVER,
+    start_balance,
 )
+from mckibben.blocks.coupled.balance_law import inverse_step as press
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.learning import (
     SENSES,

@@ -34,7 +34,7 @@ from mckibben.estimators.coupled.balance_bench import (
     without_load,
 )
 from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, noise_of, told_by
-from mckibben.estimators.coupled.balance_problem import Problem, coarser, compared, front, held
+from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
 from mckibben.estimators.coupled.balance_words import sentences
@@ -124,16 +124,26 @@ class BalanceEstimator(CoupledEstimator):
         "Springs, areas, friction and relaxation of one muscle or several, on coordinates of their own "
         "or a joint, under loads and torques; terms chosen by cross-validation."
     )
-    cannot = "One set of lags serves all muscles; areas and springs follow shortening, not temperature."
+    cannot = (
+        "One set of lags serves all muscles; areas and springs follow shortening, not temperature."
+    )
     inverse_kind = "exact"
     quick = True
     default_for = "plan of displacement"
     param_grid: ClassVar[Grid] = {"n_lags": (3, 6), "n_stops": (5, 8), "area": (2, 4)}
-    makes = ("balance", "balance-inverse", "air balance-inverse", "piecewise-linear balance-inverse")
+    makes = (
+        "balance",
+        "balance-inverse",
+        "air balance-inverse",
+        "piecewise-linear balance-inverse",
+    )
     effort: ClassVar[float] = 1.0
     alone: ClassVar[bool] = True
     unmeasured: ClassVar[bool] = True
     fewer_outputs: ClassVar[bool] = True
+    of_force: ClassVar[bool] = False
+    """Whether errors of the load count, instead of those of displacements."""
+
     through: ClassVar[bool] = True
 
     terms: tuple[str, ...] | None = None
@@ -205,8 +215,8 @@ class BalanceEstimator(CoupledEstimator):
             for name in names
         ]
         check_numbers(data)
-        data, behind, ways = from_zero(data, directions(data))
-        bench = bench_of(data, ways, tare=self.tare)
+        data, behind, ways = from_zero(data, np.eye(1) if self.of_force else directions(data))
+        bench = replace(bench_of(data, ways, tare=self.tare), of_force=self.of_force)
         if not bench.tare:
             lacking = without_load(data, every=bool(self.unknown_load))
             bench = replace(bench, unmeasured=lacking)
@@ -242,7 +252,8 @@ class BalanceEstimator(CoupledEstimator):
             balance = replace(balance, pressure_range=(float(ends[0]), float(ends[1])))
         x = of_channels(data, balance.scheduling).stacked("scheduled")
         balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
-        tracker.notes += sentences(search, z, balance, self.loads_)
+        tracker.notes += sentences(search, z, balance)
+        self._search, self._z = self._started(search, z)
         parts = [*before, balance.inverse(), *behind]
         return parts[0] if len(parts) == 1 else Series(tuple(parts))
 
@@ -287,8 +298,10 @@ class BalanceEstimator(CoupledEstimator):
                 few = structure.n_lags < 3 or self.lags is not None
                 return few or which in (structure.n_lags // 3, 2 * structure.n_lags // 3)
             if kind in ("elasticity", "areas"):
-                return which < 2 or (kind == "areas" and not self.may("areas"))
-            return kind in ("loads", "damping", "bladder") or (kind == "grip" and structure.n_stops > 0)
+                return which < 2
+            return kind in ("loads", "damping", "bladder") or (
+                kind == "grip" and structure.n_stops > 0
+            )
 
         return np.array([term.muscle is None and there(term) for term in structure.terms])
 
@@ -296,7 +309,7 @@ class BalanceEstimator(CoupledEstimator):
         self, data: TrainingData, structure: Structure, belief: Belief | None, tracker: Tracker
     ) -> tuple[Search, Array]:
         """Return the search of the terms chosen, and what they are."""
-        few = compared(coarser(data, FEW), FEW)
+        few = compared(coarser(data, FEW), FEW, of_force=self.of_force)
         search = Search(few, structure, self._first(structure), belief)
         starts = [] if belief is None else [self._likely(search)]
         for grip in GRIPS[: None if structure.n_stops else 1]:
@@ -308,28 +321,39 @@ class BalanceEstimator(CoupledEstimator):
         z = min(starts, key=lambda start: start[0])[1]
         tried = np.array([self._tried(term) for term in structure.terms])
         for number in range(ROUNDS if belief is None else 1):
-            self._search, self._z = search, z = search, search.descend(
-                z, min(self.steps, STEPS_BETWEEN), tracker.part(0.1 * number, 0.1 * (number + 1))
+            self._search, self._z = search, z = (
+                search,
+                search.descend(
+                    z,
+                    min(self.steps, STEPS_BETWEEN),
+                    tracker.part(0.1 * number, 0.1 * (number + 1)),
+                ),
             )
             active, z = search.chosen(z, tried)
             if belief is not None or (active == search.active).all() or number == ROUNDS - 1:
                 break
             search = replace(search, active=active)
-        added = [t for t, now, first in zip(structure.terms, search.active, self._first(structure), strict=True) if now and not first]
+        added = [
+            t
+            for t, now, first in zip(
+                structure.terms, search.active, self._first(structure), strict=True
+            )
+            if now and not first
+        ]
         self.terms_ = tuple(dict.fromkeys(t.kind if t.muscle is None else "muscles" for t in added))
         search, z = self._needed(search, z)
         if self.may("slack") and (structure.n > 1 or any(held(data, run) for run in data.runs)):
             search, z = self._slack(search, z)
         if structure.n == 1 and self.unknown_load is None:
             search, z = self._own_loads(search, z, data)
-        whole = compared(data, MOST)
+        whole = compared(data, MOST, of_force=self.of_force)
         search = replace(search, problem=whole)
         for _ in range(1 if belief is None else REFINED):
             if belief is not None:
                 noise = noise_of(whole.errors(search.structure, z)[0][: len(whole.runs)])
                 search = replace(search, belief=replace(belief, noise=noise))
             z = search.descend(z, self.steps, tracker.part(0.6, 0.9))
-        return self._started(search, z)
+        return search, z
 
     def _likely(self, search: Search) -> tuple[float, Array]:
         """Return what is likely before, under the constant force the recordings ask, and its cost."""
@@ -340,7 +364,9 @@ class BalanceEstimator(CoupledEstimator):
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
                 z[place] = 1.0 / belief.prior.sheet.area
-        alone = replace(search, problem=replace(search.problem, data=replace(search.problem.data, runs=())))
+        alone = replace(
+            search, problem=replace(search.problem, data=replace(search.problem.data, runs=()))
+        )
         z = alone.descend(z, TOWARDS, Tracker())
         return search.cost(z), z
 
@@ -355,7 +381,9 @@ class BalanceEstimator(CoupledEstimator):
         """Return the search of the terms that are free alone."""
         structure, n = search.structure, len(search.structure.terms)
         free = {key for key, there in zip(structure.keys, search.active, strict=True) if there}
-        needed = structure.needed([t for t, on in zip(structure.terms, search.active, strict=True) if on])
+        needed = structure.needed(
+            [t for t, on in zip(structure.terms, search.active, strict=True) if on]
+        )
         active = np.array([key in free for key in needed.keys])
         moved = np.append(structure.moved_to(needed, z[:n]), z[n:])
         return replace(search, structure=needed, active=active), moved
@@ -375,7 +403,9 @@ class BalanceEstimator(CoupledEstimator):
         bench, every = search.structure.bench, without_load(data, every=True)
         if bench.loaded or bench.unmeasured or bench.tare or not every:
             return search, z
-        own = replace(search, structure=replace(search.structure, bench=replace(bench, unmeasured=every)))
+        own = replace(
+            search, structure=replace(search.structure, bench=replace(bench, unmeasured=every))
+        )
         started = np.append(z, np.zeros(own.problem.size(own.structure) - z.size))
         found = own.descend(started, STEPS_BETWEEN, Tracker())
         return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
@@ -421,5 +451,9 @@ def in_newtons(balance: Balance) -> Balance:
         balance,
         obstacles=rows(obstacles.reshape(len(balance.obstacles), -1)),
         **{name: rows(scaled(getattr(balance, name))) for name in tables},
-        **{name: vector(scaled(getattr(balance, name))) for name in single if getattr(balance, name)},
+        **{
+            name: vector(scaled(getattr(balance, name)))
+            for name in single
+            if getattr(balance, name)
+        },
     )

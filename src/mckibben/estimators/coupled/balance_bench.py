@@ -199,7 +199,8 @@ def one_speed(data: TrainingData) -> bool:
     if any(run.sample_time is None for run in data.runs):
         return True
     speeds = [
-        (np.abs(np.diff(run.driven, axis=0)) / (run.sample_time or 1.0)).max(axis=1) for run in data.runs
+        (np.abs(np.diff(run.driven, axis=0)) / (run.sample_time or 1.0)).max(axis=1)
+        for run in data.runs
     ]
     found = np.concatenate(speeds)
     rests = found <= SLOW * float(np.quantile(found, 0.99))

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from numpy.polynomial import polynomial
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
@@ -103,11 +103,14 @@ class Problem:
         One sample of so many is compared; all are run through.
     starts : bool
         Whether the starts of runs that do not begin at rest are found.
+    of_force : bool
+        Whether forces count in all runs.
     """
 
     data: TrainingData
     every: int = 1
     starts: bool = False
+    of_force: bool = False
     _fronts: dict[tuple[object, ...], Array] = field(default_factory=dict, repr=False)
 
     @property
@@ -116,6 +119,8 @@ class Problem:
 
     def still(self, run: Run) -> bool:
         """Tell whether a run's forces count, not its displacements."""
+        if self.of_force:
+            return True
         return self.data.once(("held", run.place), lambda: np.array(held(self.data, run))).item()
 
     def counting(self, run: Run, structure: Structure) -> Mask:
@@ -124,8 +129,11 @@ class Problem:
         Of a run that begins in an unknown state, that is not found, the first part does not.
         """
         places = self.places(run)
-        known = self.still(run) or structure.settled or self.starts or at_rest(self.data, run)
-        return run.counts[places] & (np.arange(places.size) >= (0.0 if known else WARMING) * places.size)
+        still = held(self.data, run) or structure.settled or self.starts
+        known = still or at_rest(self.data, run)
+        return run.counts[places] & (
+            np.arange(places.size) >= (0.0 if known else WARMING) * places.size
+        )
 
     def compared(self, run: Run) -> Array:
         """Return the outputs that are compared."""
@@ -148,7 +156,9 @@ class Problem:
             driven = run.driven
             for block in front(structure, values, Channel("pressure", "bar")):
                 columns = [
-                    run_many([block], np.ascontiguousarray(p[:, np.newaxis]), sample_time=run.sample_time)
+                    run_many(
+                        [block], np.ascontiguousarray(p[:, np.newaxis]), sample_time=run.sample_time
+                    )
                     for p in driven.T
                 ]
                 driven = np.column_stack([column[0, :, 0] for column in columns])
@@ -217,7 +227,8 @@ class Problem:
         still = self.still(run)
         found, slopes = self.followed(structure, z, run, held=still, sloped=sloped)
         counts = self.counting(run, structure)[:, np.newaxis]
-        scale = counts / (structure.bench.highest if still else structure.bench.travel)
+        bench = structure.bench
+        scale = counts / (bench.highest * bench.unit if still else bench.travel)
         errors = (found if still else found - self.compared(run)) * scale
         return errors, slopes * scale[..., np.newaxis]
 
@@ -321,7 +332,9 @@ class Problem:
                             [part], first[np.newaxis, : structure.n], sample_time=run.sample_time
                         )[0][0]
                     self._begin(balance, state, first, structure, z, run)
-                found = run_many([model], run.inputs, sample_time=run.sample_time, initial=tuple(state))
+                found = run_many(
+                    [model], run.inputs, sample_time=run.sample_time, initial=tuple(state)
+                )
                 given.append(found[0][run.counts].ravel())
             outputs.append(np.array(given))
         return np.concatenate(outputs, axis=1)
@@ -349,9 +362,10 @@ class Problem:
         areas at rest are: those of muscles with a coordinate each are 1 where samples are on average.
         """
         n, terms = structure.mix.shape[1], structure.terms
-        fixed = [not active[i] or (terms[i].kind == "areas" and terms[i].which == 0) for i in range(n)]
+        of_force = structure.bench.of_force
+        fixed = [not active[i] or (terms[i][:2] == ("areas", 0) and not of_force) for i in range(n)]
         chosen = np.flatnonzero(~np.array(fixed))
-        beyond = np.array([terms[i].kind == "areas" for i in chosen])
+        beyond = np.array([terms[i].kind == "areas" and not of_force for i in chosen])
         bounded = (structure.not_negative @ structure.mix > 0)[chosen] & np.array(
             [terms[i].muscle is None for i in chosen]
         )
@@ -375,13 +389,18 @@ class Problem:
         whole[..., narrowing] -= means * target[..., np.newaxis]
         weight = np.ones_like(target)
         for _ in range(PASSES):
-            table = np.concatenate([whole, target[..., np.newaxis]], axis=2) * weight[..., np.newaxis]
+            table = (
+                np.concatenate([whole, target[..., np.newaxis]], axis=2) * weight[..., np.newaxis]
+            )
             flat = table.reshape(-1, table.shape[2])
             least = bounded_least_squares(flat.T @ flat, bounded)
             at_rest = max(1.0 + float(means @ least[narrowing]), LEAST_AT_REST)
             start[chosen] = least[: chosen.size] / at_rest
-            start[len(terms) : len(terms) + least.size - chosen.size] = least[chosen.size :] / at_rest
-            weight = 1.0 / (self.stiffness(structure, start) * structure.bench.travel)
+            start[len(terms) : len(terms) + least.size - chosen.size] = (
+                least[chosen.size :] / at_rest
+            )
+            if not of_force:
+                weight = 1.0 / (self.stiffness(structure, start) * structure.bench.travel)
         # the same within physics, in the unit in which the area is 1 on average
         scaling = np.zeros(chosen.size)
         scaling[narrowing] = means
@@ -395,7 +414,9 @@ class Problem:
 
         def asked(side: Array, bound: Array) -> tuple[Array, Array]:
             on = side @ mix - np.outer(bound, scaling)
-            return np.hstack([on, np.zeros((len(on), size.size - chosen.size))]), bound - side @ structure.base
+            return np.hstack(
+                [on, np.zeros((len(on), size.size - chosen.size))]
+            ), bound - side @ structure.base
 
         sides, bounds = asked(sides, bounds)
         for _ in range(MOST_CUTS):
@@ -403,7 +424,9 @@ class Problem:
             least = constrained_least_squares(system, right, sides[asks], bounds[asks])[0]
             at_rest = max(1.0 + float(scaling @ least[: chosen.size]), LEAST_AT_REST)
             start[chosen] = least[: chosen.size] / at_rest
-            start[len(terms) : len(terms) + size.size - chosen.size] = least[chosen.size :] / at_rest
+            start[len(terms) : len(terms) + size.size - chosen.size] = (
+                least[chosen.size :] / at_rest
+            )
             side, softest = structure.softest(structure.base + structure.mix @ start[:n])
             if softest >= 0.5 * structure.least_stiffness:
                 break
@@ -457,10 +480,10 @@ def bounded_least_squares(gram: Array, bounded: Mask) -> Array:
     return found / size
 
 
-def compared(data: TrainingData, most: int) -> Problem:
+def compared(data: TrainingData, most: int, *, of_force: bool = False) -> Problem:
     """Return the problem of following runs, of which about so many numbers are compared."""
     total = sum(len(run.outputs) for run in data.runs) * len(data.outputs)
-    return Problem(data, max(1, total // most))
+    return Problem(data, max(1, total // most), of_force=of_force)
 
 
 def coarser(data: TrainingData, most: int) -> TrainingData:

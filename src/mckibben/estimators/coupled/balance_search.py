@@ -175,9 +175,15 @@ class Search:
         on_all[:, :n] = sides @ structure.mix
         low, high, much = structure.ends()
         box, shape = np.eye(z.size)[n:n_terms], z[n:n_terms]
-        bounds = np.append(np.maximum(low, shape - FAR * much), -np.minimum(high, shape + FAR * much))
-        lags = [i for i, term in enumerate(structure.terms) if term.kind == "lags" and self.active[i]]
-        apart = np.array([np.eye(z.size)[j] - np.eye(z.size)[i] for i, j in zip(lags, lags[1:], strict=False)])
+        bounds = np.append(
+            np.maximum(low, shape - FAR * much), -np.minimum(high, shape + FAR * much)
+        )
+        lags = [
+            i for i, term in enumerate(structure.terms) if term.kind == "lags" and self.active[i]
+        ]
+        apart = np.array(
+            [np.eye(z.size)[j] - np.eye(z.size)[i] for i, j in zip(lags, lags[1:], strict=False)]
+        )
         starts = np.eye(z.size)[z.size - self._n_starts :: 1 + len(structure.lags)]
         every = [on_all, box, -box, apart.reshape(-1, z.size), starts, -starts]
         asked = [least - sides @ structure.base, bounds, np.full(len(apart), APART)]
@@ -207,7 +213,9 @@ class Search:
 
         best = missed(active)
         for _ in range(MOST_ADDED):
-            options = [active | more for more in self._candidates(active) if not (more & ~tried).any()]
+            options = [
+                active | more for more in self._candidates(active) if not (more & ~tried).any()
+            ]
             errors = [missed(option) for option in options]
             first = int(np.argmin([one.sum() for one in errors])) if errors else 0
             gain = best - errors[first] if errors else np.zeros(1)
@@ -220,7 +228,9 @@ class Search:
         solution[free] = bounded_least_squares(whole, bounded[free])
         low, high, much = structure.ends()
         shape = slice(structure.mix.shape[1], n)
-        near = np.clip(solution[shape], np.maximum(low, z[shape] - much), np.minimum(high, z[shape] + much))
+        near = np.clip(
+            solution[shape], np.maximum(low, z[shape] - much), np.minimum(high, z[shape] + much)
+        )
         found[shape] = np.where((active & new)[shape], near, z[shape])
         return active, found
 
@@ -250,7 +260,9 @@ class Search:
     def _bounded(self, size: int) -> Mask:
         """Return which of all numbers are not negative."""
         bounded = np.zeros(size, dtype=bool)
-        bounded[: self.structure.mix.shape[1]] = self.structure.not_negative @ self.structure.mix > 0
+        bounded[: self.structure.mix.shape[1]] = (
+            self.structure.not_negative @ self.structure.mix > 0
+        )
         for place, term in enumerate(self.structure.terms):
             shaped = term.kind in POSITIVE_SHAPE
             bounded[place] = (bounded[place] or shaped) and term.muscle is None
@@ -266,7 +278,9 @@ class Search:
         found = []
         for fold in np.unique(folds):
             moved = z.copy()
-            moved[free] += bounded_least_squares(parts[folds != fold].sum(axis=0), bounded[free]) - whole
+            moved[free] += (
+                bounded_least_squares(parts[folds != fold].sum(axis=0), bounded[free]) - whole
+            )
             low, high, _ = self.structure.ends()
             n = self.structure.mix.shape[1]
             moved[n : n + low.size] = np.clip(moved[n : n + low.size], low, high)
@@ -281,7 +295,9 @@ class Search:
             return np.array([term in wanted for term in terms])
 
         on = {(term.kind, term.which) for term, there in zip(terms, active, strict=True) if there}
-        own = {term.kind for term, there in zip(terms, active, strict=True) if there and term.muscle}
+        own = {
+            term.kind for term, there in zip(terms, active, strict=True) if there and term.muscle
+        }
         for kind in ("elasticity", "areas"):
             known = [which for name, which in on if name == kind]
             following = max(known, default=0) + 1
@@ -289,14 +305,20 @@ class Search:
                 whole = range(following, following + more)
                 yield group(*self._with_own(kind, whole, own))
         for kind in ("friction", "relaxation", "line", "mass"):
-            for which in {term.which for term in terms if term.kind == kind} - {w for k, w in on if k == kind}:
+            for which in {term.which for term in terms if term.kind == kind} - {
+                w for k, w in on if k == kind
+            }:
                 yield group(Term("lags", which), *self._with_own(kind, (which,), own)) & ~(
-                    group(Term("lags", which)) if kind != "relaxation" else np.zeros(len(terms), dtype=bool)
+                    group(Term("lags", which))
+                    if kind != "relaxation"
+                    else np.zeros(len(terms), dtype=bool)
                 )
         met = {self.structure.obstacles[which][0] for kind, which in on if kind == "obstacle"}
         for which, (side, _) in enumerate(self.structure.obstacles):
             if side not in met:
-                places = [which + j * len(self.structure.obstacles) for j in range(self.structure.m)]
+                places = [
+                    which + j * len(self.structure.obstacles) for j in range(self.structure.m)
+                ]
                 yield group(Term("obstacle", which), *(Term("places", place) for place in places))
         for which in {w for k, w in ((t.kind, t.which) for t in terms) if k == "springs"}:
             if ("springs", which) not in on:
@@ -311,9 +333,7 @@ class Search:
             if not own & set(kinds):
                 whiches = [(kind, which) for kind, which in on if kind in kinds]
                 whiches += [("areas", 0)] if "areas" in kinds else []
-                yield group(
-                    *(Term(*one, k) for one in whiches for k in range(1, self.structure.n))
-                )
+                yield group(*(Term(*one, k) for one in whiches for k in range(1, self.structure.n)))
 
     def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
         """Return terms of a kind, and those by which muscles differ if they do."""

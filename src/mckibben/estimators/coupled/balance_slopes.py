@@ -94,7 +94,15 @@ def through_past(
 
 @kernel
 def carry(
-    c: Array, k: int, state: Array, way: int, p: float, x: Array, past: Array, moved: Array, now: Array
+    c: Array,
+    k: int,
+    state: Array,
+    way: int,
+    p: float,
+    x: Array,
+    past: Array,
+    moved: Array,
+    now: Array,
 ) -> None:
     """Bring the slopes of the past of muscle k to where ``state`` is already."""
     n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
@@ -238,7 +246,13 @@ def follow(
     n, m = int(c[0]), int(c[1])
     n_states = scratch.size - 3 * m - 2 * n - 5 * m - m * m - 2 * n_terms(c)
     state, rest = scratch[:n_states], scratch[n_states:]
-    q, p, tare, now, work = rest[:m], rest[m : m + n], rest[m + n : 2 * m + n], rest[2 * m + n : 3 * m + n], rest[3 * m + n :]
+    q, p, tare, now, work = (
+        rest[:m],
+        rest[m : m + n],
+        rest[m + n : 2 * m + n],
+        rest[2 * m + n : 3 * m + n],
+        rest[3 * m + n :],
+    )
     for i in range(past.shape[0]):
         for j in range(past.shape[1]):
             past[i, j] = 0.0

@@ -68,6 +68,8 @@ class Bench:
         Shortest and longest time constant that the recordings can tell [s].
     step : float
         Shortest sample time [s]; 0 without time.
+    of_force : bool
+        Whether errors of the one load count, not those of coordinates: then it sets the unit of force.
     curved : bool
         Whether all that schedules has been at three levels or more.
     unmeasured : tuple of int
@@ -89,6 +91,7 @@ class Bench:
     tare: bool
     lag_range: tuple[float, float]
     step: float
+    of_force: bool = False
     curved: bool = True
     unmeasured: tuple[int, ...] = ()
 
@@ -97,6 +100,11 @@ class Bench:
         """Whether muscles shorten along directions, not each by a coordinate of its own."""
         n, m = self.directions.shape
         return n != m or not bool((self.directions == np.eye(n)).all())
+
+    @property
+    def unit(self) -> float:
+        """Area that is about that of a muscle."""
+        return self.heaviest / self.highest if self.of_force else 1.0
 
     @property
     def scale(self) -> float:
@@ -213,10 +221,18 @@ class Structure:
         time constants of air in front, while filling [s], the logarithm of the ratio of venting, and the
         dead zone [bar].
         """
-        widths = {"grip": 1, "grips": len(self.bench.scheduled), "asymmetry": 1, "lags": len(self.lags)}
+        widths = {
+            "grip": 1,
+            "grips": len(self.bench.scheduled),
+            "asymmetry": 1,
+            "lags": len(self.lags),
+        }
         widths |= {"walls": 1, "pushes": 1, "places": self.m * len(self.obstacles)}
         widths |= {"filling": 1, "venting": 1, "dead": 1}
-        return {k: slice(p.start + self.n_linear, p.stop + self.n_linear) for k, p in _slices(widths).items()}
+        return {
+            k: slice(p.start + self.n_linear, p.stop + self.n_linear)
+            for k, p in _slices(widths).items()
+        }
 
     @property
     def size(self) -> int:
@@ -238,16 +254,19 @@ class Structure:
             if q or not self.bench.tare:  # coordinates from rest make a constant of their own
                 found.append((Term("springs", q), [self.spring(q, j, -1)]))
             for i in range(j, self.m):
-                found.append((Term("springs", q), sorted({self.spring(q, j, i), self.spring(q, i, j)})))
+                found.append(
+                    (Term("springs", q), sorted({self.spring(q, j, i), self.spring(q, i, j)}))
+                )
         for j in range(self.m):
-            found += [(Term("loads", j), [place]) for place in self.on("loads", j).tolist()]
+            if not self.bench.of_force:
+                found += [(Term("loads", j), [place]) for place in self.on("loads", j).tolist()]
             table = self.on("met", j).reshape(len(self.obstacles), 3 + len(self.bench.scheduled))
             for number, stiffnesses in enumerate(table[:, 2:].tolist()):
                 found += [(Term("obstacle", number), [place]) for place in stiffnesses]
         for kind in OF_MUSCLES:
             places = [self.of(kind, k).tolist() for k in range(self.n)]
             for which, same in enumerate(zip(*places, strict=True)):
-                if kind != "areas" or which:
+                if kind != "areas" or which or self.bench.of_force:
                     found.append((Term(kind, which), list(same)))
                 found += [(Term(kind, which, k), [same[k]]) for k in range(1, self.n)]
         return found
@@ -270,9 +289,11 @@ class Structure:
 
     @cached_property
     def base(self) -> Array:
-        """Linear coefficients where nothing is free: areas at rest 1, all others 0."""
+        """Linear coefficients where nothing is free: areas at rest or the load 1, all others 0."""
         values = np.zeros(self.n_linear)
-        for k in range(self.n):
+        if self.bench.of_force:
+            values[self.on("loads", 0)] = 1.0
+        for k in range(0 if self.bench.of_force else self.n):
             values[self.of("areas", k)[0]] = 1.0
         return values
 
@@ -319,13 +340,15 @@ class Structure:
         by = {"friction": self.limits, "relaxation": self.lags, "lags": self.lags}
         by |= {"obstacle": self.obstacles, "places": self.m * self.obstacles}
         return [
-            (kind, by[kind][which] if kind in by else which, muscle) for kind, which, muscle in self.terms
+            (kind, by[kind][which] if kind in by else which, muscle)
+            for kind, which, muscle in self.terms
         ]
 
     def scales(self) -> Array:
         """Return how much is much of everything that may be free, beside an area at rest of 1."""
         bench = self.bench
-        force, stiff = bench.highest, bench.highest / bench.scale
+        force = bench.highest * bench.unit
+        stiff = force / bench.scale
         linear = np.full(self.n_linear, stiff)
         x = np.abs(bench.levels).max(axis=1) if len(bench.levels) else np.zeros(0)
         powers = 1.0 / self.powers(np.where(x > 0, x, 1.0))
@@ -334,7 +357,7 @@ class Structure:
             linear[self.on("loads", j)] = force / bench.heaviest
         for k in range(self.n):
             linear[self.of("elasticity", k)] = force
-            linear[self.of("areas", k)] = 1.0
+            linear[self.of("areas", k)] = bench.unit
         return np.append(self.mix.T @ linear / self.mix.sum(axis=0), self.ends()[2])
 
     def ends(self) -> tuple[Array, Array, Array]:
@@ -350,7 +373,7 @@ class Structure:
             "asymmetry": (-ratio, ratio, 1.0),
             "lags": (shortest, longest, 1.0),
             "walls": (0.0, MOST_WALL * much, 0.2 * MOST_WALL * much),
-            "pushes": (0.0, 1.1 * NEVER, bench.highest),
+            "pushes": (0.0, 1.1 * NEVER, bench.highest * bench.unit),
             "places": (-np.inf, np.inf, 0.2 * bench.travel.repeat(len(self.obstacles))),
             "filling": (0.0, LONGEST_AIR, max(4.0 * bench.step, 1e-9)),
             "venting": (-ratio, ratio, 1.0),
@@ -437,7 +460,9 @@ class Structure:
         def highest(kind: str, least: int) -> int:
             return 1 + max((which for name, which in kept if name == kind), default=least - 1)
 
-        squares = any(("springs", q) in kept for q in range(2, 1 + len(self.bench.scheduled) * 2, 2))
+        squares = any(
+            ("springs", q) in kept for q in range(2, 1 + len(self.bench.scheduled) * 2, 2)
+        )
         return replace(
             self,
             n_elastic=highest("elasticity", 0),
@@ -452,8 +477,8 @@ class Structure:
 
     @property
     def least_stiffness(self) -> float:
-        """Least stiffness that has to be left [bar on an area at rest of 1 by mm]."""
-        return LEAST_STIFF * self.bench.highest / self.bench.scale
+        """Least stiffness that has to be left."""
+        return LEAST_STIFF * self.bench.unit * self.bench.highest / self.bench.scale
 
     def conditions(self, values: Array) -> tuple[Array, Array]:
         """Return what physics asks of linear coefficients: sides @ coefficients >= least.
@@ -475,7 +500,7 @@ class Structure:
         for k in range(self.n):
             areas, friction = self.of("areas", k).tolist(), self.of("friction", k).tolist()
             elastic, bladder = self.of("elasticity", k).tolist(), int(self.of("bladder", k)[0])
-            ask({areas[0]: 1.0}, 0.1)
+            ask({areas[0]: 1.0}, 0.1 * self.bench.unit)
             order, power = np.arange(1, self.n_area), np.arange(2, 2 + self.n_elastic)
             for u in np.linspace(*self.bench.hull[k], GRID) / self.bench.scale:
                 left = dict(zip(areas, (u ** np.arange(self.n_area)).tolist(), strict=True))

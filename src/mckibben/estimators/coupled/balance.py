@@ -48,14 +48,14 @@ PRESSURES = ("bar", "V", "")
 LIMITED = ("bar", "V")
 """Units of what the hardware limits."""
 
-FEW, MOST = 6_000, 12_000
-"""Errors that are looked at to find terms, and in the end."""
+FEW, MOST, MOST_SAMPLES = 6_000, 12_000, 60_000
+"""Errors that are looked at to find terms, and in the end; samples that are run through then."""
 
 GRIPS = (0.05, 0.3, 1.0, 4.0)
 """Pressures below zero at which friction holds nothing, relative to the highest, to begin from."""
 
-ROUNDS, STEPS_BETWEEN = 5, 4
-"""Times that terms are added, and steps before each."""
+ROUNDS, STEPS_BETWEEN, LAST_STEPS = 6, 8, 8
+"""Times that terms are added, and steps before each; those on all samples in the end."""
 
 FIRM = 0.7
 """Of the most that muscles resist with, share at which they go slack at first."""
@@ -68,7 +68,7 @@ PLACES = (0.5, 0.65, 0.8, 0.9, 0.97)
 
 TERMS = (
     *("elasticity", "areas", "friction", "relaxation", "line", "mass", "obstacle", "springs"),
-    *("grips", "asymmetry", "walls", "filling", "venting", "dead", "muscles", "slack"),
+    *("grips", "asymmetry", "walls", "filling", "venting", "dead", "contact", "muscles", "slack"),
 )
 """Kinds of terms that may be added."""
 
@@ -84,8 +84,8 @@ class BalanceEstimator(CoupledEstimator):
         of ``elasticity`` and ``areas``, more stops (``friction``) and lags (``relaxation``), the ``line``,
         ``mass``, an ``obstacle`` either way, springs by squares of what schedules (``springs``), friction
         that grows with what schedules (``grips``) or differs by direction (``asymmetry``), stretch of the
-        wall (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, ``muscles`` that
-        differ, and that go ``slack``. Each is added if the error of what is left out falls by more than
+        wall (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, or one that fades
+        (``contact``), ``muscles`` that differ, and that go ``slack``. Each is added if the error of what is left out falls by more than
         its standard error. Default all.
     n_stops : int
         Stops that may be, from which it begins with every other.
@@ -320,15 +320,20 @@ class BalanceEstimator(CoupledEstimator):
             tracker.saw(z, starts[-1][0])
         z = min(starts, key=lambda start: start[0])[1]
         tried = np.array([self._tried(term) for term in structure.terms])
+        pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
         for number in range(ROUNDS if belief is None else 1):
             self._search, self._z = search, z = (
                 search,
                 search.descend(
                     z,
                     min(self.steps, STEPS_BETWEEN),
-                    tracker.part(0.1 * number, 0.1 * (number + 1)),
+                    tracker.part(0.04 * number, 0.04 * (number + 1)),
                 ),
             )
+            if number == 0 and not few.all_at_rest:
+                search, z = self._long_held(search, z)
+            if number == 0 and self.may("slack") and pushed:
+                search, z = self._slack(search, z)
             active, z = search.chosen(z, tried)
             if belief is not None or (active == search.active).all() or number == ROUNDS - 1:
                 break
@@ -342,18 +347,28 @@ class BalanceEstimator(CoupledEstimator):
         ]
         self.terms_ = tuple(dict.fromkeys(t.kind if t.muscle is None else "muscles" for t in added))
         search, z = self._needed(search, z)
-        if self.may("slack") and (structure.n > 1 or any(held(data, run) for run in data.runs)):
-            search, z = self._slack(search, z)
         if structure.n == 1 and self.unknown_load is None:
             search, z = self._own_loads(search, z, data)
-        whole = compared(data, MOST, of_force=self.of_force)
+        z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
+        whole = compared(coarser(data, MOST_SAMPLES), MOST, of_force=self.of_force)
         search = replace(search, problem=whole)
         for _ in range(1 if belief is None else REFINED):
             if belief is not None:
                 noise = noise_of(whole.errors(search.structure, z)[0][: len(whole.runs)])
                 search = replace(search, belief=replace(belief, noise=noise))
-            z = search.descend(z, self.steps, tracker.part(0.6, 0.9))
+            z = search.descend(z, min(self.steps, LAST_STEPS), tracker.part(0.7, 0.9))
         return search, z
+
+    def _long_held(self, search: Search, z: Array) -> tuple[Search, Array]:
+        """Return the search in which muscles had long been where runs begin, if that explains these.
+
+        Their first parts count then, which they do not where what came before is unknown.
+        """
+        settled = replace(search, structure=replace(search.structure, settled=True))
+        found = settled.descend(z, STEPS_BETWEEN, Tracker())
+        whole = replace(search, problem=replace(search.problem, whole=True))
+        most = min(EXPLAINED * search.cost(z), (1.0 - OWN_HELPS) * whole.cost(z))
+        return (settled, found) if settled.cost(found) < most else (search, z)
 
     def _likely(self, search: Search) -> tuple[float, Array]:
         """Return what is likely before, under the constant force the recordings ask, and its cost."""
@@ -390,7 +405,8 @@ class BalanceEstimator(CoupledEstimator):
 
     def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
         """Return the search in which muscles go slack, if that lessens errors; else the same."""
-        structure, place = search.structure, list(search.structure.terms).index(Term("pushes"))
+        structure = search.structure
+        place = [i for i, term in enumerate(structure.terms) if term.kind == "pushes"]
         active = search.active.copy()
         active[place] = True
         slack, started = replace(search, active=active), z.copy()
@@ -430,7 +446,10 @@ FIRST_GRIP, TOWARDS, REFINED = 0.1, 60, 3
 the noise of recordings is found anew."""
 
 OWN_HELPS = 0.1
-"""By how much loads of recordings' own have to lessen errors."""
+"""By how much what recordings have of their own, or how they begin, has to lessen errors."""
+
+EXPLAINED = 1.5
+"""Times the error of all but first parts up to which that of all explains how runs begin."""
 
 
 def in_newtons(balance: Balance) -> Balance:
@@ -449,7 +468,7 @@ def in_newtons(balance: Balance) -> Balance:
     obstacles[:, 2:] /= share
     return replace(
         balance,
-        obstacles=rows(obstacles.reshape(len(balance.obstacles), -1)),
+        obstacles=rows(obstacles.reshape(np.shape(balance.obstacles))),
         **{name: rows(scaled(getattr(balance, name))) for name in tables},
         **{
             name: vector(scaled(getattr(balance, name)))

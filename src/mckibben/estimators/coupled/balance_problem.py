@@ -28,12 +28,18 @@ from mckibben.blocks.coupled.balance_law import (
 )
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel, rows
-from mckibben.blocks.memoryless import PiecewiseLinear
+from mckibben.blocks.memoryless import Contact, PiecewiseLinear
 from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.coupled.constrained import constrained_least_squares
+
+EXACT, OF_AIR = (
+    ("grip", "grips", "asymmetry", "lags", "places"),
+    ("filling", "venting", "dead", "contact"),
+)
+"""Shape of which slopes are exact, in the order that `balance_slopes` has them; and that in front."""
 
 WARMING = 0.2
 """Share of a run that does not begin at rest before which its errors do not count."""
@@ -51,7 +57,7 @@ FILLS = 0.02
 """Share of a pressure that acts within the dead zone: an inverse needs some."""
 
 STRAIGHT = 0.01
-"""What pressures may be off a straight line, relative to the highest."""
+"""What inputs may be off a straight line, relative to their ranges."""
 
 RIDGE = 1e-7
 """Damping of least squares, relative to every coefficient's own effect."""
@@ -78,8 +84,9 @@ def at_rest(data: TrainingData, run: Run) -> bool:
 
 def front(structure: Structure, values: Array, channel: Channel) -> list[Block]:
     """Return what acts between a measured pressure and a muscle: air's lag, then the dead zone."""
-    filling, ratio, dead = (
-        float(structure.shaped(values, name)[0]) for name in ("filling", "venting", "dead")
+    filling, ratio, dead, contact = (
+        float(structure.shaped(values, name)[0])
+        for name in ("filling", "venting", "dead", "contact")
     )
     blocks: list[Block] = []
     if filling > 0.0:
@@ -88,6 +95,8 @@ def front(structure: Structure, values: Array, channel: Channel) -> list[Block]:
     if dead > 0.0:
         knots, acting = (0.0, dead, 2.0 * dead), (0.0, FILLS * dead, (1.0 + FILLS) * dead)
         blocks.append(PiecewiseLinear(knots, acting, channel, channel))
+    if contact > 0.0:
+        blocks.append(Contact(contact, channel, channel))
     return blocks
 
 
@@ -105,12 +114,15 @@ class Problem:
         Whether the starts of runs that do not begin at rest are found.
     of_force : bool
         Whether forces count in all runs.
+    whole : bool
+        Whether all samples count, whatever is known of the start.
     """
 
     data: TrainingData
     every: int = 1
     starts: bool = False
     of_force: bool = False
+    whole: bool = False
     _fronts: dict[tuple[object, ...], Array] = field(default_factory=dict, repr=False)
 
     @property
@@ -129,7 +141,7 @@ class Problem:
         Of a run that begins in an unknown state, that is not found, the first part does not.
         """
         places = self.places(run)
-        still = held(self.data, run) or structure.settled or self.starts
+        still = held(self.data, run) or structure.settled or self.starts or self.whole
         known = still or at_rest(self.data, run)
         return run.counts[places] & (
             np.arange(places.size) >= (0.0 if known else WARMING) * places.size
@@ -147,7 +159,7 @@ class Problem:
     def acting(self, run: Run, structure: Structure, values: Array) -> Array:
         """Return the pressures that act on muscles, shape (n, muscles)."""
         shape = tuple(values[structure.shape["filling"].start :].tolist())
-        if not (shape[0] or shape[2]):
+        if not (shape[0] or shape[2] or shape[3]):
             return run.driven
         key = (run.place, *shape)
         if key not in self._fronts:
@@ -202,9 +214,20 @@ class Problem:
     # -- following -------------------------------------------------------------------------------
 
     def followed(
-        self, structure: Structure, z: Array, run: Run, *, held: bool, sloped: bool = True
+        self,
+        structure: Structure,
+        z: Array,
+        run: Run,
+        *,
+        held: bool,
+        sloped: bool = True,
+        by_air: Array | None = None,
     ) -> tuple[Array, Array]:
-        """Return coordinates of a run, or forces that are lacking, and slopes by linear coefficients."""
+        """Return coordinates of a run, or forces that are lacking, and their slopes.
+
+        Slopes are by linear coefficients and shape as `balance_slopes` has it. ``by_air`` are those of
+        acting pressures, shape (t, muscles, f).
+        """
         values = structure.expanded(z[: len(structure.terms)])
         driven = self.acting(run, structure, values)
         c = structure.coefficients(values, run.sample_time or 1.0)
@@ -212,22 +235,27 @@ class Problem:
             c[coordinate_at(c, j)] += load
         begun = None if held else self.begun(structure, z, c, run, driven[0])
         return follow(
-            c, driven, run.outputs, run.scheduled,
+            c, driven, run.outputs, run.scheduled, by_air,
             held=held, every=self.every, sloped=sloped, begun=begun,
         )  # fmt: skip
 
     def errors_of(
-        self, structure: Structure, z: Array, run: Run, *, sloped: bool
+        self,
+        structure: Structure,
+        z: Array,
+        run: Run,
+        *,
+        sloped: bool,
+        by_air: Array | None = None,
     ) -> tuple[Array, Array]:
-        """Return the errors over a run relative to ranges, (k, m), and slopes by linear coefficients.
+        """Return the errors over a run relative to ranges, (k, m), and their slopes.
 
         Of a run in which nothing moves, they are the forces that are lacking, over that of the highest
         pressure at rest.
         """
         still = self.still(run)
-        found, slopes = self.followed(structure, z, run, held=still, sloped=sloped)
-        counts = self.counting(run, structure)[:, np.newaxis]
-        bench = structure.bench
+        found, slopes = self.followed(structure, z, run, held=still, sloped=sloped, by_air=by_air)
+        counts, bench = self.counting(run, structure)[:, np.newaxis], structure.bench
         scale = counts / (bench.highest * bench.unit if still else bench.travel)
         errors = (found if still else found - self.compared(run)) * scale
         return errors, slopes * scale[..., np.newaxis]
@@ -241,49 +269,87 @@ class Problem:
     ) -> tuple[list[Array], Array]:
         """Return the errors of every run, and their slopes by all that is found, shape (errors, found).
 
-        Those by shape, of what is ``wanted`` of it, and by starts are differences, of shape that is
-        ``new`` over as much as is much; none at all are computed unless some are wanted. Starts that are unlikely are errors, too, after those of runs.
+        None are computed unless some are ``wanted``. Those by what acts on pressures are differences
+        before the muscles, by what is ``new`` of it over as much as is much; those by walls, pushes and
+        starts are differences behind them. Starts that are unlikely are errors, too, after those of runs.
         """
-        own = [self.errors_of(structure, z, run, sloped=wanted is not None) for run in self.runs]
-        errors = [one.ravel() for one, _ in own]
-        size, n = self.size(structure), structure.mix.shape[1]
-        slopes = []
-        far = np.zeros(size, dtype=bool)
-        far[: len(structure.terms)] = False if new is None else new
-        for run, (before, by) in zip(self.runs, own if wanted is not None else (), strict=False):
-            whole = np.zeros((before.size, size))
+        if wanted is None:
+            errors = [
+                self.errors_of(structure, z, run, sloped=False)[0].ravel() for run in self.runs
+            ]
+            return [*errors, *self._unlikely(structure, z)[:1]], np.zeros((0, z.size))
+        errors, slopes = [], []
+        n, terms = structure.mix.shape[1], structure.terms
+        asked = {
+            kind: wanted[n + p.start - structure.n_linear]
+            for kind, p in structure.shape.items()
+            if p.stop > p.start
+        }
+        air = [kind for kind in OF_AIR if asked[kind]]
+        exact = [place for place in range(n, len(terms)) if terms[place].kind in EXACT]
+        for run in self.runs:
+            by_air = self._by_air(structure, z, run, air, new)
+            before, by = self.errors_of(structure, z, run, sloped=True, by_air=by_air)
             by = by.reshape(before.size, -1)
-            whole[:, :n] = by @ structure.mix
+            whole = np.zeros((before.size, z.size))
+            whole[:, :n] = by[:, : structure.n_linear] @ structure.mix
+            whole[:, exact] = by[:, structure.n_linear : structure.n_linear + len(exact)]
+            for number, kind in enumerate(air):
+                whole[:, n + structure.shape[kind].start - structure.n_linear] = by[
+                    :, number - len(air)
+                ]
             loads = self.loads_at(structure, run)
-            constants = [structure.spring(0, j, -1) for j in range(loads.stop - loads.start)]
-            whole[:, loads] = by[:, constants]
+            whole[:, loads] = by[
+                :, [structure.spring(0, j, -1) for j in range(loads.stop - loads.start)]
+            ]
             start = self.start_at(structure, run)
-            assert wanted is not None
-            changed = [*np.flatnonzero(wanted[n : len(structure.terms)]) + n]
+            changed = [p for p in np.flatnonzero(wanted) if terms[p].kind in ("walls", "pushes")]
             for place in (*changed, *range(start.start, start.stop)):
                 moved = z.copy()
-                moved[place] += (step := self._step(structure, z, place, far[place]))
+                moved[place] += (step := self._step(structure, z, place, STEP))
                 after = self.errors_of(structure, moved, run, sloped=False)[0]
                 whole[:, place] = ((after - before) / step).ravel()
+            errors.append(before.ravel())
             slopes.append(whole)
         if self.starts:
-            first = len(structure.terms) + len(structure.bench.unmeasured) * structure.m
-            scale = np.full((size - first) // (1 + len(structure.lags)), UNLIKELY)
-            scale = np.repeat(scale[:, np.newaxis], 1 + len(structure.lags), axis=1)
-            scale[:, 1:] /= float(structure.bench.travel.mean())
-            errors.append(scale.ravel() * z[first:])
-            whole = np.zeros((size - first, size))
-            whole[:, first:] = np.diag(scale.ravel())
-            slopes.append(whole)
-        return errors, np.concatenate(slopes) if wanted is not None else np.zeros((0, size))
+            far, by = self._unlikely(structure, z)
+            errors, slopes = [*errors, far], [*slopes, by]
+        return errors, np.concatenate(slopes) if slopes else np.zeros((0, z.size))
 
-    def _step(self, structure: Structure, z: Array, place: int, far: bool) -> float:
-        """Return a change of a number by which slopes are found, small or not, away from its end."""
+    def _by_air(
+        self, structure: Structure, z: Array, run: Run, kinds: list[str], new: Mask | None
+    ) -> Array:
+        """Return how acting pressures move with what acts on them, shape (t, muscles, kinds)."""
+        n, found = len(structure.terms), []
+        for kind in kinds:
+            place = structure.mix.shape[1] + structure.shape[kind].start - structure.n_linear
+            far = FIRST_STEP if new is not None and new[place] else STEP
+            moved = z.copy()
+            moved[place] += (step := self._step(structure, z, place, far))
+            acting = (
+                self.acting(run, structure, structure.expanded(one[:n])) for one in (moved, z)
+            )
+            found.append(np.subtract(*acting) / step)
+        shape = (*run.driven.shape, len(kinds))
+        return np.stack(found, axis=2) if found else np.zeros(shape)
+
+    def _unlikely(self, structure: Structure, z: Array) -> tuple[Array, Array]:
+        """Return how unlikely the starts of runs are, as errors, and the slopes."""
+        width = 1 + len(structure.lags)
+        first = len(structure.terms) + len(structure.bench.unmeasured) * structure.m
+        scale = np.full(((z.size - first) // width, width), UNLIKELY)
+        scale[:, 1:] /= float(structure.bench.travel.mean())
+        slopes = np.zeros((scale.size, z.size))
+        slopes[:, z.size - scale.size :] = np.diag(scale.ravel())
+        return scale.ravel() * z[z.size - scale.size :], slopes
+
+    def _step(self, structure: Structure, z: Array, place: int, share: float) -> float:
+        """Return a change of a number by which slopes are found, away from where it ends."""
         n = structure.mix.shape[1]
         if place >= len(structure.terms):
             return STEP
         _, high, much = (end[place - n] for end in structure.ends())
-        step = float(much) * (FIRST_STEP if far else STEP)
+        step = share * float(much)
         return step if z[place] + step <= high else -step
 
     @property
@@ -374,6 +440,7 @@ class Problem:
         start[:n] = 0.0
         for run in self.runs:
             lacking, slopes = self.followed(structure, start, run, held=True)
+            slopes = slopes[..., : structure.n_linear]
             loads = self.loads_at(structure, run)
             own = np.zeros((*lacking.shape, self.size(structure) - len(terms)))
             for j in range(loads.stop - loads.start):
@@ -487,17 +554,25 @@ def compared(data: TrainingData, most: int, *, of_force: bool = False) -> Proble
 
 
 def coarser(data: TrainingData, most: int) -> TrainingData:
-    """Return data of about so many samples at most: thinned where inputs go straight between them."""
+    """Return data of about so many samples at most.
+
+    Runs are thinned where inputs go straight between samples, and then chosen evenly.
+    """
     total = sum(len(run.outputs) for run in data.runs)
     every = max(1, -(-total // most))
     while every > 1 and not _straight(data, every):
         every -= 1
-    return replace(data, runs=tuple(run.thinned(every) for run in data.runs))
+    count = max(min(len(data.runs) * most * every // total, len(data.runs)), 1)
+    chosen = np.unique(np.linspace(0, len(data.runs) - 1, count).round().astype(int))
+    return replace(data, runs=tuple(data.runs[i].thinned(every) for i in chosen))
 
 
 def _straight(data: TrainingData, every: int) -> bool:
     missed = []
+    whole = np.hstack([data.stacked("driven"), data.stacked("scheduled")])
+    spans = np.maximum(np.ptp(whole, axis=0), 1e-300)
     for run in data.runs:
         t = np.arange(len(run.driven))
-        missed += [np.interp(t, t[::every], p[::every]) - p for p in run.driven.T]
-    return float(np.std(np.concatenate(missed))) <= STRAIGHT * float(data.highest.max())
+        inputs = np.hstack([run.driven, run.scheduled]) / spans
+        missed += [np.interp(t, t[::every], u[::every]) - u for u in inputs.T]
+    return float(np.std(np.concatenate(missed))) <= STRAIGHT

@@ -10,7 +10,7 @@ least, within what physics asks.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from mckibben.estimators.optimisers.tracker import Tracker
 BLOCKS, FOLDS = 20, 5
 """About how many blocks all runs are cut into, and in how many parts they are left out in turn."""
 
-MOST_ADDED = 12
+MOST_ADDED = 40
 """Groups of terms that are added before the free run is made straight anew."""
 
 MOST_TRIES = 7
@@ -51,10 +51,10 @@ SLOW, SLOWEST = 1e-3, 2
 DEVIATIONS = (("areas",), ("elasticity", "bladder"), ("friction",), ("relaxation", "damping"))
 """Kinds by which muscles may differ, together."""
 
-NEW_SHAPE = ("asymmetry", "grips", "walls", "filling", "dead", "venting")
+NEW_SHAPE = ("asymmetry", "grips", "walls", "filling", "dead", "contact", "venting")
 """Shape that is added by itself."""
 
-POSITIVE_SHAPE = ("grip", "grips", "walls", "filling", "dead")
+POSITIVE_SHAPE = ("grip", "grips", "walls", "filling", "dead", "contact")
 """Shape that is not negative."""
 
 
@@ -214,7 +214,7 @@ class Search:
         best = missed(active)
         for _ in range(MOST_ADDED):
             options = [
-                active | more for more in self._candidates(active) if not (more & ~tried).any()
+                active | more for more in self._candidates(active, z) if not (more & ~tried).any()
             ]
             errors = [missed(option) for option in options]
             first = int(np.argmin([one.sum() for one in errors])) if errors else 0
@@ -232,6 +232,7 @@ class Search:
             solution[shape], np.maximum(low, z[shape] - much), np.minimum(high, z[shape] + much)
         )
         found[shape] = np.where((active & new)[shape], near, z[shape])
+        chosen = replace(self, active=active)
         return active, found
 
     def improved(self, z: Array, other: Search, found: Array, by: float = 0.0) -> bool:
@@ -287,7 +288,7 @@ class Search:
             found.append(moved)
         return found
 
-    def _candidates(self, active: Mask) -> Iterator[Mask]:
+    def _candidates(self, active: Mask, z: Array) -> Iterator[Mask]:
         """Yield groups of terms that may be added to those that are active."""
         terms = self.structure.terms
 
@@ -304,15 +305,13 @@ class Search:
             for more in range(1, 3):
                 whole = range(following, following + more)
                 yield group(*self._with_own(kind, whole, own))
-        for kind in ("friction", "relaxation", "line", "mass"):
-            for which in {term.which for term in terms if term.kind == kind} - {
-                w for k, w in on if k == kind
-            }:
-                yield group(Term("lags", which), *self._with_own(kind, (which,), own)) & ~(
-                    group(Term("lags", which))
-                    if kind != "relaxation"
-                    else np.zeros(len(terms), dtype=bool)
-                )
+        for kind, which, muscle in terms:
+            if kind not in ("friction", "relaxation", "line", "mass") or muscle is not None:
+                continue
+            if (kind, which) in on or (kind == "relaxation" and not self._apart(which, active, z)):
+                continue
+            lag = [Term("lags", which)] * (kind == "relaxation")
+            yield group(*lag, *self._with_own(kind, (which,), own))
         met = {self.structure.obstacles[which][0] for kind, which in on if kind == "obstacle"}
         for which, (side, _) in enumerate(self.structure.obstacles):
             if side not in met:
@@ -326,14 +325,35 @@ class Search:
         for which in range(len(self.structure.bench.scheduled)):
             if ("grips", which) not in on:
                 yield group(Term("grips", which))
-        for kind in ("asymmetry", "walls", "filling", "dead", "venting"):
-            if (kind, 0) not in on and (kind != "venting" or ("filling", 0) in on):
+        ruled_out = {"grips", *(() if ("filling", 0) in on else ("venting",))}
+        if {("dead", 0), ("contact", 0)} & on:
+            ruled_out |= {"dead", "contact"}
+        for kind in NEW_SHAPE:
+            if (kind, 0) not in on and kind not in ruled_out:
                 yield group(Term(kind))
         for kinds in DEVIATIONS if self.structure.n > 1 else ():
             if not own & set(kinds):
                 whiches = [(kind, which) for kind, which in on if kind in kinds]
                 whiches += [("areas", 0)] if "areas" in kinds else []
                 yield group(*(Term(*one, k) for one in whiches for k in range(1, self.structure.n)))
+
+    def _apart(self, which: int, active: Mask, z: Array) -> bool:
+        """Tell whether a time constant is apart from those that are free, and in order with them."""
+        known = {
+            term.which: z[place]
+            for place, term in enumerate(self.structure.terms)
+            if term.kind == "lags"
+        }
+        free = (
+            t.which
+            for t, on in zip(self.structure.terms, active, strict=True)
+            if on and t.kind == "lags"
+        )
+        return all(
+            (known[other] - known[which]) * (other - which) > 0.0
+            and abs(known[other] - known[which]) > APART
+            for other in free
+        )
 
     def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
         """Return terms of a kind, and those by which muscles differ if they do."""

@@ -1,11 +1,17 @@
-"""How a balance of forces runs, and how that moves with its linear coefficients, exactly.
+"""How a balance of forces runs, and how that moves with its coefficients and shape, exactly.
 
 Either free, where its coordinates are what matters, or held where they were measured, where the forces
 that it then lacks are: those are linear, and memory does not depend on coefficients. The direct slopes
 are the terms of `mckibben.blocks.coupled.balance_law`; what moves them through the past is carried along.
+
+Columns of slopes are the coefficients from those of the first coordinate on, then the shape: the grip,
+what schedules friction, the logarithms of the ratio of limits and of lags, places of obstacles, and what
+changes the pressures that act, whose slopes are given.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -17,6 +23,7 @@ from mckibben.blocks.coupled.balance_law import (
     HEAD,
     IN_TIME,
     OWN,
+    area,
     coordinate_at,
     friction_pressure,
     muscle_at,
@@ -39,8 +46,14 @@ def mix(to: Array, kept: float, share: float, row: Array) -> None:
 
 
 @kernel
-def by_coupling(c: Array, j: int, q: Array, x: Array, slopes: Array) -> None:
-    """Fill how the force on coordinate j moves with its own coefficients."""
+def n_shape(c: Array) -> int:
+    """Return how many columns of slopes are shape, before those of what acts on pressures."""
+    return 2 + int(c[2]) + int(c[6]) + int(c[1]) * int(c[9])
+
+
+@kernel
+def by_coupling(c: Array, j: int, q: Array, x: Array, places: int, slopes: Array) -> None:
+    """Fill how the force on coordinate j moves with its own coefficients, and places of obstacles."""
     m, n_x, degree, n_loads = int(c[1]), int(c[2]), int(c[3]), int(c[4])
     place = coordinate_at(c, j) - coordinate_at(c, 0)
     mix(slopes, 0.0, 0.0, slopes)
@@ -55,14 +68,81 @@ def by_coupling(c: Array, j: int, q: Array, x: Array, slopes: Array) -> None:
     for i in range(n_loads):
         slopes[place + i] = x[n_x + i]
     place += n_loads
-    for _ in range(int(c[9])):
+    for number in range(int(c[9])):
         at = coordinate_at(c, 0) + place
         beyond = q[j] - c[at + 1]
         if c[at] * beyond > 0.0:
             slopes[place + 2] = beyond
+            stiffness = c[at + 2]
             for s in range(n_x):
                 slopes[place + 3 + s] = x[s] * beyond
+                stiffness += c[at + 3 + s] * x[s]
+            slopes[places + j * int(c[9]) + number] = -stiffness
         place += 3 + n_x
+
+
+@kernel
+def by_limit(
+    c: Array, k: int, i: int, s: float, p: float, x: Array, dp: Array, share: float, to: Array
+) -> None:
+    """Add a share of how stop i of muscle k moves with shape where it slides, from column 0 of it on."""
+    n_x = int(c[2])
+    upper = c[HEAD + i]
+    if s < 0.0:
+        upper *= -c[12]
+        to[1 + n_x] += share * s
+    if not friction_pressure(c, p, x) > 0.0:
+        return
+    to[0] += share * upper
+    for j in range(n_x):
+        to[1 + j] += share * upper * x[j]
+    for f in range(dp.size):
+        to[to.size - dp.size + f] += share * upper * dp[f]
+
+
+@kernel
+def by_shape(
+    c: Array,
+    k: int,
+    state: Array,
+    way: int,
+    y: float,
+    p: float,
+    x: Array,
+    dp: Array,
+    terms: Array,
+    slopes: Array,
+    late: Array,
+    to: Array,
+) -> None:
+    """Add how the force of a taut muscle moves with shape where its past stays, and fill that of lags.
+
+    ``terms`` and ``slopes`` are its own; ``to`` begins with the shape; ``late`` has a number a lag.
+    """
+    n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
+    place, first = muscle_at(c, k) + OWN + m, n_terms(c) - n_l - n_s
+    taut = slopes[3] != 0.0
+    moved = y - shortening(c, k, state)
+    for i in range(n_l):
+        late[i] = 0.0
+        if way == IN_TIME:
+            decay, gain = c[HEAD + n_s + i], c[HEAD + n_s + n_l + i]
+            past = state[m + n + n * n_s + k * n_l + i]
+            late[i] = -decay * math.log(decay) * past + (gain - decay) * moved
+            if taut:
+                to[2 + int(c[2]) + i] += c[place + first + n_s + i] * late[i]
+    if not taut:
+        return
+    a, wall = area(c, k, y)[0], c[muscle_at(c, k) + 2]
+    for f in range(dp.size):
+        to[to.size - dp.size + f] -= a * dp[f]
+    for i in range(n_s if way != AT_REST else 0):
+        h = c[place + first + i]
+        if slopes[first + i] == 0.0:
+            by_limit(c, k, i, terms[first + i], p, x, dp, h, to)
+        else:
+            for f in range(dp.size):
+                to[to.size - dp.size + f] += h * wall * dp[f]
 
 
 @kernel
@@ -100,6 +180,8 @@ def carry(
     way: int,
     p: float,
     x: Array,
+    dp: Array,
+    late: Array,
     past: Array,
     moved: Array,
     now: Array,
@@ -110,7 +192,12 @@ def carry(
     for i in range(n_s):
         s, upper = state[m + n + k * n_s + i], c[HEAD + i] * grown
         if not -c[12] * upper < s < upper:
-            mix(past[m + k * n_s + i], 0.0, -1.0, now)
+            row = m + k * n_s + i
+            mix(past[row], 0.0, -1.0, now)
+            for f in range(dp.size):
+                past[row, now.size - dp.size + f] -= c[muscle_at(c, k) + 2] * dp[f]
+            if way != AT_REST:
+                by_limit(c, k, i, s, p, x, dp, 1.0, past[row, now.size - n_shape(c) - dp.size :])
     for i in range(n_l):
         row = m + n * n_s + k * n_l + i
         gain = c[HEAD + n_s + n_l + i] if way == IN_TIME else c[17]
@@ -118,6 +205,7 @@ def carry(
         if way != AT_REST:
             mix(past[row], 1.0, gain, now)
             mix(past[row], 1.0, -gain, moved)
+            past[row, now.size - n_shape(c) - dp.size + 2 + int(c[2]) + i] += late[i]
     if c[18] != 0.0:
         row = m + n * (n_s + n_l) + 2 * k
         mix(past[row + 1], 0.0, 1.0, past[row])
@@ -134,6 +222,7 @@ def move(
     q: Array,
     x: Array,
     p: Array,
+    dp: Array,
     past: Array,
     rows: Array,
     found: Array,
@@ -157,8 +246,11 @@ def move(
     if slopes.shape[1] == 0:
         update_state(c, state, way, q, p, x)
         return
+    shape = slopes.shape[1] - n_shape(c) - dp.shape[1]
+    places = shape + 2 + int(c[2]) + int(c[6])
+    late = rows[2 * n + 2 * m]
     for j in range(m):
-        by_coupling(c, j, q, x, slopes[j])
+        by_coupling(c, j, q, x, places, slopes[j])
     for k in range(n):
         own, moved = muscle_at(c, k) + OWN, rows[k]
         muscle_force(
@@ -174,6 +266,20 @@ def move(
         place = own + m - coordinate_at(c, 0)
         for i in range(width):
             by_force[place + i] = terms[i]
+        by_shape(
+            c,
+            k,
+            state,
+            way,
+            shortening(c, k, q),
+            p[k],
+            x,
+            dp[k],
+            terms[:width],
+            terms[width : 2 * width],
+            late[k * int(c[6]) : (k + 1) * int(c[6])],
+            by_force[shape:],
+        )
         if not held and way != AT_REST:
             through_past(c, k, state, terms[width : 2 * width], past, moved, by_force)
         for j in range(m):
@@ -204,7 +310,8 @@ def move(
             share = c[own + j] if c[20] != 0.0 else 1.0 * (j == k)
             if share != 0.0:
                 mix(now, 1.0, share, past[j])
-        carry(c, k, state, way, p[k], x, past, rows[k], now)
+        own_late = late[k * int(c[6]) : (k + 1) * int(c[6])]
+        carry(c, k, state, way, p[k], x, dp[k], own_late, past, rows[k], now)
 
 
 @kernel
@@ -213,6 +320,7 @@ def follow(
     driven: Array,
     measured: Array,
     x: Array,
+    dp: Array,
     held: bool,
     every: int,
     begun: Array,
@@ -230,6 +338,8 @@ def follow(
         Coefficients of the block.
     driven, measured, x : arrays, shapes (t, n), (t, m), (t, s)
         Pressures, coordinates, what schedules and loads.
+    dp : array, shape (t, n, f)
+        How pressures that act move with what acts on them.
     held : bool
         Whether muscles are where they were measured, at first with nothing loaded.
     every : int
@@ -240,7 +350,7 @@ def follow(
         To compute in.
     found : array, shape (t / every, m)
         Coordinates [mm], or forces that are lacking [N].
-    slopes : array, shape (t / every, m, coefficients from the first of a coordinate on)
+    slopes : array, shape (t / every, m, columns)
         Of no columns if not wanted.
     """
     n, m = int(c[0]), int(c[1])
@@ -267,7 +377,7 @@ def follow(
     if held:
         update_state(c, state, AT_REST, q, p, x[0])
     else:
-        move(c, state, AT_REST, False, q, x[0], p, past, rows, now, slopes[0], work)
+        move(c, state, AT_REST, False, q, x[0], p, dp[0], past, rows, now, slopes[0], work)
         if c[16] != 0.0:
             for j in range(m):
                 tare[j] = q[j]
@@ -275,7 +385,7 @@ def follow(
         if begun.size > 0:
             for k in range(n):
                 p[k] = driven[0, k]
-            move(c, state, AT_REST, False, q, x[0], p, past, rows, now, slopes[0], work)
+            move(c, state, AT_REST, False, q, x[0], p, dp[0], past, rows, now, slopes[0], work)
             for i in range(begun.size):
                 state[m + n + i] = begun[i]
     for t in range(driven.shape[0]):
@@ -285,7 +395,7 @@ def follow(
             q[j] = measured[t, j]
         way = FROM_REST if t == 0 else IN_TIME
         place = t // every
-        move(c, state, way, held, q, x[t], p, past, rows, now, slopes[place], work)
+        move(c, state, way, held, q, x[t], p, dp[t], past, rows, now, slopes[place], work)
         for j in range(m):
             found[place, j] = now[j] - tare[j]
             if not held and c[16] != 0.0:
@@ -297,6 +407,7 @@ def run(
     driven: Array,
     measured: Array,
     x: Array,
+    dp: Array | None = None,
     *,
     held: bool,
     every: int = 1,
@@ -309,13 +420,15 @@ def run(
     n_states = n * (1 + n_s + n_l + moves) + 2 * m + 2
     terms = DYNAMIC + int(c[7] + c[8]) + n_s + n_l
     first = HEAD + n_s + 2 * n_l + int(c[2])
-    n_c = (c.size - first) * sloped
+    dp = np.zeros((len(driven), n, 0)) if dp is None else dp
+    shape = 2 + int(c[2]) + n_l + m * int(c[9]) + dp.shape[2]
+    n_c = (c.size - first + shape) * sloped
     kept = -(-len(driven) // every)
     found, slopes = np.empty((kept, m)), np.zeros((kept, m, n_c))
     past = np.zeros((2 * m + n * (n_s + n_l + moves), n_c))
-    rows = np.zeros((2 * n + 2 * m, max(n_c, m)))
+    rows = np.zeros((2 * n + 2 * m + 1, max(n_c, m, n * n_l)))
     scratch = np.zeros(n_states + 3 * m + 2 * n + 5 * m + m * m + 2 * terms)
     start = np.zeros(0) if begun is None else begun
-    arrays = (np.ascontiguousarray(a) for a in (driven, measured, x))
+    arrays = (np.ascontiguousarray(a) for a in (driven, measured, x, dp))
     follow(c, *arrays, held, every, start, past, rows, scratch, found, slopes)
     return found, slopes

@@ -218,8 +218,8 @@ class Structure:
 
         The grip [bar]; what friction grows with by schedules; the logarithms of the ratio of limits and
         of the lags; stretch of walls [mm/bar], the force at which muscles go slack, places of obstacles;
-        time constants of air in front, while filling [s], the logarithm of the ratio of venting, and the
-        dead zone [bar].
+        time constants of air in front, while filling [s], the logarithm of the ratio of venting, the dead
+        zone [bar], and the pressure over which one fades [bar].
         """
         widths = {
             "grip": 1,
@@ -227,8 +227,8 @@ class Structure:
             "asymmetry": 1,
             "lags": len(self.lags),
         }
-        widths |= {"walls": 1, "pushes": 1, "places": self.m * len(self.obstacles)}
-        widths |= {"filling": 1, "venting": 1, "dead": 1}
+        widths |= {"walls": 1, "pushes": self.n, "places": self.m * len(self.obstacles)}
+        widths |= {"filling": 1, "venting": 1, "dead": 1, "contact": 1}
         return {
             k: slice(p.start + self.n_linear, p.stop + self.n_linear)
             for k, p in _slices(widths).items()
@@ -237,7 +237,7 @@ class Structure:
     @property
     def size(self) -> int:
         """How many values there are."""
-        return self.shape["dead"].stop
+        return self.shape["contact"].stop
 
     def shaped(self, values: Array, name: str) -> Array:
         """Return the numbers of a kind of shape."""
@@ -378,6 +378,7 @@ class Structure:
             "filling": (0.0, LONGEST_AIR, max(4.0 * bench.step, 1e-9)),
             "venting": (-ratio, ratio, 1.0),
             "dead": (0.0, 0.5 * bench.highest, 0.1 * bench.highest),
+            "contact": (0.0, 0.5 * bench.highest, 0.1 * bench.highest),
         }
         low, high, size = np.zeros((3, self.size - self.n_linear))
         for name, place in self.shape.items():
@@ -397,8 +398,9 @@ class Structure:
         of = {name: np.array([values[self.of(name, k)] for k in range(n)]) for name in self._muscle}
         of |= {name: np.maximum(of[name], 0.0) for name in NOT_NEGATIVE}
         springs = np.array([values[self.on("springs", j)] for j in range(m)])
-        bladders, push = of["bladder"][:, 0], float(self.shaped(values, "pushes")[0])
-        merged = final and push >= NEVER and not bench.directed
+        bladders, pushes = of["bladder"][:, 0], self.shaped(values, "pushes")
+        taut = bool((pushes >= NEVER).all())
+        merged = final and taut and not bench.directed
         if merged:
             springs[np.arange(m), 1 + np.arange(m)] += bladders
         grips, ratio = self.shaped(values, "grips"), float(self.shaped(values, "asymmetry")[0])
@@ -416,7 +418,7 @@ class Structure:
             lines=vector(of["line"][:, 0]) if not final or of["line"].any() else (),
             walls=vector(np.full(n, self.shaped(values, "walls")[0])),
             bladders=() if merged else vector(bladders),
-            pushes=vector(np.full(n, push)) if push < NEVER else (),
+            pushes=() if taut else vector(pushes),
             limits=self.limits,
             grip=float(self.shaped(values, "grip")[0]),
             grips=vector(grips) if not final or grips.any() else (),
@@ -431,7 +433,7 @@ class Structure:
             given=bench.given,
             tare=bench.tare,
             settled=self.settled,
-            mass=vector(of["mass"][:, 0]) if heavy and bench.step and push >= NEVER else (),
+            mass=vector(of["mass"][:, 0]) if heavy and bench.step and taut else (),
             directions=rows(bench.directions) if bench.directed else (),
             preload=bench.preload if bench.directed else 0.0,
         )

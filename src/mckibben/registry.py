@@ -37,7 +37,6 @@ PLUGINS: dict[str, dict[str, str]] = {
         "eupi": "mckibben.blocks.hysteresis.eupi:EUPI",
         "exponential": "mckibben.blocks.memoryless:Exponential",
         "feedforward-feedback": "mckibben.blocks.feedback:FeedforwardFeedback",
-        "force-balance": "mckibben.blocks.coupled.force_balance:ForceBalance",
         "force-feedforward": "mckibben.blocks.force.feedforward:ForceFeedforward",
         "fuzzy-network": "mckibben.blocks.coupled.fuzzy_network:FuzzyNetwork",
         "generalized-bouc-wen": ("mckibben.blocks.hysteresis.differential:GeneralizedBoucWen"),
@@ -198,6 +197,7 @@ PLUGINS: dict[str, dict[str, str]] = {
 """Group -> name -> ``"module:attribute"``. Adding a plug-in is one line here."""
 
 REPLACED: dict[str, dict[str, str]] = {
+    "blocks": {"force-balance": "balance", "force-balance-inverse": "balance"},
     "estimators": {"force-balance": "balance", "grey-box": "balance"},
 }
 """Group -> name that is gone -> name of what does its work."""

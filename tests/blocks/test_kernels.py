@@ -15,7 +15,6 @@ from mckibben.blocks.bands import look_along
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_terms import HEAD
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
-from mckibben.blocks.coupled.force_balance import ForceBalance
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
@@ -120,19 +119,6 @@ ALONE = replace(
     lags=(),
 )
 """A balance of one muscle under a load."""
-
-
-def test_a_force_balance_is_clipped_and_warns_without_an_equilibrium() -> None:
-    block = ForceBalance.example()
-    inputs = path([0.0, 0.0, 0.0], [30.0, 30.0, 2.0])
-    free = block.simulate(inputs)
-    low, high = (float(q) for q in np.quantile(free, [0.2, 0.8]))
-    with pytest.warns(ModelWarning):
-        limited = replace(block, pressure_range=(low, high)).simulate(inputs)
-    np.testing.assert_array_equal(limited, free.clip(low, high))
-    pressures = np.array([[0.0, 0.0, 0.0], [500.0, -800.0, 3.0], [-1e4, 1e4, 0.0]])
-    with pytest.warns(ModelWarning):
-        block.inverse().simulate(pressures)
 
 
 @pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid")

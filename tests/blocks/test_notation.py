@@ -15,9 +15,6 @@ from mckibben.report.mathematics import mathml
 
 EXAMPLES = examples()
 
-OLD = {"force-balance", "force-balance-inverse"}
-"""For old files alone: nothing identifies it, and its numbers have no names."""
-
 
 def parts(of: Written) -> Iterator[Written]:
     yield of
@@ -35,7 +32,7 @@ def test_equations_are_there_and_browsers_can_set_them(title: str) -> None:
             assert "\\" not in set_in, line
 
 
-@pytest.mark.parametrize("title", sorted(EXAMPLES.keys() - OLD))
+@pytest.mark.parametrize("title", EXAMPLES)
 def test_every_parameter_has_a_unit_and_a_meaning(title: str) -> None:
     block = EXAMPLES[title]
     found = quantities(block)

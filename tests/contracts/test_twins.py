@@ -23,14 +23,12 @@ TURNS, SEEDS = (4, 1) if UNCOMPILED else (24, 2)
 EXAMPLES = examples()
 WITHOUT_TWIN = {
     "feedforward-feedback",
-    "force-balance",
-    "force-balance-inverse",
     "pi-adaptive",
     "force-feedforward",
     "predictive",
 }
-"""What old files alone hold, a learner and what looks ahead, whose laws are their own, and what is made
-of kernels with twins; golden cases pin their numbers."""
+"""A learner and what looks ahead, whose laws are their own, and what is made of kernels with twins;
+golden cases pin their numbers."""
 
 COMPILED = [
     title

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -63,7 +64,7 @@ FIRM = 0.7
 FINEST, LONGEST = 0.003, 0.5
 """Shortest and longest travels at which stops break away, relative to the stroke."""
 
-PLACES = (0.5, 0.65, 0.8, 0.9, 0.97)
+PLACES = (0.6, 0.8, 0.9, 0.97)
 """Of obstacles on the way up, along the range of what is moved; of those on the way down from its end."""
 
 TERMS = (
@@ -322,14 +323,9 @@ class BalanceEstimator(CoupledEstimator):
         tried = np.array([self._tried(term) for term in structure.terms])
         pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
         for number in range(ROUNDS if belief is None else 1):
-            self._search, self._z = search, z = (
-                search,
-                search.descend(
-                    z,
-                    min(self.steps, STEPS_BETWEEN),
-                    tracker.part(0.04 * number, 0.04 * (number + 1)),
-                ),
-            )
+            self._search, self._z = search, z
+            part = tracker.part(0.08 * number, 0.08 * (number + 1))
+            z = search.descended(z, min(self.steps, STEPS_BETWEEN), part)
             if number == 0 and not few.all_at_rest:
                 search, z = self._long_held(search, z)
             if number == 0 and self.may("slack") and pushed:
@@ -338,15 +334,13 @@ class BalanceEstimator(CoupledEstimator):
             if belief is not None or (active == search.active).all() or number == ROUNDS - 1:
                 break
             search = replace(search, active=active)
-        added = [
-            t
-            for t, now, first in zip(
-                structure.terms, search.active, self._first(structure), strict=True
-            )
-            if now and not first
-        ]
-        self.terms_ = tuple(dict.fromkeys(t.kind if t.muscle is None else "muscles" for t in added))
-        search, z = self._needed(search, z)
+        added = search.active & ~self._first(structure)
+        names = (
+            t.kind if t.muscle is None else "muscles" for t in compress(structure.terms, added)
+        )
+        self.terms_ = tuple(dict.fromkeys(names))
+        search, z = search.narrowed(z)
+        self._search, self._z = search, z
         if structure.n == 1 and self.unknown_load is None:
             search, z = self._own_loads(search, z, data)
         z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
@@ -365,7 +359,7 @@ class BalanceEstimator(CoupledEstimator):
         Their first parts count then, which they do not where what came before is unknown.
         """
         settled = replace(search, structure=replace(search.structure, settled=True))
-        found = settled.descend(z, STEPS_BETWEEN, Tracker())
+        found = settled.descended(z, STEPS_BETWEEN, Tracker())
         whole = replace(search, problem=replace(search.problem, whole=True))
         most = min(EXPLAINED * search.cost(z), (1.0 - OWN_HELPS) * whole.cost(z))
         return (settled, found) if settled.cost(found) < most else (search, z)
@@ -392,17 +386,6 @@ class BalanceEstimator(CoupledEstimator):
         shape = {"lags": "relaxation", "places": "obstacle", "pushes": "none"}
         return self.may(shape.get(term.kind, term.kind)) and term.kind != "pushes"
 
-    def _needed(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search of the terms that are free alone."""
-        structure, n = search.structure, len(search.structure.terms)
-        free = {key for key, there in zip(structure.keys, search.active, strict=True) if there}
-        needed = structure.needed(
-            [t for t, on in zip(structure.terms, search.active, strict=True) if on]
-        )
-        active = np.array([key in free for key in needed.keys])
-        moved = np.append(structure.moved_to(needed, z[:n]), z[n:])
-        return replace(search, structure=needed, active=active), moved
-
     def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
         """Return the search in which muscles go slack, if that lessens errors; else the same."""
         structure = search.structure
@@ -411,7 +394,7 @@ class BalanceEstimator(CoupledEstimator):
         active[place] = True
         slack, started = replace(search, active=active), z.copy()
         started[place] = FIRM * search.problem.most_resisted(structure, z)
-        found = slack.descend(started, STEPS_BETWEEN, Tracker())
+        found = slack.descended(started, STEPS_BETWEEN, Tracker())
         return (slack, found) if search.improved(z, slack, found) else (search, z)
 
     def _own_loads(self, search: Search, z: Array, data: TrainingData) -> tuple[Search, Array]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,8 @@ from mckibben.estimators.optimisers.tracker import Tracker
 BLOCKS, FOLDS = 20, 5
 """About how many blocks all runs are cut into, and in how many parts they are left out in turn."""
 
-MOST_ADDED = 40
-"""Groups of terms that are added before the free run is made straight anew."""
+AHEAD = 4
+"""Groups of terms that are added in a row before they, together, have to lessen errors."""
 
 MOST_TRIES = 7
 """Dampings tried for a step, each ten times the last."""
@@ -99,6 +100,21 @@ class Search:
         return np.flatnonzero(np.append(self.active, np.ones(rest, dtype=bool)))
 
     # -- descent ---------------------------------------------------------------------------------
+
+    def narrowed(self, z: Array) -> tuple[Search, Array]:
+        """Return the search of the terms that are free, without the others, and the same numbers."""
+        structure, n = self.structure, len(self.structure.terms)
+        free = set(compress(structure.keys, self.active))
+        needed = structure.needed(list(compress(structure.terms, self.active)))
+        active = np.array([key in free for key in needed.keys])
+        moved = np.append(structure.moved_to(needed, z[:n]), z[n:])
+        return replace(self, structure=needed, active=active), moved
+
+    def descended(self, z: Array, steps: int, tracker: Tracker) -> Array:
+        """Return the numbers to which a descent of the terms that are free leads."""
+        few, narrow = self.narrowed(z)
+        found, n = few.descend(narrow, steps, tracker), len(few.structure.terms)
+        return np.append(few.structure.moved_to(self.structure, found[:n], z), found[n:])
 
     def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
         """Show a tracker ever better numbers, and return the best."""
@@ -211,17 +227,19 @@ class Search:
         def missed(free: Mask) -> Array:
             return _left_out(grams, np.append(free, np.ones(z.size - n, dtype=bool)), z, bounded)
 
-        best = missed(active)
-        for _ in range(MOST_ADDED):
+        best, ahead, passed = missed(active), active, 0
+        while passed < AHEAD:
             options = [
-                active | more for more in self._candidates(active, z) if not (more & ~tried).any()
+                ahead | more for more in self._candidates(ahead, z) if not (more & ~tried).any()
             ]
-            errors = [missed(option) for option in options]
-            first = int(np.argmin([one.sum() for one in errors])) if errors else 0
-            gain = best - errors[first] if errors else np.zeros(1)
-            if not gain.sum() > np.sqrt(gain.size) * gain.std():
+            if not options:
                 break
-            active, best = options[first], errors[first]
+            errors = [missed(option) for option in options]
+            first = int(np.argmin([one.sum() for one in errors]))
+            ahead, gain = options[first], best - errors[first]
+            passed += 1
+            if gain.sum() > np.sqrt(gain.size) * gain.std():
+                active, best, passed = ahead, errors[first], 0
         free = np.append(active, np.ones(z.size - n, dtype=bool))
         whole = _reduced(grams.sum(axis=0)[np.newaxis], free, z)[0]
         solution, found = z.copy(), z.copy()

@@ -323,9 +323,9 @@ class Structure:
             free[self.shape[name].start + shift : self.shape[name].stop + shift] = numbers
         return free
 
-    def moved_to(self, other: Structure, free: Array) -> Array:
-        """Return what is free in another structure, that has of this one what is not 0 alone."""
-        found = other.begin(0.0)
+    def moved_to(self, other: Structure, free: Array, behind: Array | None = None) -> Array:
+        """Return what is free in another structure, where this has it not what is ``behind``."""
+        found = other.begin(0.0) if behind is None else behind[: len(other.terms)].copy()
         named: dict[tuple[object, ...], list[float]] = {}
         for key, number in zip(self.keys, free.tolist(), strict=True):
             named.setdefault(key, []).append(number)

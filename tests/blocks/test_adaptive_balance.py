@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.adaptive import Adaptive
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_adapting import FRICTION, STIFFNESS
-from mckibben.blocks.coupled.balance_learning import learnt_of, ratios
+from mckibben.blocks.coupled.balance_adaptive import FRICTION, STIFFNESS, learnt_of, ratios
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import wander
 from tests.blocks.balances import ALONE, STEP, balances
@@ -60,7 +59,7 @@ def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) ->
         stream.step([*sample, *rng.uniform(-100.0, 100.0, n)])
     changed: Balance = block.present(stream.state).inverse()  # type: ignore[assignment]
     for k in range(n):
-        most = ratios(balance)[2 * k]
+        most = ratios(balance, k)[0]
         area = changed.areas[k][0] / balance.areas[k][0]
         for new, old in zip(changed.friction[k], balance.friction[k], strict=True):
             assert new <= old * area * most * (1 + 1e-12)

@@ -1,7 +1,7 @@
 """Forces in balance: the terms of every muscle, and the two solutions of their equation.
 
-Of coordinates q that n muscles move, with y_k = W_k q the shortening of muscle k (W is the identity where
-every coordinate has a muscle of its own), virtual work asks at every coordinate j
+Of coordinates q that n muscles move, with y_k = W_k q the shortening of muscle k (W is the identity
+where every coordinate has a muscle of its own), virtual work asks at every coordinate j
 
     sum_l C_jl F_l + S_j(x) (1, q) + K_j(x) max(q_j - o_j, 0) + sum_k W_kj min(R_k, b_k) = 0,
 
@@ -18,8 +18,8 @@ energy, by Newton's method with a search along every step.
 
 Coefficients: the head, r (m), decays and gains of the lags (l each), g (schedules); of every coordinate
 its springs (powers of what schedules by 1 + coordinates), loads, and the obstacle's place and stiffness;
-of every muscle lowest and highest shortening known, w, b, W, then the coefficients of its terms: d, l, m,
-own spring, elasticity, area, friction, relaxation. State: coordinates, stretches, stops (muscle by
+of every muscle lowest and highest shortening known, w, b, W, then the coefficients of its terms: d, l,
+m, own spring, elasticity, area, friction, relaxation. State: coordinates, stretches, stops (muscle by
 muscle), lags (the same), with mass the last two moves of each muscle, the tare of coordinates, whether
 nothing came before, samples amiss.
 """
@@ -33,8 +33,8 @@ from mckibben.blocks.kernels import DERIVED, kernel
 from mckibben.blocks.solving import eliminate
 
 HEAD = 21
-"""Muscles, coordinates, schedules, degree, loads, stops, lags, elastic terms, area's terms, whether there
-are obstacles, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a second,
+"""Muscles, coordinates, schedules, degree, loads, stops, lags, elastic terms, area's terms, whether
+there are obstacles, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a second,
 whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there is mass,
 pressure shared by muscles that are more than coordinates, whether they are."""
 
@@ -118,25 +118,32 @@ def shortening(c: Array, k: int, q: Array) -> float:
 
 
 @kernel
-def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> float:
-    """Return the force of loads, springs and obstacle on coordinate j, and fill its gradient."""
-    m, n_x, degree, n_loads = int(c[1]), int(c[2]), int(c[3]), int(c[4])
+def springs(c: Array, j: int, x: Array, row: Array) -> float:
+    """Fill the springs of coordinate j to all, as scheduled; return its constant force."""
+    m, degree = int(c[1]), int(c[3])
     place = coordinate_at(c, j)
-    force = c[place]
+    constant = c[place]
     for i in range(m):
-        gradient[i] = c[place + 1 + i]
-        force += gradient[i] * q[i]
-    for s in range(n_x):
+        row[i] = c[place + 1 + i]
+    for s in range(int(c[2])):
         power = 1.0
         for _ in range(degree):
             power *= x[s]
             place += 1 + m
-            force += power * c[place]
+            constant += power * c[place]
             for i in range(m):
-                spring = power * c[place + 1 + i]
-                force += spring * q[i]
-                gradient[i] += spring
-    place += 1 + m
+                row[i] += power * c[place + 1 + i]
+    return constant
+
+
+@kernel
+def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> float:
+    """Return the force of loads, springs and obstacle on coordinate j, and fill its gradient."""
+    m, n_x, n_loads = int(c[1]), int(c[2]), int(c[4])
+    force = springs(c, j, x, gradient)
+    for i in range(m):
+        force += gradient[i] * q[i]
+    place = coordinate_at(c, j) + (1 + n_x * int(c[3])) * (1 + m)
     for i in range(n_loads):
         force += c[place + i] * x[n_x + i]
     place += n_loads
@@ -299,7 +306,7 @@ def muscle_force(
     terms: Array,
     slopes: Array,
 ) -> tuple[float, float, float]:
-    """Do as `resistance`; of a slack muscle terms are zero, and the force is the most it resists with."""
+    """Do as `resistance`; of a slack muscle terms are 0, and the force is the most it resists with."""
     force, slope, size = resistance(c, k, state, way, y, p, x, terms, slopes)
     most = c[muscle_at(c, k) + 3]
     if not force > most:
@@ -312,7 +319,7 @@ def muscle_force(
 
 @kernel
 def update_state(c: Array, state: Array, way: int, q: Array, p: Array, x: Array) -> None:
-    """Bring the state to where the muscles are now."""
+    """Bring the state to where the muscles are now, after which something has come before."""
     n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
     for k in range(n):
         y = shortening(c, k, q)
@@ -336,6 +343,7 @@ def update_state(c: Array, state: Array, way: int, q: Array, p: Array, x: Array)
         state[m + k] = stretch
     for j in range(m):
         state[j] = q[j]
+    state[state.size - 2] = 0.0
 
 
 # -- coordinates for pressures -------------------------------------------------------------------
@@ -520,9 +528,9 @@ def solve_pressures(
 ) -> bool:
     """Fill the pressures that hold muscles at coordinates; return whether there are such.
 
-    Muscles that are more than coordinates take the forces that they have at the pressure they share, and
-    the least changes of them that balance; those that would leave the range of pressures stay at its end,
-    one by one, and the others take their part. ``work`` has two numbers a muscle more than `work_size`.
+    Muscles that are more than coordinates take the forces that they have at the pressure they share,
+    and the least changes of them that balance; those that would leave the range of pressures stay at
+    its end, one by one, and the others take their part. ``work`` has two numbers a muscle more than `work_size`.
     """
     n, m = int(c[0]), int(c[1])
     lacks, gradient = work[:m], work[m : 2 * m]
@@ -576,8 +584,8 @@ def solve_pressures(
 
 
 @kernel
-def inverse_step(c: Array, state: Array, scratch: Array, given: Array, p: Array) -> None:
-    """Give the pressures of a sample, and bring the state there; then scratch begins with where.
+def give_pressures(c: Array, state: Array, scratch: Array, given: Array, p: Array) -> int:
+    """Give the pressures of a sample, and the way to it; then scratch begins with where muscles are.
 
     The last state counts samples that muscles cannot reach.
     """
@@ -595,8 +603,7 @@ def inverse_step(c: Array, state: Array, scratch: Array, given: Array, p: Array)
     if not reached:  # where the muscles go instead is what friction will remember
         solve_equilibrium(c, state, way, q, x, p, work)
         state[state.size - 1] += 1.0
-    update_state(c, state, way, q, p, x)
-    state[state.size - 2] = 0.0
+    return way
 
 
 @kernel
@@ -615,4 +622,3 @@ def start_balance(
         for k in range(n):
             p[k] = min(max(p[k], c[13]), c[14])
         update_state(c, state, AT_REST, q, p, x)
-        state[state.size - 2] = 0.0

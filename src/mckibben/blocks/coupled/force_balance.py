@@ -14,6 +14,7 @@ names the sources, does its work: it is here for files.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from typing import Annotated, ClassVar, Self
 
@@ -25,14 +26,13 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Cost, Ports, Start
-from mckibben.blocks.coupled.balance_fields import tell_clipped
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector, rows, vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import parameter_vector
 from mckibben.blocks.solving import eliminate, newton_cost
-from mckibben.errors import ModelError
+from mckibben.errors import ModelError, ModelWarning
 
 ELASTIC, AREA = 3, 3
 """Own elastic terms, y^2 to y^4; terms of the area, y to y^3."""
@@ -344,7 +344,16 @@ class ForceBalance(Invertible):
 
     def report(self, state: Array) -> None:
         """Warn of references that would need pressures out of range."""
-        tell_clipped(state[-1], self.given, self.pressure_range)
+        if not state[-1] > 0:
+            return
+        low, high = self.pressure_range or (-np.inf, np.inf)
+        names = " or ".join(channel.name for channel in self.given)
+        warnings.warn(
+            f"{int(state[-1])} samples need {names} beyond {low:.4g} to {high:.4g} "
+            f"{self.given[0].unit} and were clipped there by the compensator",
+            ModelWarning,
+            stacklevel=4,
+        )
 
     def n_clipped(self, state: Array) -> int:
         """Return how many samples needed pressures out of range."""

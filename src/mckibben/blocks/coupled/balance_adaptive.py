@@ -190,7 +190,8 @@ def slopes_of(
     work: Array,
 ) -> None:
     """Fill the slopes of coordinates by parameters, those of each coordinate in turn."""
-    m, size, width, elastic = int(c[1]), family.shape[0], n_terms(c), DYNAMIC + int(c[7])
+    m, width, elastic = int(c[1]), n_terms(c), DYNAMIC + int(c[7])
+    size = slopes.size // m
     forces, matrix = work[:size], work[size : size + m * m].reshape((m, m))
     left, rest = work[size + m * m : size + 2 * m * m].reshape((m, m)), work[size + 2 * m * m :]
     right, terms, by_y = rest[:m], rest[m : m + width], rest[m + width : m + 2 * width]

@@ -34,9 +34,9 @@ from mckibben.blocks.solving import eliminate
 
 HEAD = 21
 """Muscles, coordinates, schedules, degree, loads, stops, lags, elastic terms, area's terms, whether
-there are obstacles, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a second,
-whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there is mass,
-pressure shared by muscles that are more than coordinates, whether they are."""
+there are obstacles, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a
+second, whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there is
+mass, pressure shared by muscles that are more than coordinates, whether they are."""
 
 OWN, DYNAMIC = 4, 4
 """Coefficients of a muscle before its directions; terms before elasticity."""
@@ -279,8 +279,8 @@ def resistance(
         terms[width - n_l + i] = 0.0
         slopes[width - n_l + i] = 0.0
         if way != AT_REST:
-            past = state[m + n + n * n_s + k * n_l + i]
-            terms[width - n_l + i] = c[HEAD + n_s + i] * past + gain * moved
+            behind = state[m + n + n * n_s + k * n_l + i]
+            terms[width - n_l + i] = c[HEAD + n_s + i] * behind + gain * moved
             slopes[width - n_l + i] = gain
     a, narrowing = area(c, k, y)
     force, slope, size = rubbed - p * a, -p * narrowing, abs(rubbed) + abs(p * a)
@@ -529,8 +529,9 @@ def solve_pressures(
     """Fill the pressures that hold muscles at coordinates; return whether there are such.
 
     Muscles that are more than coordinates take the forces that they have at the pressure they share,
-    and the least changes of them that balance; those that would leave the range of pressures stay at
-    its end, one by one, and the others take their part. ``work`` has two numbers a muscle more than `work_size`.
+    and the least changes of them that balance; those that would leave the range of pressures, or go
+    slack, stay at its end, one by one, and the others take their part. ``work`` has two numbers a muscle more than
+    `work_size`.
     """
     n, m = int(c[0]), int(c[1])
     lacks, gradient = work[:m], work[m : 2 * m]
@@ -538,46 +539,50 @@ def solve_pressures(
     if c[20] == 0.0:
         reached = True
         for k in range(n):
-            wanted, most = -coupling_force(c, k, q, x, gradient), c[muscle_at(c, k) + 3]
-            reached = reached and wanted <= most
-            p[k] = pressure_for(c, k, state, way, q[k], min(wanted, most), x, terms)
+            pulled = coupling_force(c, k, q, x, gradient)
+            most = c[muscle_at(c, k) + 3]
+            reached = reached and -pulled <= most
+            p[k] = pressure_for(c, k, state, way, q[k], min(-pulled, most), x, terms)
         return reached
-    forces, free = (
-        work[work_size(c) : work_size(c) + n],
-        work[work_size(c) + n : work_size(c) + 2 * n],
-    )
-    width, n_free = n_terms(c), n
+    width, n_free, rest = n_terms(c), n, work[work_size(c) :]
+    forces, free = rest[:n], rest[n : 2 * n]
     for k in range(n):
         free[k] = 1.0
     for _ in range(n):
         for j in range(m):
-            lacks[j] = -coupling_force(c, j, q, x, gradient)
+            pulled = coupling_force(c, j, q, x, gradient)
+            lacks[j] = -pulled
             for i in range(m):
                 matrix[j, i] = 0.0
         for k in range(n):
             own, y = muscle_at(c, k) + OWN, shortening(c, k, q)
             if free[k] != 0.0:
                 p[k] = min(max(c[19], c[13]), c[14])
-            forces[k] = muscle_force(c, k, state, way, y, p[k], x, terms[:width], terms[width:])[0]
+            force = muscle_force(c, k, state, way, y, p[k], x, terms[:width], terms[width:])[0]
+            forces[k] = force
             for j in range(m):
-                lacks[j] -= c[own + j] * forces[k]
+                lacks[j] -= c[own + j] * force
                 for i in range(m):
                     matrix[j, i] += free[k] * c[own + j] * c[own + i]
         eliminate(matrix, lacks)
-        worst, furthest = -1, 0.0
+        worst, furthest, end = -1, 0.0, 0.0
         for k in range(n):
             if free[k] == 0.0:
                 continue
-            own, y, wanted = muscle_at(c, k), shortening(c, k, q), forces[k]
+            own, y, wanted, lowest = muscle_at(c, k), shortening(c, k, q), forces[k], c[13]
             for j in range(m):
                 wanted += c[own + OWN + j] * lacks[j]
-            p[k] = pressure_for(c, k, state, way, y, min(wanted, c[own + 3]), x, terms)
-            beyond = max(c[13] - p[k], p[k] - c[14]) - HAIR * (1.0 + abs(p[k]))
+            p[k] = pressure_for(c, k, state, way, y, wanted, x, terms)
+            if wanted > c[own + 3]:
+                slack = pressure_for(c, k, state, way, y, c[own + 3], x, terms)
+                lowest = max(lowest, slack)
+            inside = min(max(p[k], lowest), c[14])
+            beyond = abs(p[k] - inside) - HAIR * (1.0 + abs(p[k]))
             if beyond > furthest:
-                worst, furthest = k, beyond
+                worst, furthest, end = k, beyond, inside
         if worst < 0 or n_free == m:
             return worst < 0
-        p[worst] = min(max(p[worst], c[13]), c[14])
+        p[worst] = end
         free[worst] = 0.0
         n_free -= 1
     return False

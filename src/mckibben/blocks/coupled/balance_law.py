@@ -118,7 +118,7 @@ def shortening(c: Array, k: int, q: Array) -> float:
 
 
 @kernel
-def springs(c: Array, j: int, x: Array, row: Array) -> float:
+def spring_row(c: Array, j: int, x: Array, row: Array) -> float:
     """Fill the springs of coordinate j to all, as scheduled; return its constant force."""
     m, degree = int(c[1]), int(c[3])
     place = coordinate_at(c, j)
@@ -140,7 +140,7 @@ def springs(c: Array, j: int, x: Array, row: Array) -> float:
 def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> float:
     """Return the force of loads, springs and obstacle on coordinate j, and fill its gradient."""
     m, n_x, n_loads = int(c[1]), int(c[2]), int(c[4])
-    force = springs(c, j, x, gradient)
+    force = spring_row(c, j, x, gradient)
     for i in range(m):
         force += gradient[i] * q[i]
     place = coordinate_at(c, j) + (1 + n_x * int(c[3])) * (1 + m)

@@ -35,8 +35,8 @@ from mckibben.blocks.solving import eliminate
 HEAD = 21
 """Muscles, coordinates, schedules, degree, loads, stops, lags, elastic terms, area's terms, whether
 there are obstacles, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a
-second, whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there is
-mass, pressure shared by muscles that are more than coordinates, whether they are."""
+second, whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there
+is mass, pressure shared by muscles that are more than coordinates, whether they are."""
 
 OWN, DYNAMIC = 4, 4
 """Coefficients of a muscle before its directions; terms before elasticity."""
@@ -528,10 +528,10 @@ def solve_pressures(
 ) -> bool:
     """Fill the pressures that hold muscles at coordinates; return whether there are such.
 
-    Muscles that are more than coordinates take the forces that they have at the pressure they share,
-    and the least changes of them that balance; those that would leave the range of pressures, or go
-    slack, stay at its end, one by one, and the others take their part. ``work`` has two numbers a muscle more than
-    `work_size`.
+    Muscles that are more than coordinates take the forces that they rest with at the pressure they
+    share, and the least changes of them that balance; those that would leave the range of pressures, or
+    go slack, stay at its end, one by one, and the others take their part. ``work`` has two numbers a
+    muscle more than `work_size`.
     """
     n, m = int(c[0]), int(c[1])
     lacks, gradient = work[:m], work[m : 2 * m]
@@ -555,10 +555,10 @@ def solve_pressures(
             for i in range(m):
                 matrix[j, i] = 0.0
         for k in range(n):
-            own, y = muscle_at(c, k) + OWN, shortening(c, k, q)
+            own, y, known = muscle_at(c, k) + OWN, shortening(c, k, q), way
             if free[k] != 0.0:
-                p[k] = min(max(c[19], c[13]), c[14])
-            force = muscle_force(c, k, state, way, y, p[k], x, terms[:width], terms[width:])[0]
+                p[k], known = min(max(c[19], c[13]), c[14]), AT_REST
+            force = muscle_force(c, k, state, known, y, p[k], x, terms[:width], terms[width:])[0]
             forces[k] = force
             for j in range(m):
                 lacks[j] -= c[own + j] * force

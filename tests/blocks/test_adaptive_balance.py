@@ -11,12 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben.blocks.adaptive import Adaptive
+from mckibben.blocks.adaptive import Adaptive, adaptive
+from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_adaptive import FRICTION, STIFFNESS, learnt_of, ratios
+from mckibben.blocks.dynamics.air import Air
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import wander
-from tests.blocks.balances import ALONE, HIGHEST, STEP, balances
+from mckibben.blocks.memoryless import Affine, Contact
+from tests.blocks.balances import ALONE, HIGHEST, STEP, balances, channels
 
 Array = NDArray[np.float64]
 
@@ -70,6 +74,25 @@ def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) ->
     assert np.linalg.eigvalsh(matrix)[0] > 0
 
 
+CROWDED = replace(
+    ALONE,
+    springs=((0.0, 14.0, 1.0), (0.0, 1.0, 16.0)),
+    elasticity=((6.0, 4.0),) * 3,
+    areas=((60.0, -25.0, -6.0),) * 3,
+    friction=((3.0, 1.5),) * 3,
+    relaxation=((1.0,),) * 3,
+    loads=((1.0,), (0.5,)),
+    damping=(0.1,) * 3,
+    lines=(0.04,) * 3,
+    walls=(0.05,) * 3,
+    hull=((-20.0, 50.0),) * 3,
+    driven=channels("displacement", "mm", 2),
+    given=channels("pressure", "bar", 3),
+    directions=((0.8, 0.0), (-0.4, 0.7), (-0.4, -0.7)),
+    preload=2.0,
+)
+"""Three muscles that move two coordinates."""
+
 SINGLE = replace(ALONE, settled=True, loads=((),), scheduled=())
 """One muscle that has come to rest."""
 
@@ -101,6 +124,48 @@ def test_what_changed_is_made_up_for_and_found(kind: int, factor: float, name: s
     changes = dict(zip((g.name for g in drift.groups), drift.changes, strict=True))
     assert changes[name] == pytest.approx(factor - 1.0, abs=0.2 * abs(factor - 1.0))
     assert drift.alarm
+
+
+def in_series(balance: Balance) -> Series:
+    """Return a balance behind valves with dead times and dead zones, and before sensors of angles."""
+    given, driven = balance.given, balance.driven
+    names = [(Channel(f"{c.name}_set", "V"), Channel(f"{c.name}_measured", "bar")) for c in given]
+    valves = [
+        Air(1.0, 0.0, 0.0, 0.02, 0.04, 2 * STEP, None, None, (-9.0, 19.0), input=own, output=there)
+        for own, there in names
+    ]
+    zones = [Contact(0.1, there, c) for (_, there), c in zip(names, given, strict=True)]
+    sensors = [Affine(2.0, 1.0, c, Channel(f"angle_{k}", "deg")) for k, c in enumerate(driven)]
+    return Series(
+        (
+            *map(PerChannel, map(tuple, (valves, zones))),
+            Inverse(balance),
+            PerChannel(tuple(sensors)),
+        )
+    )
+
+
+def test_whatever_a_balance_is_in_series_with_it_learns() -> None:
+    """Three muscles under a load, on two coordinates: late measurements teach nothing false."""
+    balance = CROWDED
+    kinds = np.array([kind for _, kind in learnt_of(balance)])
+    changes = np.where(kinds == STIFFNESS, 1.2, balance.learnable.fitted)
+    aged = balance.learnable.with_parameters(changes).inverse()
+    assert isinstance(aged, Balance)
+    block, plant = adaptive(in_series(balance), 20.0, 0.04), in_series(aged)
+    t, rng = STEP * np.arange(2400), np.random.default_rng(0)
+    asked = 1.0 + 2.0 * np.stack([9.0 + 4.0 * np.sin(t), 3.0 * np.sin(0.7 * t)], axis=1)
+    asked[:, 1] *= 1.0 + np.sin(0.13 * t)
+    stream, run, errors = block.stream(STEP), plant.stream(STEP), np.empty(asked.shape)
+    measured, loads = asked[0], 10.0 + 5.0 * np.sin(0.3 * t)
+    for k, wanted in enumerate(asked):
+        reached = run.step([*stream.step([*wanted, loads[k], *measured]), loads[k]])
+        errors[k] = reached - asked[max(k - 2, 0)]
+        measured = reached + 0.04 * rng.standard_normal(2)
+    assert np.abs(errors[-1000:]).max() < 0.05 * np.abs(errors[2:200]).max()
+    drift = block.drift(np.array(stream.state))
+    assert drift.changes[0] == pytest.approx(0.2, abs=0.04)
+    assert block.n_clipped(np.array(stream.state)) == 0
 
 
 def test_without_a_change_it_is_as_good_as_fixed() -> None:

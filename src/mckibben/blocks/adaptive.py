@@ -28,6 +28,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import (
     Block,
     Cost,
+    Ports,
     Run,
     Start,
     explicit_state,
@@ -35,9 +36,9 @@ from mckibben.blocks.base import (
 )
 from mckibben.blocks.compose import Layout, Series
 from mckibben.blocks.feedback import MEASURED
-from mckibben.blocks.fields import STRICT, Channel, Initial, Vector, vector
+from mckibben.blocks.fields import LONGEST_DELAY, STRICT, Channel, Initial, Vector, vector
 from mckibben.blocks.inverse import Inverse, Invertible
-from mckibben.blocks.kernels import Step
+from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.learning import (
     LARGEST,
     READY,
@@ -172,6 +173,54 @@ def width_of(parts: Sequence[Block]) -> float:
     return float(np.max(high - low))
 
 
+@step
+def prompt_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Correct a measurement; the state is past references, latest first."""
+    late = int(coefficients[0])
+    outputs[0] = inputs[1] + state[0] - state[late]
+    remember(inputs[0], state[: late + 1])
+
+
+@kernel
+def prompt_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as if the first reference had been there all along."""
+    state[:] = inputs[0]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Prompt(Block):
+    """What is measured, as if it came at once: moved on as the reference has since.
+
+    Parameters
+    ----------
+    late : float
+        Dead time [s].
+    reference, measured : Channel
+        What is asked for, and measured of it.
+    """
+
+    kind: ClassVar[str] = "prompt"
+    kernel: ClassVar[Step] = prompt_step
+    start_kernel: ClassVar[Start] = prompt_start
+    ports: ClassVar[Ports] = ("reference", "measured"), (), ("measured",)
+    rate_dependent: ClassVar[bool] = True
+    n_missable: ClassVar[int] = 1  # the measurement
+    n_states: ClassVar[int] = LONGEST_DELAY + 1
+
+    late: Annotated[FiniteFloat, Gt(0)]
+    reference: Channel
+    measured: Channel
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return the dead time in samples."""
+        late = round(self.late / needs_sample_time(self.kind, sample_time))
+        return np.array([float(min(late, LONGEST_DELAY))])
+
+    @classmethod
+    def example(cls) -> Self:
+        return cls(0.1, Channel("displacement", "mm"), Channel(f"displacement{MEASURED}", "mm"))
+
+
 @dataclass(frozen=True, config=STRICT)
 class Adaptive(Block):
     """The inverse of a block, which learns the block's linear parameters while it runs.
@@ -292,12 +341,21 @@ class Adaptive(Block):
 
     @cached_property
     def parts(self) -> tuple[Block, ...]:
-        """Of a series: parts behind undone on reference and measurement, the core, those before."""
+        """Of a series: dead times, parts behind undone on both sides, the core, those before."""
         if self.core is self:
             return ()
         behind, before = self._around
-        found = (behind, behind, self.core, before)
+        found = (*self._prompt, behind, behind, self.core, before)
         return tuple(part for part in found if part is not None)
+
+    @cached_property
+    def _prompt(self) -> tuple[Prompt, ...]:
+        """What makes up for a dead time, of every measurement."""
+        late, channels = (
+            self.forward.dead_time,
+            zip(self.forward.outputs, self.measured, strict=True),
+        )
+        return tuple(Prompt(late, *pair) for pair in channels) if late > 0 else ()
 
     @cached_property
     def learnable(self) -> Learnable:
@@ -458,12 +516,15 @@ class Adaptive(Block):
         behind, before = self._around
         named = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
         m = len(self.measured)
+        answers = list(taken[-m:])
+        for j, part in enumerate(self._prompt):
+            answers[j : j + 1] = part.wired(board, [taken[j], answers[j]])
 
         def run(block: Block | None, driven: Sequence[Any]) -> Sequence[Any]:
             own = [named[name] for name in block.scheduling] if block else []
             return block.wired(board, [*driven, *own]) if block else driven
 
-        asked, measured = run(behind, taken[:m]), run(behind, taken[-m:])
+        asked, measured = run(behind, taken[:m]), run(behind, answers)
         loads = [named[name] for name in self.core.fixed.scheduling]
         found = run(before, self.core.wired(board, [*asked, *loads, *measured]))
         if not isinstance(self.start, str):

@@ -126,23 +126,16 @@ def test_what_changed_is_made_up_for_and_found(kind: int, factor: float, name: s
     assert drift.alarm
 
 
-def in_series(balance: Balance) -> Series:
+def in_series(balance: Balance, dead_time: float) -> Series:
     """Return a balance behind valves with dead times and dead zones, and before sensors of angles."""
     given, driven = balance.given, balance.driven
     names = [(Channel(f"{c.name}_set", "V"), Channel(f"{c.name}_measured", "bar")) for c in given]
-    valves = [
-        Air(1.0, 0.0, 0.0, 0.02, 0.04, 2 * STEP, None, None, (-9.0, 19.0), input=own, output=there)
-        for own, there in names
-    ]
+    lags = (0.02, 0.04, dead_time, None, None, (-9.0, 19.0))
+    valves = [Air(1.0, 0.0, 0.0, *lags, input=own, output=there) for own, there in names]
     zones = [Contact(0.1, there, c) for (_, there), c in zip(names, given, strict=True)]
     sensors = [Affine(2.0, 1.0, c, Channel(f"angle_{k}", "deg")) for k, c in enumerate(driven)]
-    return Series(
-        (
-            *map(PerChannel, map(tuple, (valves, zones))),
-            Inverse(balance),
-            PerChannel(tuple(sensors)),
-        )
-    )
+    before = (PerChannel(tuple(valves)), PerChannel(tuple(zones)))
+    return Series((*before, Inverse(balance), PerChannel(tuple(sensors))))
 
 
 def test_whatever_a_balance_is_in_series_with_it_learns() -> None:
@@ -152,7 +145,8 @@ def test_whatever_a_balance_is_in_series_with_it_learns() -> None:
     changes = np.where(kinds == STIFFNESS, 1.2, balance.learnable.fitted)
     aged = balance.learnable.with_parameters(changes).inverse()
     assert isinstance(aged, Balance)
-    block, plant = adaptive(in_series(balance), 20.0, 0.04), in_series(aged)
+    block = adaptive(in_series(balance, 3 * STEP), 20.0, 0.04)
+    plant = in_series(aged, 2 * STEP)  # and one for which a command is held
     t, rng = STEP * np.arange(2400), np.random.default_rng(0)
     asked = 1.0 + 2.0 * np.stack([9.0 + 4.0 * np.sin(t), 3.0 * np.sin(0.7 * t)], axis=1)
     asked[:, 1] *= 1.0 + np.sin(0.13 * t)

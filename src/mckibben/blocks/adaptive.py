@@ -212,9 +212,9 @@ class Prompt(Block):
     measured: Channel
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the dead time in samples."""
-        late = round(self.late / needs_sample_time(self.kind, sample_time))
-        return np.array([float(min(late, LONGEST_DELAY))])
+        """Return the dead time in samples, but the one for which a command was held."""
+        late = round(self.late / needs_sample_time(self.kind, sample_time)) - 1
+        return np.array([float(min(max(late, 0), LONGEST_DELAY))])
 
     @classmethod
     def example(cls) -> Self:

@@ -445,6 +445,13 @@ class Balance(Invertible):
         flat = np.hstack([np.reshape(table, (n, -1)) for table in own])
         return np.concatenate([*shared, *(np.concatenate(row) for row in tables), flat.ravel()])
 
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the lowest and highest pressures."""
+        if self.pressure_range is None:
+            return super().reachable()
+        low, high = self.pressure_range
+        return np.full(len(self.given), low), np.full(len(self.given), high)
+
     def report(self, state: Array) -> None:
         """Warn of references that would need pressures out of range, or muscles that push."""
         if not state[-1] > 0:

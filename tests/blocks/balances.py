@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
+from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel, rows, vector
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import wander
+from mckibben.blocks.memoryless import Affine, Contact
 from tests.blocks.strategies import numbers
 
 Array = NDArray[np.float64]
@@ -142,3 +146,34 @@ ALONE = Balance(
     given=channels("pressure", "bar", 1),
 )
 """One muscle under a load."""
+
+CROWDED = replace(
+    ALONE,
+    springs=((0.0, 14.0, 1.0), (0.0, 1.0, 16.0)),
+    elasticity=((6.0, 4.0),) * 3,
+    areas=((60.0, -25.0, -6.0),) * 3,
+    friction=((3.0, 1.5),) * 3,
+    relaxation=((1.0,),) * 3,
+    loads=((1.0,), (0.5,)),
+    damping=(0.1,) * 3,
+    lines=(0.04,) * 3,
+    walls=(0.05,) * 3,
+    hull=((-20.0, 50.0),) * 3,
+    driven=channels("displacement", "mm", 2),
+    given=channels("pressure", "bar", 3),
+    directions=((0.8, 0.0), (-0.4, 0.7), (-0.4, -0.7)),
+    preload=2.0,
+)
+"""Three muscles that move two coordinates."""
+
+
+def in_series(balance: Balance, dead_time: float) -> Series:
+    """Return a balance behind valves with dead times and dead zones, and before sensors of angles."""
+    given, driven = balance.given, balance.driven
+    names = [(Channel(f"{c.name}_set", "V"), Channel(f"{c.name}_measured", "bar")) for c in given]
+    lags = (0.02, 0.04, dead_time, None, None, (-9.0, 19.0))
+    valves = [Air(1.0, 0.0, 0.0, *lags, input=own, output=there) for own, there in names]
+    zones = [Contact(0.1, there, c) for (_, there), c in zip(names, given, strict=True)]
+    sensors = [Affine(2.0, 1.0, c, Channel(f"angle_{k}", "deg")) for k, c in enumerate(driven)]
+    before = (PerChannel(tuple(valves)), PerChannel(tuple(zones)))
+    return Series((*before, Inverse(balance), PerChannel(tuple(sensors))))

@@ -53,6 +53,11 @@ def scaled(balance: Balance, of: Sheet, to: Sheet) -> Balance:
         walls=vector(length / pressure * np.array(balance.walls)),
         limits=vector(length / pressure * np.array(balance.limits)),
         grip=balance.grip * pressure,
+        grips=vector(pressure * np.array(balance.grips)),
+        obstacles=rows(
+            [(row[0] * length, *per_length * np.array(row[1:])) for row in balance.obstacles]
+        ),
+        preload=balance.preload * pressure,
         hull=times(balance.hull, length),
         scale=balance.scale * length,
         bladders=vector(per_length * np.array(balance.bladders)),

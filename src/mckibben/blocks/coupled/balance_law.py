@@ -239,8 +239,8 @@ def resistance(
 ) -> tuple[float, float, float]:
     """Fill the terms of muscle k and their slopes by y; return their force, its slope, and its size."""
     n, m, n_s, n_l, n_e, n_a = int(c[0]), int(c[1]), int(c[5]), int(c[6]), int(c[7]), int(c[8])
-    own, place, width, rate = muscle_at(c, k), terms_at(c, k), n_terms(c), c[15]
-    first = DYNAMIC + n_e
+    own, width, rate, first = muscle_at(c, k), n_terms(c), c[15], DYNAMIC + n_e
+    place = own + OWN + m
     before = shortening(c, k, state)
     moved = y - before
     for i in range(first):
@@ -284,13 +284,17 @@ def resistance(
             slopes[width - n_l + i] = gain
     a, narrowing = area(c, k, y)
     force, slope, size = rubbed - p * a, -p * narrowing, abs(rubbed) + abs(p * a)
-    for i in range(width):
-        if i < first or i >= first + n_a:
-            slope += c[place + i] * slopes[i]
-        if i < first or i >= width - n_l:
-            part = c[place + i] * terms[i]
-            force += part
-            size += abs(part)
+    for i in range(first):
+        part = c[place + i] * terms[i]
+        force += part
+        size += abs(part)
+        slope += c[place + i] * slopes[i]
+    for i in range(width - n_l, width):
+        part = c[place + i] * terms[i]
+        force += part
+        size += abs(part)
+    for i in range(first + n_a, width):
+        slope += c[place + i] * slopes[i]
     return force, slope, size
 
 

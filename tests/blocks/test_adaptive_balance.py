@@ -48,6 +48,27 @@ def test_model_and_inverse_match_at_every_step(balance: Balance, seed: int, wild
             measured = measured + rng.choice([0.0, 1e3, np.nan, -30.0], n)
 
 
+@settings(max_examples=15)
+@given(balances(m=0, n_lags=0) | balances(m=0, n_lags=0, crowded=True), st.integers(0, 1000))
+def test_slopes_are_those_of_the_model(balance: Balance, seed: int) -> None:
+    """Of coordinates by parameters, where nothing is remembered."""
+    balance = replace(balance, tare=False)
+    block, m = Adaptive(Inverse(balance), 20.0, 0.05), len(balance.driven)
+    asked, stream = path(balance, seed, 3)[-1], block.stream(STEP)
+    pressures = stream.step([*asked, *asked[:m]])
+    more = stream.state[block.fixed.n_states :][: block.learnable.n_more_states]
+    slopes, fitted = more[m:].reshape(m, -1), block.learnable.fitted
+    steps = 1e-5 * np.diag(block.learnable.scales)
+    driven = np.concatenate([pressures, asked[m:]])[np.newaxis]
+    for i, h in enumerate(steps):
+        above, below = (
+            block.learnable.with_parameters(fitted + way * h).simulate(driven, sample_time=STEP)[0]
+            for way in (1.0, -1.0)
+        )
+        expected = (above - below) / (2.0 * h[i])
+        np.testing.assert_allclose(slopes[:, i], expected, rtol=1e-5, atol=1e-10 / h[i])
+
+
 @pytest.mark.kernel
 @settings(max_examples=15)
 @given(balances() | balances(crowded=True), st.integers(0, 1000))

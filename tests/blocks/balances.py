@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
+from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import wander
+from mckibben.blocks.memoryless import Affine, Contact
 from tests.blocks.strategies import numbers
 
 Array = NDArray[np.float64]
@@ -35,14 +40,19 @@ def balances(
     m: int | None = None,
     n_lags: int | None = None,
     heavy: bool = False,
+    crowded: bool = False,
 ) -> Balance:
-    """Draw a balance whose energy is convex: stiffness of 14 N/mm and more outweighs what is lost."""
-    n = draw(st.integers(1, 3)) if n is None else n
+    """Draw a balance whose energy is convex: stiffness of 14 N/mm and more outweighs what is lost.
+
+    Of n coordinates, which, ``crowded``, n + 1 muscles move, from evenly spread directions.
+    """
+    n = draw(st.integers(1, 2 if crowded else 3)) if n is None else n
     n_loads = draw(st.integers(0, 1)) if n_loads is None else n_loads
     m = draw(st.integers(0, 3)) if m is None else m
     n_lags = draw(st.integers(0, 2)) if n_lags is None else n_lags
     n_x, degree = draw(st.integers(0, 1)), draw(st.integers(1, 2))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    muscles = n + crowded
 
     def stiff(least: float) -> Array:
         mix = rng.normal(size=(n, n))
@@ -51,28 +61,43 @@ def balances(
     matrices = [stiff(14.0), *(0.3 * stiff(0.0) for _ in range(n_x * degree))]
     constants = rng.uniform(-4.0, 4.0, (n, len(matrices), 1))
     springs = np.concatenate([constants, np.array(matrices).transpose(1, 0, 2)], axis=2)
+    turned = 2.0 * np.pi * (np.arange(muscles) + rng.uniform(-0.1, 0.1, muscles)) / muscles
+    directions = rng.uniform(0.5, 1.0) * np.stack([np.cos(turned), np.sin(turned)], axis=1)
+    walls = rng.uniform(0.0, 0.1, muscles)
+
+    def obstacles(side: int, low: float, high: float) -> Array:
+        most = (side, high, 9.0, *n_x * (2.0,))
+        return rng.uniform((side, low, 0.0, *n_x * (0.0,)), most, (n, 3 + n_x))
+
     return Balance(
         springs=rows(springs.reshape(n, -1)),
-        elasticity=rows(rng.uniform(0.0, 6.0, (n, 2))),
-        areas=rows(rng.uniform((50.0, -25.0, -8.0), (80.0, -5.0, 0.0), (n, 3))),
-        friction=rows(rng.uniform(0.0, 1.5, (n, m))),
-        relaxation=rows(rng.uniform(0.0, 2.0, (n, n_lags))),
+        elasticity=rows(rng.uniform(0.0, 6.0, (muscles, 2))),
+        areas=rows(rng.uniform((50.0, -25.0, -8.0), (80.0, -5.0, 0.0), (muscles, 3))),
+        friction=rows(rng.uniform(0.0, 1.5, (muscles, m))),
+        relaxation=rows(rng.uniform(0.0, 2.0, (muscles, n_lags))),
         loads=rows(np.eye(n) if n_loads == n else rng.uniform(0.5, 1.0, (n, n_loads))),
-        damping=vector(rng.uniform(0.0, 0.2, n) if n_lags else np.zeros(n)),
-        lines=vector(rng.uniform(0.0, 0.1, n)) if n_lags else (),
-        walls=vector(rng.uniform(0.0, 0.1, n)),
+        damping=vector(rng.uniform(0.0, 0.2, muscles) if n_lags else np.zeros(muscles)),
+        lines=vector(rng.uniform(0.0, 0.1, muscles)) if n_lags else (),
+        walls=vector(walls),
         limits=vector(np.cumsum(rng.uniform(0.05, 0.3, m))),
         grip=draw(numbers(0.0, 2.0)),
         lags=vector(rng.uniform(0.05, 5.0, n_lags)),
-        hull=((-20.0, 50.0),) * n,
+        hull=((-20.0, 50.0),) * muscles,
         scale=50.0,
         degree=degree,
         driven=channels("displacement", "mm", n),
         scheduled=(*channels("extensor", "bar", n_x), *channels("force", "N", n_loads)),
-        given=channels("pressure", "bar", n),
+        given=channels("pressure", "bar", muscles),
         tare=draw(st.booleans()),
         settled=draw(st.booleans()),
-        mass=vector(rng.uniform(0.0, 0.03, n)) if heavy else (),
+        mass=vector(rng.uniform(0.0, 0.03, muscles)) if heavy else (),
+        asymmetry=draw(st.none() | numbers(0.3, 2.0)),
+        grips=vector(rng.uniform(0.0, 0.5, n_x)) if draw(st.booleans()) else (),
+        obstacles=rows(np.hstack([obstacles(1, 5.0, 25.0), obstacles(-1, -4.0, 2.0)]))
+        if draw(st.booleans())
+        else (),
+        directions=rows(directions[:, :n]) if crowded else (),
+        preload=draw(numbers(0.0, 2.0)) if crowded else 0.0,
     )
 
 
@@ -80,13 +105,20 @@ def channels(stem: str, unit: str, n: int) -> tuple[Channel, ...]:
     return tuple(Channel(f"{stem}_{k}", unit) for k in range(1, n + 1))
 
 
-def motion(block: Balance, driven: tuple[float, float], seed: int, n_turns: int = 10) -> Array:
+def motion(block: Block, driven: tuple[float, float], seed: int, n_turns: int = 10) -> Array:
     """Return joint motion with minor loops of a balance, or, by its pressures, of its inverse."""
-    n, n_loads = len(block.driven), block.n_loads
-    n_x = len(block.scheduled) - n_loads
+    balance = block.forward if isinstance(block, Inverse) else block
+    assert isinstance(balance, Balance)
+    n, n_x, n_loads = block.n_driven, balance.n_schedules, balance.n_loads
     low = [driven[0]] * n + [0.0] * n_x + [-LOADED] * n_loads
     high = [driven[1]] * n + [2.0] * n_x + [LOADED] * n_loads
     return wander(np.array(low), np.array(high), np.random.default_rng(seed), 8, n_turns)
+
+
+def undone(block: Block, inputs: Array, start: str = "first_sample") -> Array:
+    """Return what a block's inverse makes of its outputs, beside what schedules it."""
+    given = np.column_stack([run(block, inputs, initial=start), inputs[:, block.n_driven :]])
+    return run(block.inverse(), given, initial=start)
 
 
 def run(block: Block, inputs: Array, sample_time: float = STEP, **start: Any) -> Array:
@@ -117,3 +149,34 @@ ALONE = Balance(
     given=channels("pressure", "bar", 1),
 )
 """One muscle under a load."""
+
+CROWDED = replace(
+    ALONE,
+    springs=((0.0, 14.0, 1.0), (0.0, 1.0, 16.0)),
+    elasticity=((6.0, 4.0),) * 3,
+    areas=((60.0, -25.0, -6.0),) * 3,
+    friction=((3.0, 1.5),) * 3,
+    relaxation=((1.0,),) * 3,
+    loads=((1.0,), (0.5,)),
+    damping=(0.1,) * 3,
+    lines=(0.04,) * 3,
+    walls=(0.05,) * 3,
+    hull=((-20.0, 50.0),) * 3,
+    driven=channels("displacement", "mm", 2),
+    given=channels("pressure", "bar", 3),
+    directions=((0.8, 0.0), (-0.4, 0.7), (-0.4, -0.7)),
+    preload=2.0,
+)
+"""Three muscles that move two coordinates."""
+
+
+def in_series(balance: Balance, dead_time: float) -> Series:
+    """Return a balance behind valves with dead times and dead zones, and before sensors of angles."""
+    given, driven = balance.given, balance.driven
+    names = [(Channel(f"{c.name}_set", "V"), Channel(f"{c.name}_measured", "bar")) for c in given]
+    lags = (0.02, 0.04, dead_time, None, None, (-9.0, 19.0))
+    valves = [Air(1.0, 0.0, 0.0, *lags, input=own, output=there) for own, there in names]
+    zones = [Contact(0.1, there, c) for (_, there), c in zip(names, given, strict=True)]
+    sensors = [Affine(2.0, 1.0, c, Channel(f"angle_{k}", "deg")) for k, c in enumerate(driven)]
+    before = (PerChannel(tuple(valves)), PerChannel(tuple(zones)))
+    return Series((*before, Inverse(balance), PerChannel(tuple(sensors))))

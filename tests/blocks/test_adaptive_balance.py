@@ -11,13 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben.blocks.adaptive import Adaptive
+from mckibben.blocks.adaptive import Adaptive, adaptive
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_adapting import FRICTION, STIFFNESS
-from mckibben.blocks.coupled.balance_learning import learnt_of, ratios
+from mckibben.blocks.coupled.balance_adaptive import FRICTION, STIFFNESS, learnt_of, ratios
 from mckibben.blocks.inverse import Inverse
 from mckibben.blocks.laws import wander
-from tests.blocks.balances import ALONE, STEP, balances
+from tests.blocks.balances import ALONE, CROWDED, HIGHEST, STEP, balances, in_series
 
 Array = NDArray[np.float64]
 
@@ -31,7 +30,7 @@ def path(balance: Balance, seed: int, n: int) -> Array:
 
 
 @settings(max_examples=15)
-@given(balances(), st.integers(0, 1000), st.booleans())
+@given(balances() | balances(crowded=True), st.integers(0, 1000), st.booleans())
 def test_model_and_inverse_match_at_every_step(balance: Balance, seed: int, wild: bool) -> None:
     """Whatever is measured: of a muscle that drifts, or garbage, or nothing."""
     block = Adaptive(Inverse(balance), 2.0, 0.05)
@@ -49,19 +48,42 @@ def test_model_and_inverse_match_at_every_step(balance: Balance, seed: int, wild
             measured = measured + rng.choice([0.0, 1e3, np.nan, -30.0], n)
 
 
+@settings(max_examples=15)
+@given(balances(m=0, n_lags=0) | balances(m=0, n_lags=0, crowded=True), st.integers(0, 1000))
+def test_slopes_are_those_of_the_model(balance: Balance, seed: int) -> None:
+    """Of coordinates by parameters, where nothing is remembered."""
+    balance = replace(balance, tare=False)
+    block, m = Adaptive(Inverse(balance), 20.0, 0.05), len(balance.driven)
+    asked, stream = path(balance, seed, 3)[-1], block.stream(STEP)
+    pressures = stream.step([*asked, *asked[:m]])
+    more = stream.state[block.fixed.n_states :][: block.learnable.n_more_states]
+    slopes, fitted = more[m:].reshape(m, -1), block.learnable.fitted
+    steps = 1e-5 * np.diag(block.learnable.scales)
+    driven = np.concatenate([pressures, asked[m:]])[np.newaxis]
+    for i, h in enumerate(steps):
+        above, below = (
+            block.learnable.with_parameters(fitted + way * h).simulate(driven, sample_time=STEP)[0]
+            for way in (1.0, -1.0)
+        )
+        expected = (above - below) / (2.0 * h[i])
+        np.testing.assert_allclose(slopes[:, i], expected, rtol=1e-5, atol=1e-10 / h[i])
+
+
 @pytest.mark.kernel
 @settings(max_examples=15)
-@given(balances(), st.integers(0, 1000))
+@given(balances() | balances(crowded=True), st.integers(0, 1000))
 def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) -> None:
     """A balance that makes energy is refused; areas outweigh friction, as the fitted ones do."""
+    balance = replace(balance, pressure_range=(0.0, HIGHEST))  # whose top lets areas lose stiffness
     block, n = Adaptive(Inverse(balance), 1.0, 0.05), len(balance.driven)
     stream, rng = block.stream(STEP), np.random.default_rng(seed)
     for sample in path(balance, seed, 150):
         stream.step([*sample, *rng.uniform(-100.0, 100.0, n)])
     changed: Balance = block.present(stream.state).inverse()  # type: ignore[assignment]
-    for k in range(n):
-        most = ratios(balance)[2 * k]
+    for k in range(len(balance.given)):
+        most, softest = ratios(balance, k)
         area = changed.areas[k][0] / balance.areas[k][0]
+        assert changed.elasticity[k][0] >= balance.elasticity[k][0] * area / softest * (1 - 1e-12)
         for new, old in zip(changed.friction[k], balance.friction[k], strict=True):
             assert new <= old * area * most * (1 + 1e-12)
     matrix = np.array(changed.springs)[:, 1 : 1 + n]
@@ -100,6 +122,30 @@ def test_what_changed_is_made_up_for_and_found(kind: int, factor: float, name: s
     changes = dict(zip((g.name for g in drift.groups), drift.changes, strict=True))
     assert changes[name] == pytest.approx(factor - 1.0, abs=0.2 * abs(factor - 1.0))
     assert drift.alarm
+
+
+def test_whatever_a_balance_is_in_series_with_it_learns() -> None:
+    """Three muscles under a load, on two coordinates: late measurements teach nothing false."""
+    balance = CROWDED
+    kinds = np.array([kind for _, kind in learnt_of(balance)])
+    changes = np.where(kinds == STIFFNESS, 1.2, balance.learnable.fitted)
+    aged = balance.learnable.with_parameters(changes).inverse()
+    assert isinstance(aged, Balance)
+    block = adaptive(in_series(balance, 3 * STEP), 20.0, 0.04)
+    plant = in_series(aged, 2 * STEP)  # and one for which a command is held
+    t, rng = STEP * np.arange(2400), np.random.default_rng(0)
+    asked = 1.0 + 2.0 * np.stack([9.0 + 4.0 * np.sin(t), 3.0 * np.sin(0.7 * t)], axis=1)
+    asked[:, 1] *= 1.0 + np.sin(0.13 * t)
+    stream, run, errors = block.stream(STEP), plant.stream(STEP), np.empty(asked.shape)
+    measured, loads = asked[0], 10.0 + 5.0 * np.sin(0.3 * t)
+    for k, wanted in enumerate(asked):
+        reached = run.step([*stream.step([*wanted, loads[k], *measured]), loads[k]])
+        errors[k] = reached - asked[max(k - 2, 0)]
+        measured = reached + 0.04 * rng.standard_normal(2)
+    assert np.abs(errors[-1000:]).max() < 0.05 * np.abs(errors[2:200]).max()
+    drift = block.drift(np.array(stream.state))
+    assert drift.changes[0] == pytest.approx(0.2, abs=0.04)
+    assert block.n_clipped(np.array(stream.state)) == 0
 
 
 def test_without_a_change_it_is_as_good_as_fixed() -> None:

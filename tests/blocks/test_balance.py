@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
@@ -25,6 +26,7 @@ from tests.blocks.balances import (
     balances,
     motion,
     run,
+    undone,
 )
 from tests.blocks.strategies import numbers
 from tests.twins import TWINS
@@ -32,23 +34,29 @@ from tests.twins import TWINS
 Array = NDArray[np.float64]
 
 
-def beside(driven: Array, inputs: Array) -> Array:
-    """Return other driven values with the same scheduling."""
-    return np.column_stack([driven, inputs[:, driven.shape[1] :]])
+def beside(driven: Array, block: Block, inputs: Array) -> Array:
+    """Return other driven values with what schedules a block's inputs."""
+    return np.column_stack([driven, inputs[:, block.n_driven :]])
 
 
 # -- exact both ways -----------------------------------------------------------------------------
 
 
-@given(balances() | balances(heavy=True), SEEDS)
-def test_pressures_give_the_motion_that_needs_them(block: Balance, seed: int) -> None:
-    n = len(block.driven)
+ANY = balances() | balances(heavy=True) | balances(crowded=True)
+
+
+@given(ANY, SEEDS, st.sampled_from(["first_sample", "virgin"]))
+def test_pressures_give_the_motion_that_needs_them(block: Balance, seed: int, start: str) -> None:
     inputs = motion(block, (-5.0, FURTHEST), seed)
-    found = run(block.inverse(), beside(run(block, inputs), inputs))
-    np.testing.assert_allclose(found, inputs[:, :n], atol=1e-9 * FURTHEST)
-    inputs = motion(block, (0.0, HIGHEST), seed)
-    found = run(block, beside(run(block.inverse(), inputs), inputs))
-    np.testing.assert_allclose(found, inputs[:, :n], atol=1e-9 * HIGHEST)
+    found = undone(block, inputs, start)
+    np.testing.assert_allclose(found, inputs[:, : block.n_driven], atol=1e-9 * FURTHEST)
+
+
+@given(balances() | balances(heavy=True), SEEDS)
+def test_motion_tells_the_pressures_that_made_it(block: Balance, seed: int) -> None:
+    inputs = motion(block.inverse(), (0.0, HIGHEST), seed)
+    found = undone(block.inverse(), inputs)
+    np.testing.assert_allclose(found, inputs[:, : len(block.given)], atol=1e-9 * HIGHEST)
 
 
 @given(balances() | balances(heavy=True), SEEDS)
@@ -61,11 +69,12 @@ def test_pressures_that_are_clipped_move_muscles_that_need_them(block: Balance, 
         pressures = limited.simulate(inputs, sample_time=STEP)
     assert pressures.min() >= low
     assert pressures.max() <= high
-    reached = run(block.inverse(), beside(pressures, inputs))
-    np.testing.assert_allclose(run(block, beside(reached, inputs)), pressures, atol=1e-9 * high)
+    reached = run(block.inverse(), beside(pressures, block, inputs))
+    found = run(block, beside(reached, block, inputs))
+    np.testing.assert_allclose(found, pressures, atol=1e-9 * high)
 
 
-@given(balances(), SEEDS)
+@given(ANY, SEEDS)
 def test_drawn_balances_agree_with_their_twin(block: Balance, seed: int) -> None:
     inputs = motion(block, (-5.0, FURTHEST), seed, 3)
     expected = TWINS["balance"](block, inputs.tolist(), STEP)
@@ -84,33 +93,36 @@ def state_after(block: Block, inputs: Array) -> Array:
 # -- energy --------------------------------------------------------------------------------------
 
 
-@given(balances() | balances(heavy=True), SEEDS)
+@given(ANY, SEEDS)
 def test_any_pressures_find_their_equilibrium(block: Balance, seed: int) -> None:
     """Jumps from anywhere to anywhere, also beyond what is known."""
-    rng, n = np.random.default_rng(seed), len(block.driven)
-    inputs = motion(block, (0.0, HIGHEST), seed)
+    rng, n = np.random.default_rng(seed), len(block.given)
+    inputs = motion(block.inverse(), (0.0, HIGHEST), seed)
     inputs[:, :n] = rng.uniform(-0.5, 3.0 * HIGHEST, (len(inputs), n))
     inputs[:, n:] = rng.permuted(inputs[:, n:], axis=0)
     assert state_after(block.inverse(), inputs)[-1] == 0.0
 
 
-# -- slack ---------------------------------------------------------------------------------------
+# -- what is out of reach --------------------------------------------------------------------------
 
 
-@given(balances(n=2), SEEDS)
-def test_what_asks_a_muscle_to_push_harder_than_it_can_is_told(block: Balance, seed: int) -> None:
-    """Its pressure is that at which it is about to go slack; and what is reached needs no other."""
-    slack = replace(block, bladders=(2.0, 3.0), pushes=(4.0, 0.0))
-    inputs = motion(slack, (-5.0, FURTHEST), seed)
+@given(balances(n=2) | balances(crowded=True), SEEDS, st.booleans())
+def test_what_cannot_be_reached_is_told(block: Balance, seed: int, slack: bool) -> None:
+    """Muscles that would have to push harder than they can, or pressures out of their range."""
+    n, m = len(block.given), len(block.driven)
+    limited = replace(block, pressure_range=(0.0, HIGHEST))
+    if slack:
+        limited = replace(block, bladders=(2.0, 3.0, 1.0)[:n], pushes=(4.0, 0.0, 2.0)[:n])
+    inputs = motion(limited, (-5.0, FURTHEST), seed)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        pressures = slack.simulate(inputs, sample_time=STEP)
-    found = run(slack.inverse(), beside(pressures, inputs))
+        pressures = limited.simulate(inputs, sample_time=STEP)
+    found = run(limited.inverse(), beside(pressures, limited, inputs))
     if not told:
-        np.testing.assert_allclose(found, inputs[:, :2], atol=1e-8)
+        np.testing.assert_allclose(found, inputs[:, :m], atol=1e-8)
     else:
         assert told[0].category is ModelWarning
-        assert np.abs(found - inputs[:, :2]).max() > 1e-9
+        assert np.abs(found - inputs[:, :m]).max() > 1e-9
 
 
 # -- loads ---------------------------------------------------------------------------------------

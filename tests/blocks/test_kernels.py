@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mckibben import ModelWarning
 from mckibben.blocks.bands import look_along
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_terms import HEAD
+from mckibben.blocks.coupled.balance_law import HEAD
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.load_estimate import LoadEstimate

@@ -52,6 +52,12 @@ RANGES: dict[str, tuple[tuple[float, float], ...]] = {
     "predictive, all limits": ((-7.0, 10.0),),
     "predictive balance": ((0.0, 6.0), (0.0, 6.0), (0.0, 3.0), (0.0, 9.0)),
     "adaptive balance": ((0.0, 6.0), (0.0, 6.0), (0.0, 3.0), (0.0, 9.0), (0.0, 0.0), (0.0, 0.0)),
+    "crowded muscles": ((0.0, 8.0), (-4.0, 6.0), (0.0, 3.0), (0.0, 9.0)),
+    "predictive crowded muscles": ((0.0, 8.0), (-4.0, 6.0), (0.0, 3.0), (0.0, 9.0)),
+    "adaptive crowded muscles": (
+        *((1.0, 17.0), (-7.0, 13.0), (0.0, 3.0)),
+        *((0.0, 9.0), (0.0, 0.0), (0.0, 0.0)),
+    ),
     "multistate-friction each way": ((0.0, 2.0), (0.0, 5.0)),
     "force-feedforward by chou-hannaford": ((-5.0, 100.0), (4.2, 5.5)),
     "force-feedforward by tondu-lopez": ((-5.0, 100.0), (3.8, 5.0)),
@@ -133,6 +139,46 @@ def _joint() -> Block:
     )
 
 
+def _crowded(**changes: Any) -> Any:
+    """Return three muscles that move two coordinates against obstacles, with all that a balance has."""
+    three = {
+        name: (*rows, rows[0])
+        for name, rows in vars(example("balance")).items()
+        if name in ("elasticity", "areas", "friction", "relaxation", "damping", "lines", "walls")
+    }
+    return example(
+        "balance",
+        **three,
+        hull=((-20.0, 50.0),) * 3,
+        bladders=(2.0, 3.0, 2.0),
+        pushes=(60.0, 50.0, 40.0),
+        given=tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2, 3)),
+        pressure_range=(0.0, 6.0),
+        asymmetry=0.7,
+        grips=(0.2,),
+        obstacles=((1.0, 5.0, 4.0, 1.0), (1.0, 4.0, 6.0, 0.0)),
+        directions=((0.9, 0.0), (-0.4, 0.7), (-0.5, -0.8)),
+        preload=1.0,
+        **changes,
+    )
+
+
+def _crowded_series() -> Block:
+    """Return those behind valves with dead times and dead zones, and before sensors."""
+    balance = _crowded()
+    valves, zones = [], []
+    for k, given in enumerate(balance.given, 1):
+        command, there = Channel(f"voltage_{k}", "V"), Channel(f"pressure_measured_{k}", "bar")
+        valves.append(example("air", input=command, output=there, dead_time=2 * SAMPLE_TIME))
+        zones.append(example("contact", input=there, output=given))
+    sensors = tuple(
+        block("affine", 2.0, 1.0, driven, Channel(f"sensor_{k}", "V"))
+        for k, driven in enumerate(balance.driven, 1)
+    )
+    before = PerChannel(tuple(valves)), PerChannel(tuple(zones))
+    return Series((*before, balance.inverse(), PerChannel(sensors)))
+
+
 def _loaded_network() -> Block:
     network = example("recurrent-fuzzy-network")
     return Series((example("pi", output=network.driven[0]), network))
@@ -186,6 +232,9 @@ def _compositions() -> dict[str, Block]:
         "heavy muscles": example("balance", mass=(0.01, 0.02), pushes=(), bladders=()),
         "slack muscles": example("balance", pushes=(8.0, 2.0)),
         "limited muscles": example("balance", pressure_range=(0.0, 1.2)),
+        "crowded muscles": _crowded(),
+        "adaptive crowded muscles": block("adaptive", _crowded_series(), 20.0, 0.1),
+        "predictive crowded muscles": block("predictive", _crowded(), 4, 40.0),
         "adaptive gpi": block("adaptive", gpi, 20.0, 0.05),
         "adaptive series": block("adaptive", Series.example(), 60.0, 0.05),
         "adaptive balance": block("adaptive", balance.inverse(), 20.0, 0.05),

@@ -40,12 +40,13 @@ def test_virtual_muscles_are_those_of_the_rigs_and_marked() -> None:
 
 
 def test_traits_do_not_know_size() -> None:
-    larger = muscles.scaled(RAIL.balance, RAIL.sheet, OTHER)
+    balance = replace(RAIL.balance, asymmetry=0.8, obstacles=((1.0, 30.0, 5.0),))
+    larger = muscles.scaled(balance, RAIL.sheet, OTHER)
     np.testing.assert_allclose(
         traits(larger, OTHER), traits(RAIL.balance, RAIL.sheet), rtol=0, atol=1e-9
     )
     again = muscles.scaled(larger, OTHER, RAIL.sheet)
-    np.testing.assert_allclose(again.pack(), RAIL.balance.pack(), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(again.pack(), balance.pack(), rtol=1e-12, atol=1e-12)
 
 
 def test_braid_follows_from_the_largest_force_as_from_the_angle() -> None:

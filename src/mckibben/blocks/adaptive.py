@@ -28,6 +28,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import (
     Block,
     Cost,
+    Ports,
     Run,
     Start,
     explicit_state,
@@ -35,9 +36,9 @@ from mckibben.blocks.base import (
 )
 from mckibben.blocks.compose import Layout, Series
 from mckibben.blocks.feedback import MEASURED
-from mckibben.blocks.fields import STRICT, Channel, Initial, Vector, vector
+from mckibben.blocks.fields import LONGEST_DELAY, STRICT, Channel, Initial, Vector, vector
 from mckibben.blocks.inverse import Inverse, Invertible
-from mckibben.blocks.kernels import Step
+from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.learning import (
     LARGEST,
     READY,
@@ -143,11 +144,81 @@ def learnable_of(block: Block) -> Learnable | None:
     return found if found and found.compensates == isinstance(block, Inverse) else None
 
 
-def width_of(model: Block, learnable: Learnable) -> float:
-    """Return the widest range that a model reaches, or else where it was fitted; 0 if unknown."""
-    low, high = model.reachable()
-    width = float(np.max(high - low))
-    return width if np.isfinite(width) else learnable.known_span
+def learning_part(model: Block) -> tuple[tuple[Block, ...], Block, tuple[Block, ...]]:
+    """Return what of a model is before the one part that learns, that part, and what is behind it.
+
+    Raises
+    ------
+    ModelError
+        Where no part learns, or several do.
+    """
+    parts = model.parts if isinstance(model, Series) else (model,)
+    places = [k for k, part in enumerate(parts) if learnable_of(part) is not None]
+    if len(places) != 1:
+        raise ModelError(
+            f"{len(places)} parts of {model.title!r} can learn while it runs. Remedy: adapt a pi, gpi, "
+            "mpi, cpi or balance model, of one part that learns."
+        )
+    return parts[: places[0]], parts[places[0]], parts[places[0] + 1 :]
+
+
+def width_of(parts: Sequence[Block]) -> float:
+    """Return the widest range that a part reaches, or else was fitted on, behind other parts."""
+    low, high = parts[0].reachable()
+    learnable = learnable_of(parts[0])
+    if learnable and learnable.known is not None and not np.isfinite([*low, *high]).all():
+        low, high = learnable.known.T
+    for part in parts[1:]:
+        low, high = part.passes(low, high)
+    return float(np.max(high - low))
+
+
+@step
+def prompt_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Correct a measurement; the state is past references, latest first."""
+    late = int(coefficients[0])
+    outputs[0] = inputs[1] + state[0] - state[late]
+    remember(inputs[0], state[: late + 1])
+
+
+@kernel
+def prompt_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
+    """Start as if the first reference had been there all along."""
+    state[:] = inputs[0]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Prompt(Block):
+    """What is measured, as if it came at once: moved on as the reference has since.
+
+    Parameters
+    ----------
+    late : float
+        Dead time [s].
+    reference, measured : Channel
+        What is asked for, and measured of it.
+    """
+
+    kind: ClassVar[str] = "prompt"
+    kernel: ClassVar[Step] = prompt_step
+    start_kernel: ClassVar[Start] = prompt_start
+    ports: ClassVar[Ports] = ("reference", "measured"), (), ("measured",)
+    rate_dependent: ClassVar[bool] = True
+    n_missable: ClassVar[int] = 1  # the measurement
+    n_states: ClassVar[int] = LONGEST_DELAY + 1
+
+    late: Annotated[FiniteFloat, Gt(0)]
+    reference: Channel
+    measured: Channel
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return the dead time in samples, but the one for which a command was held."""
+        late = round(self.late / needs_sample_time(self.kind, sample_time)) - 1
+        return np.array([float(min(max(late, 0), LONGEST_DELAY))])
+
+    @classmethod
+    def example(cls) -> Self:
+        return cls(0.1, Channel("displacement", "mm"), Channel(f"displacement{MEASURED}", "mm"))
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -158,7 +229,7 @@ class Adaptive(Block):
     ----------
     forward : Block
         The block undone, which declares what of it is learnt, or whose inverse does, as of a balance; or
-        a series of blocks of one channel, exactly one of which does.
+        a series of blocks, exactly one of which does.
     time : float
         How long it takes to learn what the motion shows [s]; positive.
     noise : float
@@ -184,14 +255,7 @@ class Adaptive(Block):
     forward_model = same_as("forward")
 
     def __post_init__(self) -> None:
-        if isinstance(self.forward, Series):
-            parts = self.forward.parts
-            learning = sum(learnable_of(part) is not None for part in parts)
-            if learning != 1 or any(len(p.inputs) != 1 or len(p.outputs) != 1 for p in parts):
-                raise ModelError(
-                    f"{learning} parts of this series can learn. Remedy: adapt pi, gpi, mpi, cpi or "
-                    "balance models: one part that learns, of one channel like the others."
-                )
+        learning_part(self.forward)
         self.forward.inverse()  # which refuses what has none
         self._check_settings()
         if self.memory is not None:
@@ -209,7 +273,8 @@ class Adaptive(Block):
                 f"{self.kind!r} cannot learn in a time of {self.time:g} s. Remedy: give {TIMES[0]:g} "
                 f"to {TIMES[1]:g} s."
             )
-        width = width_of(self.forward, self.learnable)
+        _, part, behind = learning_part(self.forward)
+        width = width_of((part, *behind))
         low, high = (bound * width for bound in NOISES) if 0 < width < np.inf else NOISES
         if not low <= self.noise <= high:
             raise ModelError(
@@ -257,23 +322,12 @@ class Adaptive(Block):
     # -- what it is made of ------------------------------------------------------------------
 
     @cached_property
-    def _apart(self) -> tuple[tuple[Block, ...], Block, tuple[Block, ...]]:
-        """What of a series is before the part that learns, that part, and what is behind it."""
-        parts = self.forward.parts if isinstance(self.forward, Series) else (self.forward,)
-        place = [learnable_of(part) is not None for part in parts].index(True)
-        return parts[:place], parts[place], parts[place + 1 :]
-
-    @cached_property
     def core(self) -> Adaptive:
         """What learns: this itself, or a part of a series, its noise by the mean slope behind it."""
         if not isinstance(self.forward, Series):
             return self
-        _, part, behind_it = self._apart
-        low, high = (float(end[0]) for end in part.reachable())
-        ends = np.array([low]), np.array([high])
-        for behind in behind_it:
-            ends = behind.passes(*ends)
-        slope = float(np.abs(ends[1] - ends[0])[0]) / (high - low)
+        _, part, behind = learning_part(self.forward)
+        slope = width_of((part, *behind)) / width_of((part,))
         core = Adaptive(part, self.time, self.noise / (slope if 0 < slope < np.inf else 1.0))
         learnt = self.memory is not None and len(self.memory) == core.n_learnt
         return replace(core, memory=self.memory) if learnt else core
@@ -281,33 +335,33 @@ class Adaptive(Block):
     @cached_property
     def _around(self) -> tuple[Block | None, Block | None]:
         """What undoes the parts behind the one that learns, and those before it, where there are any."""
-        before, _, behind = self._apart
+        before, _, behind = learning_part(self.forward)
         undo_behind = Series(behind).inverse() if behind else None
         return undo_behind, Series(before).inverse() if before else None
 
     @cached_property
     def parts(self) -> tuple[Block, ...]:
-        """Of a series: parts behind undone on reference and measurement, the core, those before."""
+        """Of a series: dead times, parts behind undone on both sides, the core, those before."""
         if self.core is self:
             return ()
         behind, before = self._around
-        found = (behind, behind, self.core, before)
+        found = (*self._prompt, behind, behind, self.core, before)
         return tuple(part for part in found if part is not None)
 
     @cached_property
-    def learnable(self) -> Learnable:
-        """What is learnt.
+    def _prompt(self) -> tuple[Prompt, ...]:
+        """What makes up for a dead time, of every measurement."""
+        late, channels = (
+            self.forward.dead_time,
+            zip(self.forward.outputs, self.measured, strict=True),
+        )
+        return tuple(Prompt(late, *pair) for pair in channels) if late > 0 else ()
 
-        Raises
-        ------
-        ModelError
-            Where nothing is.
-        """
+    @cached_property
+    def learnable(self) -> Learnable:
+        """What is learnt."""
         found = learnable_of(self.core.forward)
-        if found is None:
-            raise ModelError(
-                f"{self.forward.title!r} does not learn. Remedy: give a pi, gpi or balance model."
-            )
+        assert found is not None
         return found
 
     @cached_property
@@ -460,12 +514,22 @@ class Adaptive(Block):
         if not self.parts:
             return super().wired(board, taken)
         behind, before = self._around
-        signals = [behind.wired(board, [signal])[0] for signal in taken] if behind else taken
-        found = self.core.wired(board, signals)
-        found = before.wired(board, found) if before else found
+        named = dict(zip((channel.name for channel in self.inputs), taken, strict=True))
+        m = len(self.measured)
+        answers = list(taken[-m:])
+        for j, part in enumerate(self._prompt):
+            answers[j : j + 1] = part.wired(board, [taken[j], answers[j]])
+
+        def run(block: Block | None, driven: Sequence[Any]) -> Sequence[Any]:
+            own = [named[name] for name in block.scheduling] if block else []
+            return block.wired(board, [*driven, *own]) if block else driven
+
+        asked, measured = run(behind, taken[:m]), run(behind, answers)
+        loads = [named[name] for name in self.core.fixed.scheduling]
+        found = run(before, self.core.wired(board, [*asked, *loads, *measured]))
         if not isinstance(self.start, str):
             board.resume(self.start)
-        return found
+        return [*found]
 
     def report(self, state: Array) -> None:
         if self.parts:
@@ -483,7 +547,7 @@ class Adaptive(Block):
     def present(self, state: Array) -> Block:
         """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
         found = self.learnable.with_parameters(self._split(self._core_state(state))[2])
-        before, _, behind = self._apart
+        before, _, behind = learning_part(self.forward)
         return Series((*before, found, *behind)) if isinstance(self.forward, Series) else found
 
     def drift(self, state: Array) -> Drift:
@@ -541,14 +605,8 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
         raise ModelError(
             f"{model.title!r} learns already. Remedy: use it as it is, or adapt the model it undoes."
         )
-    parts = model.parts if isinstance(model, Series) else (model,)
-    learnable = next(filter(None, map(learnable_of, parts)), None)
-    if learnable is None:
-        raise ModelError(
-            f"{model.title!r} cannot learn while it runs. Remedy: adapt a pi, gpi, mpi, cpi or balance "
-            "model."
-        )
-    width = width_of(model, learnable)
+    _, part, behind = learning_part(model)
+    width = width_of((part, *behind))
     if noise is None and not 0 < width < np.inf:
         raise ModelError(
             f"what {model.title!r} reaches does not tell how exactly it is measured. "

@@ -82,8 +82,8 @@ class Learnable:
         Returns the relative change of every group from the fitted one, given parameters.
     whole_changes : array, shape (n_groups,)
         How far an output moves where a group changes by the whole of it; infinite if unknown.
-    known_span : float
-        Largest range of an output where it was fitted; 0 if unknown.
+    known : array, shape (n_outputs, 2), optional
+        Lowest and highest outputs where it was fitted, if known.
     compensates : bool
         Whether the block is itself the compensator that runs, and its inverse the model.
     n_more_states : int
@@ -102,7 +102,7 @@ class Learnable:
     groups: tuple[Group, ...]
     group_changes: Callable[[Array], Array]
     whole_changes: Array
-    known_span: float = 0.0
+    known: Array | None = None
     compensates: bool = False
     n_more_states: int = 1
     n_more_scratch: int = 0
@@ -318,6 +318,40 @@ def _bound(root: Array, widest: Array, i: int) -> None:
     first = p + (i * (i + 1)) // 2
     for j in range(i + 1, p):
         root[first + i] *= less
+        first += j
+
+
+@kernel
+def pull_back(c: Array, learnt: Array, along: Array, work: Array) -> None:
+    """Bring what measurements do not tell back to what was fitted, in the time to learn in.
+
+    It is weighed as if the fit were measured too: by the covariance, over the widest. ``along`` and
+    ``work`` have a number a parameter to compute in.
+    """
+    p = along.size
+    for i in range(p):
+        work[i] = c[1] * (c[4 + 2 * p + i] - learnt[i]) / (c[4 + i] * c[4 + p + i])
+    covariant(learnt, work, along)
+    for i in range(p):
+        learnt[i] += c[4 + i] * along[i]
+
+
+@kernel
+def covariant(learnt: Array, vector: Array, product: Array) -> None:
+    """Multiply by the covariance U D U'."""
+    p = product.size
+    root = learnt[2 * p : 2 * p + root_size(p)]
+    first = p + (p * (p - 1)) // 2
+    for j in range(p - 1, -1, -1):
+        first -= j
+        total = vector[j]
+        for i in range(j):
+            total += root[first + i] * vector[i]
+        product[j] = root[j] * total
+    first = p
+    for j in range(p):
+        for i in range(j):
+            product[i] += root[first + i] * product[j]
         first += j
 
 

@@ -2,7 +2,7 @@
 
     min sum_t |G_t (p_t - q_t) - e_t|^2 / 2   where all limits hold.
 
-G_t (n by n) are the model's slopes along the pressures q_t, and e_t is what these leave of the error. A
+G_t (m by n) are the model's slopes along the pressures q_t, and e_t is what these leave of the error. A
 limit is a row [whether it is of changes, bound, n weights]: the weighted sum of the n pressures, or of
 how they change in a step, stays at or below the bound. A row with one weight is a muscle's own.
 
@@ -282,9 +282,10 @@ def plan_several(
 ) -> int:
     """Find the pressures of a horizon from those before it; return the steps taken.
 
-    ``slopes`` are N by n by n, ``nominal`` (q) and ``errors`` (e) N by n.
+    ``slopes`` are N by m by n, ``nominal`` (q) N by n and ``errors`` (e) N by m.
     """
     width, block, length = n + 2, n * n, nominal.size // n
+    n_errors = errors.size // length
     m = rows.size // width
     count, size_of = length * m, length * block
     hessian, system = scratch[:size_of], scratch[size_of : 3 * size_of]
@@ -297,22 +298,23 @@ def plan_several(
     goal, room_step = duals[3 * count : 4 * count], duals[4 * count : 5 * count]
     price_step, p = duals[5 * count :], path[n:]
     size = 0.0
-    for i in range(size_of):
+    for i in range(errors.size * n):
         size += slopes[i] * slopes[i]
     size = max(size / (length * n), FLAT)
     for t in range(length):
-        slope, own = slopes[t * block : (t + 1) * block], hessian[t * block : (t + 1) * block]
+        slope, own = slopes[t * n_errors * n :], hessian[t * block : (t + 1) * block]
         for i in range(n):
             for j in range(n):
                 total = 0.0
-                for k in range(n):
+                for k in range(n_errors):
                     total += slope[k * n + i] * slope[k * n + j]
                 own[i * n + j] = total / size
             own[i * n + i] += STAYS
         for i in range(n):
             wished[t * n + i] = 0.0
+            for k in range(n_errors):
+                wished[t * n + i] += slope[k * n + i] * errors[t * n_errors + k] / size
             for k in range(n):
-                wished[t * n + i] += slope[k * n + i] * errors[t * n + k] / size
                 wished[t * n + i] += own[i * n + k] * nominal[t * n + k]
     fill(p, nominal)
     for t in range(length):

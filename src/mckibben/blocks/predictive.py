@@ -12,6 +12,7 @@ References come ``horizon - 1`` samples ahead, one a sample, and are kept until 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, cached_property
 from typing import Annotated, Any, ClassVar, Self
 
@@ -49,7 +50,7 @@ NUDGE = 1e-3
 MOST = 1e6
 """Of limits: bar, or bar/s."""
 
-HEAD = 7
+HEAD = 8
 """Coefficients before the nudges."""
 
 PASSES = 2
@@ -86,6 +87,16 @@ def model_state(compensator: Block, state: Array) -> Array:
         f"{compensator.title!r} is no exact inverse whose memory could be foreseen. Remedy: invert a "
         "model such as pi, gpi, mpi or balance (mckibben invert), and give that."
     )
+
+
+def at_once(block: Any) -> Any:
+    """Return a block without its dead times, which its inverse knows nothing of."""
+    match block:
+        case Series() | PerChannel():
+            return replace(block, parts=tuple(map(at_once, block.parts)))
+        case Inverse():
+            return replace(block, forward=at_once(block.forward))
+    return replace(block, dead_time=0.0) if block.dead_time > 0 else block
 
 
 def undoing_state(compensator: Block) -> Callable[[Array], Array]:
@@ -186,9 +197,9 @@ def predictive_kernels(
 
     They are made of the kernels of a model and of its inverse; ``resume`` fills the inverse's state
     from the model's. Coefficients are [n, horizon, limits, the model's states, the inverse's, the
-    model's coefficients, the inverse's], nudges (n), lowest pressures (n), limits, and the coefficients
-    of both. The state is [the model's, references to come (horizon by n), last pressures (n), whether
-    there are some, plans made].
+    model's coefficients, the inverse's, references m], nudges (n), lowest pressures (n), limits, and the
+    coefficients of both. The state is [the model's, references to come (horizon by m), last pressures
+    (n), whether there are some, plans made].
     """
     answers, undoes, begins = _in_room(model_step), _in_room(undo_step), _start_in_room(undo_start)
     predictive_step = step_of(answers, undoes, resume, one=one, decorate=kernel)
@@ -234,14 +245,15 @@ def step_of(
 
         ``tables`` become [slopes, errors]; they are followed by three vectors to compute in.
         """
-        size, count = memory.size, wished.size
+        size, length, count = memory.size, path.size // n - 1, wished.size
+        m = count // length
         trial, kept, after = states[:size], states[size : 2 * size], states[2 * size : 3 * size]
         slopes, errors = tables[: n * count], tables[n * count : (n + 1) * count]
         vectors = tables[(n + 1) * count :]
-        way, answer, change = vectors[:n], vectors[n : 2 * n], vectors[2 * n : 3 * n]
+        way, answer, change = vectors[:n], vectors[n : n + m], vectors[n + m : n + 2 * m]
         way[:] = 1.0
         fill(kept, memory)
-        for t in range(count // n):
+        for t in range(length):
             for k in range(n):
                 p = path[(t + 1) * n + k]
                 moved = p - path[t * n + k]
@@ -255,11 +267,11 @@ def step_of(
                 given[k] = path[(t + 1) * n + k] + way[k] * nudges[k]
                 fill(trial, kept)
                 answers(model, trial, room, given, change)
-                for i in range(n):
-                    slopes[(t * n + i) * n + k] = (change[i] - answer[i]) / (way[k] * nudges[k])
+                for i in range(m):
+                    slopes[(t * m + i) * n + k] = (change[i] - answer[i]) / (way[k] * nudges[k])
                 given[k] = path[(t + 1) * n + k]
-            for k in range(n):
-                errors[t * n + k] = wished[t * n + k] - answer[k]
+            for i in range(m):
+                errors[t * m + i] = wished[t * m + i] - answer[i]
             fill(kept, after)
 
     def predictive_step(
@@ -267,27 +279,30 @@ def step_of(
     ) -> None:
         """Give the first pressures of a horizon within all limits, and take that step."""
         c = coefficients
-        n, count, size, n_undoing = int(c[0]), int(c[1]) * int(c[0]), int(c[3]), int(c[4])
+        n, m, length, size, n_undoing = int(c[0]), int(c[7]), int(c[1]), int(c[3]), int(c[4])
+        planned, count = length * n, length * m
         nudges, lowest, numbers = c[HEAD : HEAD + n], c[HEAD + n : HEAD + 2 * n], c[HEAD + 2 * n :]
         n_limits = int(c[2]) * (n + 2)
         rows, own = numbers[:n_limits], numbers[n_limits:]
         model, undo = own[: int(c[5])], own[int(c[5]) : int(c[5]) + int(c[6])]
         memory, wished, last = state[:size], state[size : size + count], state[size + count :]
         states, undoing = scratch[: 3 * size], scratch[3 * size : 3 * size + n_undoing]
-        given = scratch[3 * size + n_undoing : 3 * size + n_undoing + inputs.size]
-        rest = scratch[3 * size + n_undoing + inputs.size :]
-        path, nominal = rest[: n + count], rest[n + count : 2 * (n + count)]
-        tables = rest[2 * (n + count) : 2 * (n + count) + (n + 1) * count + 3 * n]
-        room = rest[2 * (n + count) + (n + 1) * count + 3 * n :]
+        more = scratch[3 * size + n_undoing :]
+        asked, given = more[: inputs.size], more[inputs.size : 2 * inputs.size - m + n]
+        rest = more[2 * inputs.size - m + n :]
+        path, nominal = rest[: n + planned], rest[n + planned : 2 * (n + planned)]
+        tables = rest[2 * (n + planned) : 2 * (n + planned) + (n + 1) * count + n + 2 * m]
+        room = rest[2 * (n + planned) + (n + 1) * count + n + 2 * m :]
         first = last[n] == 0.0
-        for i in range(count - n):
-            wished[i] = inputs[i % n] if first else wished[i + n]
-        fill(wished[count - n :], inputs[:n])
+        for i in range(count - m):
+            wished[i] = inputs[i % m] if first else wished[i + m]
+        fill(wished[count - m :], inputs[:m])
         resume(model, memory, undoing)
-        fill(given, inputs)
-        for t in range(int(c[1])):
-            fill(given[:n], wished[t * n : (t + 1) * n])
-            undoes(undo, undoing, room, given, path[(t + 1) * n : (t + 2) * n])
+        fill(asked, inputs)
+        fill(given[n:], inputs[m:])
+        for t in range(length):
+            fill(asked[:m], wished[t * m : (t + 1) * m])
+            undoes(undo, undoing, room, asked, path[(t + 1) * n : (t + 2) * n])
         if first:  # whatever the rate
             fill(nominal[:n], lowest)
             fill(nominal[n : 2 * n], path[n : 2 * n])
@@ -306,7 +321,7 @@ def step_of(
             last[n + 1] += 1.0
         fill(last[:n], path[n : 2 * n])
         fill(given[:n], last[:n])
-        answers(model, memory, room, given, nominal[:n])
+        answers(model, memory, room, given, asked[:m])
         fill(outputs, last[:n])
 
     return predictive_step
@@ -377,7 +392,7 @@ class Predictive(Block):
     outputs = same_as("compensator.outputs")
 
     def __post_init__(self) -> None:
-        model_state(self.compensator, np.zeros(self.compensator.n_states))
+        model_state(self._undoing, np.zeros(self._undoing.n_states))
         n = len(self.outputs)
         if strange := [c.name for c in self.outputs if not drives(c)]:
             raise ModelError(
@@ -406,12 +421,22 @@ class Predictive(Block):
         return self.compensator.inverse()
 
     @cached_property
+    def _undoing(self) -> Block:
+        """The compensator, of a model whose outputs come at once."""
+        return at_once(self.compensator)
+
+    @cached_property
+    def _planned(self) -> Block:
+        """The model along which is planned."""
+        return self._undoing.inverse()
+
+    @cached_property
     def pressures(self) -> tuple[Array, Array]:
         """Lowest and highest pressure of every muscle [bar], shape (n,) each."""
-        ends = self.pressure_range or getattr(self.compensator, "pressure_range", None)
-        if ends is None:
+        if self.pressure_range is None:
             return self.compensator.reachable()
-        return np.full(len(self.outputs), ends[0]), np.full(len(self.outputs), ends[1])
+        low, high = self.pressure_range
+        return np.full(len(self.outputs), low), np.full(len(self.outputs), high)
 
     @property
     def samples_ahead(self) -> int:  # type: ignore[override]
@@ -421,8 +446,8 @@ class Predictive(Block):
     @property
     def n_states(self) -> int:
         """The model's memory; references to come; last pressures, whether there are; plans made."""
-        n = len(self.outputs)
-        return self.forward_model.n_states + self.horizon * n + n + 2
+        n, m = len(self.outputs), self.compensator.n_driven
+        return self._planned.n_states + self.horizon * m + n + 2
 
     def rows(self, sample_time: float) -> Array:
         """Return all limits, as `mckibben.blocks.planning` says."""
@@ -436,9 +461,8 @@ class Predictive(Block):
         """Return the state before the first sample: as if its reference had been there all along."""
         if initial is not None and not isinstance(initial, str):
             return explicit_state(self, initial)
-        n = len(self.outputs)
-        own = model_state(self.compensator, self.compensator.initial_state(first, initial))
-        return np.concatenate([own, np.zeros(self.horizon * n + n + 2)])
+        own = model_state(self._undoing, self._undoing.initial_state(first, initial))
+        return np.concatenate([own, np.zeros(self.n_states - own.size)])
 
     @property
     def start(self) -> Initial:
@@ -447,21 +471,23 @@ class Predictive(Block):
     @property
     def n_scratch(self) -> int:
         """States to try, pressures, slopes, and what a plan computes in."""
-        n, model, undo = len(self.outputs), self.forward_model, self.compensator
+        model, undo = self._planned, self._undoing
+        n, m = len(self.outputs), undo.n_driven
         planned = plan_scratch(self.horizon, n, len(self.rows(1.0)))
-        own = 3 * model.n_states + undo.n_states + len(undo.inputs) + 2 * n + 3 * n
+        given = len(model.inputs) + len(undo.inputs)
+        own = 3 * model.n_states + undo.n_states + given + 2 * n + n + 2 * m
         room = max(planned, model.n_scratch, undo.n_scratch)
-        return own + self.horizon * n * (3 + n) + room
+        return own + self.horizon * (2 * n + m * (1 + n)) + room
 
     @cached_property
     def _kernels(self) -> tuple[Step, Start] | None:
         """Those of a compensator of one kernel; None where it is of several."""
-        resume = resume_of(self.compensator)
+        resume = resume_of(self._undoing)
         if resume is None or not isinstance(self.compensator.start, str):
             return None
         (undo_step, undo_start), (model_step, _) = (
-            self.compensator.c_kernels,
-            self.forward_model.c_kernels,
+            self._undoing.c_kernels,
+            self._planned.c_kernels,
         )
         one = len(self.outputs) == 1
         return predictive_kernels(model_step, undo_step, undo_start, resume, one=one)
@@ -480,7 +506,7 @@ class Predictive(Block):
                 f"{self.compensator.title!r} cannot be run ahead in C. Remedy: export pi, gpi or "
                 "balance that starts at its first sample, or stream this one from Python."
             )
-        blocks = (self.forward_model, self.compensator)
+        blocks = (self._planned, self._undoing)
         return self._numbers(sample_time, [block.coefficients(sample_time) for block in blocks])
 
     def _numbers(self, sample_time: float | None, own: list[Array]) -> Array:
@@ -491,10 +517,10 @@ class Predictive(Block):
             len(low),
             self.horizon,
             len(rows),
-            self.forward_model.n_states,
-            self.compensator.n_states,
+            self._planned.n_states,
+            self._undoing.n_states,
         ]
-        sizes = [len(numbers) for numbers in own]
+        sizes = [*map(len, own), self.compensator.n_driven]
         return np.concatenate([[*head, *sizes], NUDGE * (high - low), low, rows.ravel(), *own])
 
     @property
@@ -508,7 +534,7 @@ class Predictive(Block):
         """Return that of the inverse over the horizon; at worst, of all plans too."""
         n, length = len(self.outputs), self.horizon
         inverse = self.compensator.cost(sample_time).usual
-        answers = PASSES * (n + 1) * self.forward_model.cost(sample_time).usual
+        answers = PASSES * (n + 1) * self._planned.cost(sample_time).usual
         step = 2 * n**3 + len(self.rows(1.0)) * (4 * n * n + 12 * n + 20)
         planned = PASSES * (4 * length if n == 1 else MOST_STEPS * step)
         return Cost(length * inverse, length * (inverse + answers + planned))
@@ -517,9 +543,9 @@ class Predictive(Block):
         if self._kernels is not None:
             return super().bind(sample_time, state, inputs, outputs)
         numbers = self._numbers(sample_time, [np.empty(0), np.empty(0)])
-        scratch, undoing = np.empty(self.n_scratch), undoing_state(self.compensator)
+        scratch, undoing = np.empty(self.n_scratch), undoing_state(self._undoing)
         own_time = needs_sample_time(self.kind, sample_time)
-        answers, undoes = (one_step_of(b, own_time) for b in (self.forward_model, self.compensator))
+        answers, undoes = (one_step_of(b, own_time) for b in (self._planned, self._undoing))
 
         def resume(model: Array, memory: Array, own: Array) -> None:
             del model

@@ -61,7 +61,7 @@ def _of_balance(placed: Placed, model: Block, recording: Recording) -> Asked:
         for channel, (low, high) in zip(balance.scheduled, balance.known, strict=False)
     ]
     for place, channel in enumerate(driven):
-        known = balance.pressure_range if placed.solved else balance.hull[place]
+        known = balance.pressure_range if placed.solved else balance.known_coordinates[place]
         if known is not None:
             asked.append((channel, found[:, place], (known[0], known[1])))
     return asked

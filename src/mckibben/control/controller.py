@@ -121,9 +121,9 @@ class BlockController(Controller):
 
     def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
         given = np.concatenate([reference, scheduled])
-        if self._ahead is not None and not self._feels.any():
-            # what is measured answers the reference of the last step; a plan takes what schedules as
-            # it is now
+        if self._ahead is not None and (self.preview > 0.0 or not self._feels.any()):
+            # what is measured answers the reference of the last step, or before by a dead time that the
+            # block knows; a plan takes what schedules as it is now
             known = len(reference) if self.samples_ahead else len(given)
             given[:known] = self._ahead[:known]
         if self._feels.any():

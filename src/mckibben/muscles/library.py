@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,6 +21,9 @@ from mckibben.muscles.traits import GROUPS, PLACES, traits
 from mckibben.system.ordinary import DESCRIPTION, read_text
 
 FORMAT, VERSION = "mckibben-muscle", 1
+
+HEADING = ("format", "version", "kind")
+"""Of a saved balance, which a muscle's file leaves out."""
 
 FOLDER = Path(__file__).parent / "library"
 
@@ -153,7 +156,8 @@ def _load(path: Path) -> Muscle:
         )
     try:
         found = _File.model_validate(content)
-        balance = from_dict(to_dict(Balance.example()) | found.balance)
+        example = to_dict(Balance.example())
+        balance = from_dict({name: example[name] for name in HEADING} | found.balance)
     except ValidationError as error:
         raise refused(error, path, "what a muscle's file holds") from None
     except ModelError as error:
@@ -198,7 +202,10 @@ def described(muscle: Muscle) -> str:
     """Return a muscle as the text of its file."""
     block = to_dict(muscle.balance)
     channels = {"driven", "scheduled", "given"}
-    left = {"format", "version", "kind", "pressure_range", *channels}
+    left = {*HEADING, "pressure_range", *channels}
+    left |= {
+        each.name for each in fields(Balance) if getattr(muscle.balance, each.name) == each.default
+    }
     text = [f'format = "{FORMAT}"', f"version = {VERSION}"]
     text += [f"{name} = {_toml(getattr(muscle, name))}" for name in ("title", "source", "licence")]
     text += [f"virtual = {_toml(muscle.virtual)}", "", "[sheet]"]

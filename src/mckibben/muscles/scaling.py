@@ -41,6 +41,8 @@ def scaled(balance: Balance, of: Sheet, to: Sheet) -> Balance:
     springs[:, 0] *= force
     springs[:, 1:] *= per_length
     span = balance.pressure_range
+    obstacles = np.array(balance.obstacles).reshape(-1, 3 + balance.n_schedules)
+    obstacles *= (1.0, length, *(1 + balance.n_schedules) * (per_length,))
     return replace(
         balance,
         springs=rows(springs),
@@ -53,6 +55,9 @@ def scaled(balance: Balance, of: Sheet, to: Sheet) -> Balance:
         walls=vector(length / pressure * np.array(balance.walls)),
         limits=vector(length / pressure * np.array(balance.limits)),
         grip=balance.grip * pressure,
+        grips=vector(pressure * np.array(balance.grips)),
+        obstacles=rows(obstacles.reshape(np.shape(balance.obstacles))),
+        preload=balance.preload * pressure,
         hull=times(balance.hull, length),
         scale=balance.scale * length,
         bladders=vector(per_length * np.array(balance.bladders)),

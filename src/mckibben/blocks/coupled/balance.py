@@ -2,13 +2,14 @@
 
 What a muscle's pressure gives over its effective area holds its load, springs (its own and those that
 couple muscles, which stiffen with whatever schedules them), its rubber's elasticity, friction of the
-braid, relaxation, damping, inertia and what it meets; what has to push harder than it can goes slack. The
-equation is that of `mckibben.blocks.coupled.balance_law`. A load enters once. Springs are symmetric, what
-rubs and relaxes is not negative, areas outweigh friction, and stiffness what areas lose, as identification
-sees to: then pressures hold muscles in one place only, which is found, and friction never makes energy.
+braid, relaxation, damping, inertia and what it meets; what has to push harder than it can goes slack.
+The equation is that of `mckibben.blocks.coupled.balance_law`. A load enters once. Springs are symmetric,
+what rubs and relaxes is not negative, areas outweigh friction, and stiffness what areas lose, as
+identification sees to: then pressures hold muscles in one place only, which is found, and friction never
+makes energy.
 
-This block gives pressures for coordinates, explicitly: the compensator. Its inverse gives coordinates for
-pressures. `mckibben.blocks.coupled.load_estimate` gives loads for both.
+This block gives pressures for coordinates, explicitly: the compensator. Its inverse gives coordinates
+for pressures. `mckibben.blocks.coupled.load_estimate` gives loads for both.
 
 The form is this package's own. Friction that breaks away after a travel follows "A Multistate Friction
 Model for the Compensation of the Asymmetric Hysteresis in the Mechanical Response of Pneumatic
@@ -30,19 +31,19 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Block, Cost, Ports, Start, needs_sample_time
 from mckibben.blocks.compose import Series
+from mckibben.blocks.coupled.balance_adaptive import learnable_balance
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
     FROM_REST,
     IN_TIME,
     NEARLY,
     NEVER,
-    inverse_step,
+    give_pressures,
     solve_equilibrium,
     start_at_rest,
     start_balance,
     update_state,
 )
-from mckibben.blocks.coupled.balance_learning import learnable_balance
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, step
@@ -57,7 +58,10 @@ def balance_step(
     coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
 ) -> None:
     """Give pressures; the last state counts samples that muscles cannot reach."""
-    inverse_step(coefficients, state, scratch, inputs, outputs)
+    c = coefficients
+    m, n_x = int(c[1]), int(c[2]) + int(c[4])
+    way = give_pressures(c, state, scratch, inputs, outputs)
+    update_state(c, state, way, scratch[:m], outputs, inputs[m : m + n_x])
 
 
 @step
@@ -73,7 +77,6 @@ def balance_inverse_step(
     way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
     left = solve_equilibrium(c, state, way, q, x, p, scratch[m:])
     update_state(c, state, way, q, p, x)
-    state[state.size - 2] = 0.0
     for j in range(m):
         outputs[j] = q[j] - state[state.size - 2 - m + j]
     if not left < NEARLY:
@@ -92,7 +95,6 @@ def balance_inverse_start(
     if virgin:
         solve_equilibrium(c, state, AT_REST, q, x, p, scratch[m + n :])
         update_state(c, state, AT_REST, q, p, x)
-        state[state.size - 2] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -348,7 +350,7 @@ class Balance(Invertible):
             " + ".join(term for term, there in terms.items() if there)
             for terms in (on_coordinates, of_muscles)
         )
-        balance = (f"p_k A_k(y_k) = {outer} + {inner}",)
+        balance: tuple[str, ...] = (f"p_k A_k(y_k) = {outer} + {inner}",)
         if self.directions:
             pulls = (
                 rf"\sum_k W_{{kj}} \left(p_k A_k(y_k) - R_k\right) = {outer.replace('_k', '_j')}"
@@ -381,6 +383,17 @@ class Balance(Invertible):
     def n_obstacles(self) -> int:
         """How many obstacles every coordinate may meet."""
         return len(self.obstacles[0]) // (3 + self.n_schedules) if self.obstacles else 0
+
+    @property
+    def moves(self) -> Array:
+        """How much every muscle shortens by every coordinate, shape (n, m)."""
+        return np.array(self.directions) if self.directions else np.eye(len(self.given))
+
+    @property
+    def known_coordinates(self) -> Array:
+        """Lowest and highest coordinates that the shortenings known come to, shape (m, 2)."""
+        ends = np.linalg.pinv(self.moves)[:, :, np.newaxis] * np.array(self.hull)
+        return np.stack([ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)], axis=1)
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
@@ -429,13 +442,20 @@ class Balance(Invertible):
             *(
                 self.hull,
                 np.transpose(columns),
-                self.directions or np.eye(n),
+                self.moves,
                 np.transpose(dynamic),
             ),
             *(self.elasticity, self.areas, self.friction, self.relaxation),
         )
         flat = np.hstack([np.reshape(table, (n, -1)) for table in own])
         return np.concatenate([*shared, *(np.concatenate(row) for row in tables), flat.ravel()])
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the lowest and highest pressures."""
+        if self.pressure_range is None:
+            return super().reachable()
+        low, high = self.pressure_range
+        return np.full(len(self.given), low), np.full(len(self.given), high)
 
     def report(self, state: Array) -> None:
         """Warn of references that would need pressures out of range, or muscles that push."""
@@ -527,8 +547,10 @@ class Balance(Invertible):
             name += f" to {whose} {to}" if to not in (0, index[0] + 1) else ""
             if power == 0:
                 return name
-            by, degree = divmod(power - 1, self.degree)
-            return f"{name} by {self.scheduled[by].name}{f'^{degree + 1}' if degree else ''}"
+            of_scheduled, degree = divmod(power - 1, self.degree)
+            return (
+                f"{name} by {self.scheduled[of_scheduled].name}{f'^{degree + 1}' if degree else ''}"
+            )
         if field == "loads":
             return f"share{of} of {self.scheduled[place - self.n_loads].name}"
         if field == "obstacles":

@@ -1,7 +1,7 @@
 """Forces in balance: the terms of every muscle, and the two solutions of their equation.
 
-Of coordinates q that n muscles move, with y_k = W_k q the shortening of muscle k (W is the identity where
-every coordinate has a muscle of its own), virtual work asks at every coordinate j
+Of coordinates q that n muscles move, with y_k = W_k q the shortening of muscle k (W is the identity
+where every coordinate has a muscle of its own), virtual work asks at every coordinate j
 
     sum_l C_jl F_l + S_j(x) (1, q) + K_j(x) (q_j - o_j) + sum_k W_kj min(R_k, b_k) = 0,
 
@@ -17,9 +17,9 @@ Pressures follow from coordinates muscle by muscle; coordinates from pressures a
 energy, by Newton's method with a search along every step.
 
 Coefficients: the head, r (m), decays and gains of the lags (l each), g (schedules); of every coordinate
-its springs (powers of what schedules by 1 + coordinates), loads, and the side (1 or -1), place and stiffness of obstacles;
-of every muscle lowest and highest shortening known, w, b, W, then the coefficients of its terms: d, l, m,
-own spring, elasticity, area, friction, relaxation. State: coordinates, stretches, stops (muscle by
+its springs (powers of what schedules by 1 + coordinates), loads, and of obstacles the side (1 or -1),
+place and stiffness; of every muscle lowest and highest shortening known, w, b, W, then the coefficients
+of its terms: d, l, m, own spring, elasticity, area, friction, relaxation. State: coordinates, stretches, stops (muscle by
 muscle), lags (the same), with mass the last two moves of each muscle, the tare of coordinates, whether
 nothing came before, samples amiss.
 """
@@ -118,25 +118,32 @@ def shortening(c: Array, k: int, q: Array) -> float:
 
 
 @kernel
-def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> float:
-    """Return the force of loads, springs and obstacle on coordinate j, and fill its gradient."""
-    m, n_x, degree, n_loads = int(c[1]), int(c[2]), int(c[3]), int(c[4])
+def spring_row(c: Array, j: int, x: Array, row: Array) -> float:
+    """Fill the springs of coordinate j to all, as scheduled; return its constant force."""
+    m, degree = int(c[1]), int(c[3])
     place = coordinate_at(c, j)
-    force = c[place]
+    constant = c[place]
     for i in range(m):
-        gradient[i] = c[place + 1 + i]
-        force += gradient[i] * q[i]
-    for s in range(n_x):
+        row[i] = c[place + 1 + i]
+    for s in range(int(c[2])):
         power = 1.0
         for _ in range(degree):
             power *= x[s]
             place += 1 + m
-            force += power * c[place]
+            constant += power * c[place]
             for i in range(m):
-                spring = power * c[place + 1 + i]
-                force += spring * q[i]
-                gradient[i] += spring
-    place += 1 + m
+                row[i] += power * c[place + 1 + i]
+    return constant
+
+
+@kernel
+def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> float:
+    """Return the force of loads, springs and obstacle on coordinate j, and fill its gradient."""
+    m, n_x, n_loads = int(c[1]), int(c[2]), int(c[4])
+    force = spring_row(c, j, x, gradient)
+    for i in range(m):
+        force += gradient[i] * q[i]
+    place = coordinate_at(c, j) + (1 + n_x * int(c[3])) * (1 + m)
     for i in range(n_loads):
         force += c[place + i] * x[n_x + i]
     place += n_loads
@@ -235,8 +242,8 @@ def resistance(
 ) -> tuple[float, float, float]:
     """Fill the terms of muscle k and their slopes by y; return their force, its slope, and its size."""
     n, m, n_s, n_l, n_e, n_a = int(c[0]), int(c[1]), int(c[5]), int(c[6]), int(c[7]), int(c[8])
-    own, place, width, rate = muscle_at(c, k), terms_at(c, k), n_terms(c), c[15]
-    first = DYNAMIC + n_e
+    own, width, rate, first = muscle_at(c, k), n_terms(c), c[15], DYNAMIC + n_e
+    place = own + OWN + m
     before = shortening(c, k, state)
     moved = y - before
     for i in range(first):
@@ -275,18 +282,22 @@ def resistance(
         terms[width - n_l + i] = 0.0
         slopes[width - n_l + i] = 0.0
         if way != AT_REST:
-            past = state[m + n + n * n_s + k * n_l + i]
-            terms[width - n_l + i] = c[HEAD + n_s + i] * past + gain * moved
+            behind = state[m + n + n * n_s + k * n_l + i]
+            terms[width - n_l + i] = c[HEAD + n_s + i] * behind + gain * moved
             slopes[width - n_l + i] = gain
     a, narrowing = area(c, k, y)
     force, slope, size = rubbed - p * a, -p * narrowing, abs(rubbed) + abs(p * a)
-    for i in range(width):
-        if i < first or i >= first + n_a:
-            slope += c[place + i] * slopes[i]
-        if i < first or i >= width - n_l:
-            part = c[place + i] * terms[i]
-            force += part
-            size += abs(part)
+    for i in range(first):
+        part = c[place + i] * terms[i]
+        force += part
+        size += abs(part)
+        slope += c[place + i] * slopes[i]
+    for i in range(width - n_l, width):
+        part = c[place + i] * terms[i]
+        force += part
+        size += abs(part)
+    for i in range(first + n_a, width):
+        slope += c[place + i] * slopes[i]
     return force, slope, size
 
 
@@ -302,7 +313,7 @@ def muscle_force(
     terms: Array,
     slopes: Array,
 ) -> tuple[float, float, float]:
-    """Do as `resistance`; of a slack muscle terms are zero, and the force is the most it resists with."""
+    """Do as `resistance`; of a slack muscle terms are 0, and the force is the most it resists with."""
     force, slope, size = resistance(c, k, state, way, y, p, x, terms, slopes)
     most = c[muscle_at(c, k) + 3]
     if not force > most:
@@ -315,7 +326,7 @@ def muscle_force(
 
 @kernel
 def update_state(c: Array, state: Array, way: int, q: Array, p: Array, x: Array) -> None:
-    """Bring the state to where the muscles are now."""
+    """Bring the state to where the muscles are now, after which something has come before."""
     n, m, n_s, n_l = int(c[0]), int(c[1]), int(c[5]), int(c[6])
     for k in range(n):
         y = shortening(c, k, q)
@@ -339,6 +350,7 @@ def update_state(c: Array, state: Array, way: int, q: Array, p: Array, x: Array)
         state[m + k] = stretch
     for j in range(m):
         state[j] = q[j]
+    state[state.size - 2] = 0.0
 
 
 # -- coordinates for pressures -------------------------------------------------------------------
@@ -523,9 +535,10 @@ def solve_pressures(
 ) -> bool:
     """Fill the pressures that hold muscles at coordinates; return whether there are such.
 
-    Muscles that are more than coordinates take the forces that they have at the pressure they share, and
-    the least changes of them that balance; those that would leave the range of pressures stay at its end,
-    one by one, and the others take their part. ``work`` has two numbers a muscle more than `work_size`.
+    Muscles that are more than coordinates take the forces that they rest with at the pressure they
+    share, and the least changes of them that balance; those that would leave the range of pressures, or
+    go slack, stay at its end, one by one, and the others take their part. ``work`` has two numbers a
+    muscle more than `work_size`.
     """
     n, m = int(c[0]), int(c[1])
     lacks, gradient = work[:m], work[m : 2 * m]
@@ -533,54 +546,58 @@ def solve_pressures(
     if c[20] == 0.0:
         reached = True
         for k in range(n):
-            wanted, most = -coupling_force(c, k, q, x, gradient), c[muscle_at(c, k) + 3]
-            reached = reached and wanted <= most
-            p[k] = pressure_for(c, k, state, way, q[k], min(wanted, most), x, terms)
+            pulled = coupling_force(c, k, q, x, gradient)
+            most = c[muscle_at(c, k) + 3]
+            reached = reached and -pulled <= most
+            p[k] = pressure_for(c, k, state, way, q[k], min(-pulled, most), x, terms)
         return reached
-    forces, free = (
-        work[work_size(c) : work_size(c) + n],
-        work[work_size(c) + n : work_size(c) + 2 * n],
-    )
-    width, n_free = n_terms(c), n
+    width, n_free, rest = n_terms(c), n, work[work_size(c) :]
+    forces, free = rest[:n], rest[n : 2 * n]
     for k in range(n):
         free[k] = 1.0
     for _ in range(n):
         for j in range(m):
-            lacks[j] = -coupling_force(c, j, q, x, gradient)
+            pulled = coupling_force(c, j, q, x, gradient)
+            lacks[j] = -pulled
             for i in range(m):
                 matrix[j, i] = 0.0
         for k in range(n):
-            own, y = muscle_at(c, k) + OWN, shortening(c, k, q)
+            own, y, known = muscle_at(c, k) + OWN, shortening(c, k, q), way
             if free[k] != 0.0:
-                p[k] = min(max(c[19], c[13]), c[14])
-            forces[k] = muscle_force(c, k, state, way, y, p[k], x, terms[:width], terms[width:])[0]
+                p[k], known = min(max(c[19], c[13]), c[14]), AT_REST
+            force = muscle_force(c, k, state, known, y, p[k], x, terms[:width], terms[width:])[0]
+            forces[k] = force
             for j in range(m):
-                lacks[j] -= c[own + j] * forces[k]
+                lacks[j] -= c[own + j] * force
                 for i in range(m):
                     matrix[j, i] += free[k] * c[own + j] * c[own + i]
         eliminate(matrix, lacks)
-        worst, furthest = -1, 0.0
+        worst, furthest, end = -1, 0.0, 0.0
         for k in range(n):
             if free[k] == 0.0:
                 continue
-            own, y, wanted = muscle_at(c, k), shortening(c, k, q), forces[k]
+            own, y, wanted, lowest = muscle_at(c, k), shortening(c, k, q), forces[k], c[13]
             for j in range(m):
                 wanted += c[own + OWN + j] * lacks[j]
-            p[k] = pressure_for(c, k, state, way, y, min(wanted, c[own + 3]), x, terms)
-            beyond = max(c[13] - p[k], p[k] - c[14]) - HAIR * (1.0 + abs(p[k]))
+            p[k] = pressure_for(c, k, state, way, y, wanted, x, terms)
+            if wanted > c[own + 3]:
+                slack = pressure_for(c, k, state, way, y, c[own + 3], x, terms)
+                lowest = max(lowest, slack)
+            inside = min(max(p[k], lowest), c[14])
+            beyond = abs(p[k] - inside) - HAIR * (1.0 + abs(p[k]))
             if beyond > furthest:
-                worst, furthest = k, beyond
+                worst, furthest, end = k, beyond, inside
         if worst < 0 or n_free == m:
             return worst < 0
-        p[worst] = min(max(p[worst], c[13]), c[14])
+        p[worst] = end
         free[worst] = 0.0
         n_free -= 1
     return False
 
 
 @kernel
-def inverse_step(c: Array, state: Array, scratch: Array, given: Array, p: Array) -> None:
-    """Give the pressures of a sample, and bring the state there; then scratch begins with where.
+def give_pressures(c: Array, state: Array, scratch: Array, given: Array, p: Array) -> int:
+    """Give the pressures of a sample, and the way to it; then scratch begins with where muscles are.
 
     The last state counts samples that muscles cannot reach.
     """
@@ -598,8 +615,7 @@ def inverse_step(c: Array, state: Array, scratch: Array, given: Array, p: Array)
     if not reached:  # where the muscles go instead is what friction will remember
         solve_equilibrium(c, state, way, q, x, p, work)
         state[state.size - 1] += 1.0
-    update_state(c, state, way, q, p, x)
-    state[state.size - 2] = 0.0
+    return way
 
 
 @kernel
@@ -618,4 +634,3 @@ def start_balance(
         for k in range(n):
             p[k] = min(max(p[k], c[13]), c[14])
         update_state(c, state, AT_REST, q, p, x)
-        state[state.size - 2] = 0.0

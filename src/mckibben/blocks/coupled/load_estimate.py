@@ -53,7 +53,6 @@ def load_estimate_step(
     n, n_x = int(coefficients[0]), int(coefficients[2]) + int(coefficients[4])
     x = scratch[scratch.size - n_x :]
     update_state(coefficients, state, way, q, inputs[m : m + n], x)
-    state[state.size - 2] = 0.0
     fill(outputs, loads)
 
 
@@ -100,7 +99,6 @@ def load_estimate_start(
         for j in range(m):
             q[j] = inputs[j] + state[state.size - 2 - m + j]
         update_state(c, state, AT_REST, q, inputs[m : m + n], x)
-        state[state.size - 2] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)

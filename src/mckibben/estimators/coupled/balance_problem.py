@@ -536,7 +536,8 @@ def bounded_least_squares(gram: Array, bounded: Mask) -> Array:
     a = gram[:-1, :-1] / np.outer(size, size) + RIDGE * np.eye(size.size)
     b, free, found = gram[:-1, -1] / size, ~bounded, np.zeros(size.size)
     both = np.column_stack([a[np.ix_(free, bounded)], b[free]])
-    across = np.linalg.solve(a[np.ix_(free, free)], both)
+    sizes, ways = np.linalg.eigh(a[np.ix_(free, free)])
+    across = ways @ ((ways.T @ both) / np.maximum(sizes, RIDGE)[:, np.newaxis])
     if bounded.any():
         inner = a[np.ix_(bounded, bounded)] - a[np.ix_(bounded, free)] @ across[:, :-1]
         right = b[bounded] - a[np.ix_(bounded, free)] @ across[:, -1]

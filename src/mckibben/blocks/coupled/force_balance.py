@@ -25,7 +25,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import SEVERAL, Cost, Ports, Start
-from mckibben.blocks.coupled.balance_fields import tell_clipped
+from mckibben.blocks.coupled.balance import tell_clipped
 from mckibben.blocks.fields import STRICT, Channel, Channels, Rows, Vector, rows, vector
 from mckibben.blocks.inverse import Invertible
 from mckibben.blocks.kernels import Step, kernel, step

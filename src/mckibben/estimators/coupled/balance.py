@@ -449,7 +449,7 @@ def in_newtons(balance: Balance) -> Balance:
     obstacles[:, 2:] /= share
     return replace(
         balance,
-        obstacles=rows(obstacles.reshape(len(balance.obstacles), -1)),
+        obstacles=rows(obstacles.reshape(1, -1)) if balance.obstacles else (),
         **{name: rows(scaled(getattr(balance, name))) for name in tables},
         **{
             name: vector(scaled(getattr(balance, name)))

@@ -118,7 +118,7 @@ def carry(
         if way != AT_REST:
             mix(past[row], 1.0, gain, now)
             mix(past[row], 1.0, -gain, moved)
-    if c[18] != 0.0:
+    if c[18] != 0.0 and way == IN_TIME:
         row = m + n * (n_s + n_l) + 2 * k
         mix(past[row + 1], 0.0, 1.0, past[row])
         mix(past[row], 0.0, 1.0, now)

@@ -248,7 +248,9 @@ def linear(block: Balance, c: Array) -> list[int]:
     terms += len(block.limits) + len(block.lags)
     for k in range(n):
         first = int(muscle_at(c, k)) + OWN + len(block.driven)
-        found += [place for place in range(first, first + terms) if place != first + 2 or block.mass]
+        found += [
+            place for place in range(first, first + terms) if place != first + 2 or block.mass
+        ]
     return found
 
 

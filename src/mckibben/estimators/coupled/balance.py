@@ -57,6 +57,9 @@ GRIPS = (0.05, 0.3, 1.0, 4.0)
 ROUNDS, STEPS_BETWEEN = 5, 4
 """Times that terms are added, and steps before each."""
 
+AS_GOOD = 1.25
+"""Times the error of all but first parts up to which that of all, settled before, is as good."""
+
 FIRM = 0.7
 """Of the most that muscles resist with, share at which they go slack at first."""
 
@@ -319,6 +322,8 @@ class BalanceEstimator(CoupledEstimator):
             starts.append((search.cost(z), z))
             tracker.saw(z, starts[-1][0])
         z = min(starts, key=lambda start: start[0])[1]
+        search, z = self._settled(search, z)
+        structure = search.structure
         tried = np.array([self._tried(term) for term in structure.terms])
         for number in range(ROUNDS if belief is None else 1):
             self._search, self._z = search, z = (
@@ -410,10 +415,25 @@ class BalanceEstimator(CoupledEstimator):
         found = own.descend(started, STEPS_BETWEEN, Tracker())
         return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
 
+    def _settled(self, search: Search, z: Array) -> tuple[Search, Array]:
+        """Return the search of muscles that had long been where runs begin, if all of these tell so."""
+        problem = search.problem
+        if problem.all_at_rest or search.structure.bench.tare:
+            return search, z
+        settled = replace(search, structure=replace(search.structure, settled=True))
+        started = settled.descend(z, STEPS_BETWEEN, Tracker())
+        later = search.descend(z, STEPS_BETWEEN, Tracker())
+        counted = np.mean(
+            np.concatenate([problem.counting(r, search.structure) for r in problem.runs])
+        )
+        as_good = settled.cost(started) <= AS_GOOD * search.cost(later) / np.sqrt(counted)
+        return (settled, started) if as_good else (search, z)
+
     def _started(self, search: Search, z: Array) -> tuple[Search, Array]:
         """Return the search in which runs that do not begin at rest have starts, found by themselves."""
         problem = search.problem
-        if problem.all_at_rest or search.structure.bench.tare:
+        structure = search.structure
+        if problem.all_at_rest or structure.bench.tare or structure.settled:
             return search, z
         none = np.zeros(search.active.size, dtype=bool)
         started = replace(search, problem=replace(problem, starts=True), active=none)

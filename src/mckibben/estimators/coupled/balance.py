@@ -60,6 +60,9 @@ ROUNDS, STEPS_BETWEEN = 5, 4
 AS_GOOD = 1.25
 """Times the error of all but first parts up to which that of all, settled before, is as good."""
 
+FILLINGS = (1.0, 4.0, 16.0)
+"""Time constants of air in front, in samples, to begin from."""
+
 FIRM = 0.7
 """Of the most that muscles resist with, share at which they go slack at first."""
 
@@ -323,6 +326,7 @@ class BalanceEstimator(CoupledEstimator):
             tracker.saw(z, starts[-1][0])
         z = min(starts, key=lambda start: start[0])[1]
         search, z = self._settled(search, z)
+        search, z = self._filled(search, z)
         structure = search.structure
         tried = np.array([self._tried(term) for term in structure.terms])
         for number in range(ROUNDS if belief is None else 1):
@@ -414,6 +418,28 @@ class BalanceEstimator(CoupledEstimator):
         started = np.append(z, np.zeros(own.problem.size(own.structure) - z.size))
         found = own.descend(started, STEPS_BETWEEN, Tracker())
         return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
+
+    def _filled(self, search: Search, z: Array) -> tuple[Search, Array]:
+        """Return the search in which air takes time in front, if that lessens errors from the beginning."""
+        structure, problem = search.structure, search.problem
+        if not self.may("filling") or not structure.bench.step:
+            return search, z
+        place = list(structure.terms).index(Term("filling"))
+        filled = replace(search, active=search.active.copy())
+        filled.active[place] = True
+        starts = [(search.cost(z), z)]
+        for samples in FILLINGS:
+            started = z.copy()
+            started[place] = samples * structure.bench.step
+            started = problem.balanced(structure, started, search.active)
+            starts.append((search.cost(started), started))
+        started = min(starts, key=lambda start: start[0])[1]
+        if not started[place]:
+            return search, z
+        without = search.descend(z, STEPS_BETWEEN, Tracker())
+        found = filled.descend(started, STEPS_BETWEEN, Tracker())
+        helps = search.improved(without, filled, found, by=OWN_HELPS)
+        return (filled, found) if helps else (search, z)
 
     def _settled(self, search: Search, z: Array) -> tuple[Search, Array]:
         """Return the search of muscles that had long been where runs begin, if all of these tell so."""

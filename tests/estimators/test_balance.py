@@ -15,7 +15,7 @@ from mckibben.blocks.coupled.balance import Balance, Placed, balance_in
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE, Channel
 from mckibben.blocks.memoryless import PiecewiseLinear
-from mckibben.estimators.coupled.balance import TERMS, BalanceEstimator
+from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_slopes import run
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.signals.broadband import random_wave
@@ -99,8 +99,8 @@ def error(estimator: BalanceEstimator, on: Recording) -> float:
 
 def test_it_recovers_a_muscle_of_its_own_kind(found: BalanceEstimator) -> None:
     # its stops break away at other travels than those of the muscle
-    assert found.diagnostics_.rmse < 2.0 * NOISE
-    assert error(found, recording(3)) < 2.0 * NOISE
+    assert found.diagnostics_.rmse < 1.5 * NOISE
+    assert error(found, recording(3)) < 1.5 * NOISE
     balance = balance_of(found)
     np.testing.assert_allclose(balance.lags, MUSCLE.lags, rtol=0.2)
     np.testing.assert_allclose(balance.areas[0][0], 60.0, rtol=0.05)
@@ -125,7 +125,7 @@ def test_a_dead_zone_is_found() -> None:
     (zone,) = placed(estimator).before
     assert isinstance(zone, PiecewiseLinear)
     assert zone.knots[1] == pytest.approx(0.3, rel=0.05)
-    assert error(estimator, behind(lost, 3)) < 2.0 * NOISE
+    assert error(estimator, behind(lost, 3)) < 1.5 * NOISE
 
 
 def test_times_of_filling_and_venting_are_found() -> None:
@@ -141,6 +141,7 @@ def test_times_of_filling_and_venting_are_found() -> None:
     ("kind", "change"),
     [
         ("mass", {"mass": (0.02,)}),
+        ("walls", {"walls": (0.3,)}),
         ("asymmetry", {"asymmetry": 0.4}),
         ("obstacle", {"obstacles": ((1.0, 8.0, 40.0),)}),
     ],
@@ -148,18 +149,16 @@ def test_times_of_filling_and_venting_are_found() -> None:
 def test_terms_are_added_that_a_muscle_has(kind: str, change: dict[str, Any]) -> None:
     muscle = replace(MUSCLE, **change)
     *train, other = (recording(seed, muscle=muscle, highest=1.0) for seed in (1, 2, 3))
-    without = tuple(one for one in TERMS if one != kind)
-    estimator = BalanceEstimator().fit(train)
+    estimator, without = BalanceEstimator().fit(train), BalanceEstimator(terms=()).fit(train)
     assert kind in estimator.terms_
-    assert error(estimator, other) < 2.0 * NOISE
-    assert error(estimator, other) < error(BalanceEstimator(terms=without).fit(train), other)
+    assert error(estimator, other) < 1.5 * NOISE
+    assert error(without, other) > 1.2 * error(estimator, other)
 
 
 def test_terms_that_may_not_be_added_are_none(found: BalanceEstimator) -> None:
     plain = BalanceEstimator(terms=()).fit([recording(1), recording(2)])
     assert plain.terms_ == ()
     assert plain.fitted.n_parameters < found.fitted.n_parameters
-    assert plain.diagnostics_.rmse > found.diagnostics_.rmse
     assert not placed(plain).before
 
 
@@ -187,8 +186,8 @@ def test_lengths_that_fall_from_afar_are_the_same_to_it() -> None:
         for one in map(recording, (1, 2, 3))
     ]
     other = BalanceEstimator().fit(runs[:2])
-    assert other.diagnostics_.rmse < 2.0 * NOISE
-    assert error(other, runs[2]) < 2.0 * NOISE
+    assert other.diagnostics_.rmse < 1.5 * NOISE
+    assert error(other, runs[2]) < 1.5 * NOISE
 
 
 def test_a_fit_does_not_depend_on_units(found: BalanceEstimator) -> None:
@@ -211,7 +210,7 @@ def test_held_muscles_are_learned_from_by_their_force() -> None:
     )
     held = Recording({"pressure": p, "displacement": y, "force": -lacking[:, 0]}, STEP)
     estimator = BalanceEstimator().fit([recording(1), recording(2), held])
-    assert error(estimator, recording(3)) < 3.0 * NOISE
+    assert error(estimator, recording(3)) < 1.5 * NOISE
     np.testing.assert_allclose(balance_of(estimator).lags, MUSCLE.lags, rtol=0.35)
 
 
@@ -232,8 +231,8 @@ def test_weights_that_nobody_measured_are_found() -> None:
     estimator = BalanceEstimator().fit(runs)
     found = estimator.loads_[:, 0] * 60.0  # bar on an area at rest of 60 N/bar
     np.testing.assert_allclose(found, [0.0, 40.0, 80.0], atol=2.0)
-    assert estimator.diagnostics_.rmse < 2.0 * NOISE
-    assert error(estimator, hung(4, 0.0)) < 2.5 * NOISE  # under the load of the first
+    assert estimator.diagnostics_.rmse < 1.5 * NOISE
+    assert error(estimator, hung(4, 0.0)) < 1.5 * NOISE  # under the load of the first
 
 
 def test_recordings_that_begin_under_a_pressure_long_held_count_as_a_whole() -> None:
@@ -315,7 +314,7 @@ def joint(seed: int, sign: float = 1.0, n: int = 1200) -> Recording:
 
 def test_muscles_that_are_alike_come_out_alike_at_a_joint() -> None:
     estimator = BalanceEstimator().fit([joint(1), joint(2)])
-    assert error(estimator, joint(3)) < 2.0 * NOISE
+    assert error(estimator, joint(3)) < 1.5 * NOISE
     balance = balance_of(estimator)
     np.testing.assert_allclose(balance.directions, [[1.0], [-1.0]])
     for name in ("areas", "friction", "relaxation"):

@@ -73,7 +73,7 @@ PLACES = (0.5, 0.65, 0.8, 0.9, 0.97)
 """Of obstacles on the way up, along the range of what is moved; of those on the way down from its end."""
 
 TERMS = (
-    *("elasticity", "areas", "friction", "relaxation", "line", "mass", "obstacle", "springs"),
+    *("elasticity", "areas", "relaxation", "line", "mass", "obstacle", "springs"),
     *("grips", "asymmetry", "walls", "filling", "venting", "dead", "muscles", "slack"),
 )
 """Kinds of terms that may be added."""
@@ -87,14 +87,14 @@ class BalanceEstimator(CoupledEstimator):
     ----------
     terms : sequence of str, optional
         Kinds of terms that may be added to springs, area, friction, relaxation and damping: more degrees
-        of ``elasticity`` and ``areas``, more stops (``friction``) and lags (``relaxation``), the ``line``,
+        of ``elasticity`` and ``areas``, more lags (``relaxation``), the ``line``,
         ``mass``, an ``obstacle`` either way, springs by squares of what schedules (``springs``), friction
         that grows with what schedules (``grips``) or differs by direction (``asymmetry``), stretch of the
         wall (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, ``muscles`` that
         differ, and that go ``slack``. Each is added if the error of what is left out falls by more than
         its standard error. Default all.
     n_stops : int
-        Stops that may be, from which it begins with every other.
+        Stops, which break away after travels from 0.3 to 50 % of the stroke at the highest pressure.
     n_lags : int
         Time constants that may be, from which it begins with two; 0 for muscles without time.
     lags : sequence of float, optional
@@ -298,14 +298,12 @@ class BalanceEstimator(CoupledEstimator):
             kind, which, muscle = term
             if kind == "springs":
                 return which == 0 or (which - 1) % structure.degree == 0
-            if kind == "friction":
-                return which % 2 == 1 or structure.n_stops == 1
             if kind in ("relaxation", "lags"):
                 few = structure.n_lags < 3 or self.lags is not None
                 return few or which in (structure.n_lags // 3, 2 * structure.n_lags // 3)
             if kind in ("elasticity", "areas"):
                 return which < 2
-            return kind in ("loads", "damping", "bladder") or (
+            return kind in ("loads", "damping", "bladder", "friction") or (
                 kind == "grip" and structure.n_stops > 0
             )
 
@@ -324,8 +322,8 @@ class BalanceEstimator(CoupledEstimator):
             z = few.balanced(structure, z, search.active)
             starts.append((search.cost(z), z))
             tracker.saw(z, starts[-1][0])
-        z = min(starts, key=lambda start: start[0])[1]
-        search, z = self._settled(search, z)
+        starts.sort(key=lambda start: start[0])
+        search, z = self._settled(search, [start for _, start in starts])
         search, z = self._filled(search, z)
         structure = search.structure
         tried = np.array([self._tried(term) for term in structure.terms])
@@ -441,19 +439,18 @@ class BalanceEstimator(CoupledEstimator):
         helps = search.improved(without, filled, found, by=OWN_HELPS)
         return (filled, found) if helps else (search, z)
 
-    def _settled(self, search: Search, z: Array) -> tuple[Search, Array]:
+    def _settled(self, search: Search, starts: list[Array]) -> tuple[Search, Array]:
         """Return the search of muscles that had long been where runs begin, if all of these tell so."""
-        problem = search.problem
-        if problem.all_at_rest or search.structure.bench.tare:
-            return search, z
-        settled = replace(search, structure=replace(search.structure, settled=True))
-        started = settled.descend(z, STEPS_BETWEEN, Tracker())
-        later = search.descend(z, STEPS_BETWEEN, Tracker())
-        counted = np.mean(
-            np.concatenate([problem.counting(r, search.structure) for r in problem.runs])
-        )
-        as_good = settled.cost(started) <= AS_GOOD * search.cost(later) / np.sqrt(counted)
-        return (settled, started) if as_good else (search, z)
+        problem, structure = search.problem, search.structure
+        if problem.all_at_rest or structure.bench.tare:
+            return search, starts[0]
+        settled = replace(search, structure=replace(structure, settled=True))
+        found = [settled.descend(z, STEPS_BETWEEN, Tracker()) for z in starts]
+        best = min(found, key=settled.cost)
+        later = search.cost(search.descend(starts[0], STEPS_BETWEEN, Tracker()))
+        counted = np.concatenate([problem.counting(run, structure) for run in problem.runs])
+        as_good = settled.cost(best) <= AS_GOOD * later / np.sqrt(counted.mean())
+        return (settled, best) if as_good else (search, starts[0])
 
     def _started(self, search: Search, z: Array) -> tuple[Search, Array]:
         """Return the search in which runs that do not begin at rest have starts, found by themselves."""

@@ -304,7 +304,7 @@ class Search:
             for more in range(1, 3):
                 whole = range(following, following + more)
                 yield group(*self._with_own(kind, whole, own))
-        for kind in ("friction", "relaxation", "line", "mass"):
+        for kind in ("relaxation", "line", "mass"):
             for which in {term.which for term in terms if term.kind == kind} - {
                 w for k, w in on if k == kind
             }:

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from mckibben import ModelWarning
 from mckibben.blocks.bands import look_along
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_law import HEAD
+from mckibben.blocks.coupled.balance_law import (
+    AT_REST,
+    DYNAMIC,
+    HEAD,
+    OWN,
+    coordinate_at,
+    muscle_at,
+    solve_equilibrium,
+    update_state,
+)
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
@@ -28,7 +37,6 @@ from mckibben.blocks.hysteresis.preisach import DEPTH, Preisach, _output, _solve
 from mckibben.blocks.laws import wander
 from mckibben.blocks.solving import eliminate, solve_near
 from mckibben.estimators.coupled.balance_slopes import run as follow
-from mckibben.estimators.coupled.balance_starts import begin_at
 from mckibben.estimators.coupled.mpi_narmax import remembered
 from mckibben.registry import load, names
 from mckibben.system.compiling import Deferred
@@ -177,16 +185,24 @@ def test_slack_muscles_push_as_hard_as_they_can(friction: tuple[tuple[float, ...
         {"pushes": (150.0, 120.0)},
         {"pushes": (0.5, 0.1)},
         {"pushes": (), "bladders": (), "mass": (0.01, 0.02)},
+        {"asymmetry": 0.4, "grips": (0.3,), "obstacles": 2 * ((1.0, 3.0, 2.0, 0.1),)},
+        {"directions": ((1.0, 0.3), (-0.2, 1.0)), "pushes": (), "bladders": ()},
     ],
 )
 def test_slopes_of_a_balance_are_those_of_differences(change: dict[str, Any]) -> None:
     """Free from rest, with a tare, through breaks of its stops, beyond its hull, and slack."""
-    block = replace(SLACK, tare=True, hull=((-2.0, 6.0), (-2.0, 8.0)), grip=0.1, **change)
-    driven, x = path([0.0, 0.0], [4.0, 4.0]), path([0.0, 0.0], [2.0, 1.0])
-    driven, x = np.ascontiguousarray(driven[:30]), np.ascontiguousarray(x[:30])
+    block = replace(
+        SLACK,
+        tare=True,
+        hull=((-2.0, 6.0), (-2.0, 8.0)),
+        grip=0.1,
+        lines=(1e-5, 1e-5),  # slopes leave out that what flows in depends on the area
+        **change,
+    )
+    driven, x = path([0.0, 0.0], [4.0, 4.0])[:30], path([0.0, 0.0], [2.0, 1.0])[:30]
     driven[:, 1] = driven[::-1, 1]
     start = block.coefficients(0.1)
-    first = HEAD + len(block.limits) + 2 * len(block.lags)
+    first = int(coordinate_at(start, 0))
 
     def moved(c: Array) -> tuple[Array, Array]:
         return follow(c, driven, driven, x, held=False)
@@ -198,55 +214,58 @@ def test_slopes_of_a_balance_are_those_of_differences(change: dict[str, Any]) ->
     alone, none = follow(start, driven, driven, x, held=False, sloped=False)
     np.testing.assert_array_equal(alone, found)
     assert none.shape == (30, 2, 0)
-    n_own = start.size - first
-    width = n_own // 2
-    hulls = {0, 1, width, width + 1}
-    for place in sorted({*range(n_own + 1)} - hulls):
-        at = 9 if place == n_own else first + place
+    for at in linear(block, start):
         step = np.zeros(start.size)
         step[at] = 1e-6 * max(abs(start[at]), 0.1)
         slope = (moved(start + step)[0] - moved(start - step)[0]) / (2.0 * step[at])
-        missed = np.abs(slope - slopes[:, :, place])
-        assert np.quantile(missed, 0.9) < 1e-5 * (np.abs(slope).max() + 1e-6), place
-    longer = [replace(block, lags=(0.8 * f, 12.0)).coefficients(0.1) for f in (1 + 1e-6, 1 - 1e-6)]
-    slope = (moved(longer[0])[0] - moved(longer[1])[0]) / 2e-6
-    np.testing.assert_allclose(slope, slopes[:, :, n_own + 1], atol=1e-5)
+        missed = np.abs(slope - slopes[:, :, at - first])
+        assert np.quantile(missed, 0.9) < 1e-5 * (np.abs(slope).max() + 1e-6), at
+
+
+def linear(block: Balance, c: Array) -> list[int]:
+    """Return the places of coefficients that forces are linear in."""
+    n, width = len(block.given), block.n_schedules + 3
+    found: list[int] = []
+    for j in range(len(block.driven)):
+        first, met = int(coordinate_at(c, j)), block.n_obstacles * width
+        end = first + len(block.springs[0]) + block.n_loads
+        found += [*range(first, end)]
+        found += [end + i for i in range(met) if i % width > 1]
+    terms = DYNAMIC + len(block.elasticity[0]) + len(block.areas[0])
+    terms += len(block.limits) + len(block.lags)
+    for k in range(n):
+        first = int(muscle_at(c, k)) + OWN + len(block.driven)
+        found += [
+            place for place in range(first, first + terms) if place != first + 2 or block.mass
+        ]
+    return found
 
 
 def test_a_balance_begun_in_motion_is_its_simulation_from_that_state() -> None:
     block = replace(Balance.example(), grip=0.1)
     driven, x = path([0.0, 0.0], [4.0, 4.0])[5:25], path([0.0, 0.0], [1.0, 60.0])[5:25]
-    driven, x = np.ascontiguousarray(driven), np.ascontiguousarray(x)
     begun = np.array([0.1, 0.3, -0.05, 0.2, 0.5, -3.0, 0.2, 1.0])
-
-    def moved(begun: Array) -> tuple[Array, Array]:
-        return follow(block.coefficients(0.1), driven, driven, x, held=False, begun=begun)
-
-    found, slopes = moved(begun)
+    c = block.coefficients(0.1)
+    found, _ = follow(c, driven, driven, x, held=False, begun=begun)
     inputs = np.column_stack([driven, x])
     state = block.inverse().initial_state(inputs[0])
-    begin_at(block, state, inputs[0], begun)
+    q, scratch = state[:2].copy(), np.zeros(block.n_scratch)
+    solve_equilibrium(c, state, AT_REST, q, inputs[0, 2:], inputs[0, :2], scratch)
+    update_state(c, state, AT_REST, q, inputs[0, :2], inputs[0, 2:])
+    state[4 : 4 + begun.size] = begun
     expected = block.inverse().simulate(inputs, sample_time=0.1, initial=tuple(state))
     np.testing.assert_array_equal(found, expected)
-    for place in range(begun.size):
-        step = np.zeros(begun.size)
-        step[place] = 1e-6
-        slope = (moved(begun + step)[0] - moved(begun - step)[0]) / 2e-6
-        np.testing.assert_allclose(slope, slopes[:, :, place - begun.size], atol=1e-6)
 
 
-def test_forces_that_a_held_balance_lacks_are_linear_in_its_coefficients() -> None:
-    block = replace(Balance.example(), walls=(0.0, 0.0), lines=())
+@pytest.mark.parametrize("settled", [False, True])
+def test_forces_that_a_held_balance_lacks_are_linear_in_its_coefficients(*, settled: bool) -> None:
+    block = replace(Balance.example(), walls=(0.0, 0.0), lines=(), settled=settled)
     measured, x = path([-4.0, -4.0], [10.0, 10.0])[:20], np.full((20, 2), 1.0)
-    driven = np.ascontiguousarray(measured[::-1] + 4.0)
     c = block.coefficients(0.1)
-    width = (c.size - HEAD - len(block.limits) - 2 * len(block.lags)) // 2
-    for settled in (False, True):
-        lacking, slopes = follow(c, driven, measured, x, held=True, settled=settled)
-        own = np.concatenate([c[-2 * width :].reshape(2, width).ravel()])
-        own[[0, 1, width, width + 1]] = 0.0  # hulls
-        own[[3, width + 3]] = 0.0  # never slack
-        np.testing.assert_allclose(slopes[:, :, : 2 * width] @ own, lacking, atol=1e-9)
+    lacking, slopes = follow(c, measured[::-1] + 4.0, measured, x, held=True)
+    places = linear(block, c)
+    own = slopes[:, :, np.array(places) - int(coordinate_at(c, 0))]
+    np.testing.assert_allclose(own @ c[places], lacking, atol=1e-9)
 
 
 def longer_pasts() -> RecurrentFuzzyNetwork:

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, ModelError, Recording
-from mckibben.arrays import Array
-from mckibben.blocks.compose import Series
-from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE
-from mckibben.blocks.inverse import Inverse
-from mckibben.blocks.memoryless import Contact
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import PerChannel, Series
+from mckibben.blocks.coupled.balance import Balance, Placed, balance_in
+from mckibben.blocks.dynamics.air import Air
+from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE, Channel
+from mckibben.blocks.memoryless import PiecewiseLinear
 from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.estimators.coupled.balance_loads import under
 from mckibben.estimators.coupled.balance_slopes import run
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.signals.broadband import random_wave
@@ -67,72 +66,110 @@ def recording(
     return Recording(channels, STEP, meta={"name": f"run-{seed}"})
 
 
+def behind(front: Block, seed: int) -> Recording:
+    """Return a recording of the muscle behind what acts in front of it."""
+    plain = recording(seed, noise=0.0)
+    moved = Series((front, MUSCLE.inverse())).simulate(plain.select(["pressure", "force"]))
+    noise = NOISE * np.random.default_rng(seed).standard_normal(len(plain))
+    return plain.with_channels({}, displacement=moved["displacement"] + noise)
+
+
 @pytest.fixture(scope="module")
 def found() -> BalanceEstimator:
     return BalanceEstimator().fit([recording(seed) for seed in (1, 2)])
 
 
+def placed(estimator: BalanceEstimator) -> Placed:
+    found = balance_in(estimator.fitted)
+    assert found is not None
+    return found
+
+
 def balance_of(estimator: BalanceEstimator) -> Balance:
-    block = estimator.fitted
-    solved = block.parts[0] if isinstance(block, Series) else block
-    assert isinstance(solved, Inverse)
-    forward = solved.forward
-    assert isinstance(forward, Balance)
-    return forward
+    return placed(estimator).balance
 
 
 def error(estimator: BalanceEstimator, on: Recording) -> float:
-    return float(np.sqrt(np.mean((estimator.predict(on)[0] - on["displacement"]) ** 2)))
+    missed = estimator.predict(on)[0].ravel() - on["displacement"]
+    return float(np.sqrt(np.mean(missed**2)))
+
+
+# -- what it finds -------------------------------------------------------------------------------
 
 
 def test_it_recovers_a_muscle_of_its_own_kind(found: BalanceEstimator) -> None:
     # its stops break away at other travels than those of the muscle
-    assert found.diagnostics_.rmse < 2.5 * NOISE
-    assert error(found, recording(3)) < 3.0 * NOISE
+    assert found.diagnostics_.rmse < 1.5 * NOISE
+    assert error(found, recording(3)) < 1.5 * NOISE
     balance = balance_of(found)
-    np.testing.assert_allclose(balance.lags, MUSCLE.lags, rtol=0.35)
+    np.testing.assert_allclose(balance.lags, MUSCLE.lags, rtol=0.2)
     np.testing.assert_allclose(balance.areas[0][0], 60.0, rtol=0.05)
     assert balance.loads == ((1.0,),)
 
 
 def test_loads_beyond_those_trained_enter_as_they_are(found: BalanceEstimator) -> None:
-    assert error(found, recording(4, strongest=140.0)) < 0.15
+    assert error(found, recording(4, strongest=140.0)) < 0.1
 
 
-def test_a_dead_zone_is_found_where_there_is_one(found: BalanceEstimator) -> None:
-    assert isinstance(found.fitted, Inverse)
-    filled = Series((Contact(0.15), MUSCLE.inverse()))
-
-    def dead(seed: int) -> Recording:
-        plain = recording(seed)
-        moved = filled.simulate(plain.select(["pressure", "force"]))["displacement"]
-        noise = NOISE * np.random.default_rng(seed).standard_normal(len(plain))
-        return plain.with_channels({}, displacement=moved + noise)
-
-    estimator = BalanceEstimator().fit([dead(1), dead(2)])
-    (contact, _) = estimator.fitted.parts  # type: ignore[attr-defined]
-    assert 0.07 < contact.pressure < 0.3
-    assert error(estimator, dead(3)) < 0.1
+def test_a_load_that_counts_the_other_way_is_the_same_and_told(found: BalanceEstimator) -> None:
+    turned = BalanceEstimator().fit([recording(seed, sign=-1.0) for seed in (1, 2)])
+    assert balance_of(turned).loads == ((-1.0,),)
+    assert turned.diagnostics_.rmse == pytest.approx(found.diagnostics_.rmse, rel=1e-4)
+    assert [note for note in turned.diagnostics_.notes if note.startswith("force acts")]
+    assert not [note for note in found.diagnostics_.notes if note.startswith("force acts")]
 
 
-def test_a_mass_is_found_by_how_fast_it_swings() -> None:
-    heavy = replace(MUSCLE, mass=(0.02,))
-    *train, other = (recording(seed, muscle=heavy, highest=2.0) for seed in (1, 2, 3))
-    errors = []
-    for told in (False, True):
-        estimator = BalanceEstimator(mass=told).fit(train)
-        errors.append(error(estimator, other))
-    assert errors[1] < 3.0 * NOISE < 0.5 * errors[0]
-    np.testing.assert_allclose(balance_of(estimator).mass, 0.02, rtol=0.2)
+def test_a_dead_zone_is_found() -> None:
+    lost = PiecewiseLinear((0.0, 0.3, 0.6), (0.0, 0.006, 0.306), PRESSURE, PRESSURE)
+    estimator = BalanceEstimator().fit([behind(lost, 1), behind(lost, 2)])
+    (zone,) = placed(estimator).before
+    assert isinstance(zone, PiecewiseLinear)
+    assert zone.knots[1] == pytest.approx(0.3, rel=0.05)
+    assert error(estimator, behind(lost, 3)) < 1.5 * NOISE
+
+
+def test_times_of_filling_and_venting_are_found() -> None:
+    air = Air(1.0, 0.0, 0.0, 0.3, 0.6, ambient=None, input=PRESSURE, output=PRESSURE)
+    estimator = BalanceEstimator().fit([behind(air, 1), behind(air, 2)])
+    first = placed(estimator).before[0]
+    assert isinstance(first, Air)
+    assert first.filling_time == pytest.approx(0.3, rel=0.1)
+    assert first.venting_time == pytest.approx(0.6, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("mass", {"mass": (0.02,)}),
+        ("walls", {"walls": (0.3,)}),
+        ("asymmetry", {"asymmetry": 0.4}),
+        ("obstacle", {"obstacles": ((1.0, 8.0, 40.0),)}),
+    ],
+)
+def test_terms_are_added_that_a_muscle_has(kind: str, change: dict[str, Any]) -> None:
+    muscle = replace(MUSCLE, **change)
+    *train, other = (recording(seed, muscle=muscle, highest=1.0) for seed in (1, 2, 3))
+    estimator, without = BalanceEstimator().fit(train), BalanceEstimator(terms=()).fit(train)
+    assert kind in estimator.terms_
+    assert error(estimator, other) < 1.5 * NOISE
+    assert error(without, other) > 1.2 * error(estimator, other)
+
+
+def test_terms_that_may_not_be_added_are_none(found: BalanceEstimator) -> None:
+    plain = BalanceEstimator(terms=()).fit([recording(1), recording(2)])
+    assert plain.terms_ == ()
+    assert plain.fitted.n_parameters < found.fitted.n_parameters
+    assert not placed(plain).before
 
 
 def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
     b = balance_of(found)
-    assert min(*b.friction[0], *b.relaxation[0], b.damping[0], b.lines[0], b.walls[0], b.grip) >= 0
+    assert min(*b.friction[0], *b.relaxation[0], b.damping[0], *b.lines, b.walls[0], b.grip) >= 0
     y = np.linspace(b.hull[0][0], b.hull[0][1], 200)
     u = y / b.scale
     area = sum(a * u**i for i, a in enumerate(b.areas[0]))
-    taken = sum(h * (r + b.walls[0]) for h, r in zip(b.friction[0], b.limits, strict=True))
+    most = max(1.0, b.asymmetry or 1.0)
+    taken = sum(h * (most * r + b.walls[0]) for h, r in zip(b.friction[0], b.limits, strict=True))
     assert float(np.min(area - taken)) > 0
     elastic = sum(e * i * u ** (i - 1) for i, e in enumerate(b.elasticity[0], start=2)) / b.scale
     for p in (0.0, 4.0):
@@ -140,32 +177,40 @@ def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
         assert float(np.min(b.springs[0][1] + elastic - p * narrows)) > -1e-6
 
 
-def test_lengths_that_fall_from_afar_are_the_same_to_it(found: BalanceEstimator) -> None:
+# -- how recordings may be -----------------------------------------------------------------------
+
+
+def test_lengths_that_fall_from_afar_are_the_same_to_it() -> None:
     runs = [
-        run_.with_channels({}, displacement=250.0 - run_["displacement"])
-        for run_ in map(recording, (1, 2))
+        one.with_channels({}, displacement=250.0 - one["displacement"])
+        for one in map(recording, (1, 2, 3))
     ]
-    other = BalanceEstimator().fit(runs)
-    assert other.diagnostics_.rmse < 2.5 * NOISE
+    other = BalanceEstimator().fit(runs[:2])
+    assert other.diagnostics_.rmse < 1.5 * NOISE
+    assert error(other, runs[2]) < 1.5 * NOISE
+
+
+def test_a_fit_does_not_depend_on_units(found: BalanceEstimator) -> None:
+    for name, unit in {"pressure": 10.0, "displacement": 1e-3, "force": 1e3}.items():
+        runs = [
+            one.with_channels(**{name: unit * one[name]}) for one in (recording(1), recording(2))
+        ]
+        rmse = BalanceEstimator().fit(runs).diagnostics_.rmse
+        rmse /= unit if name == "displacement" else 1.0
+        assert rmse == pytest.approx(found.diagnostics_.rmse, rel=0.01), name
 
 
 def test_held_muscles_are_learned_from_by_their_force() -> None:
     """At a length of its own, where it has long been: the same muscle is found."""
     time = np.arange(600) * STEP
     p = np.minimum(time / 2.0, 1.0) * random_wave(time, 0.3, 4.0, seed=8)
-    y = np.full((600, 1), 15.0)
+    y = np.full(600, 15.0)
     lacking, _ = run(
-        MUSCLE.coefficients(STEP),
-        np.ascontiguousarray(p[:, np.newaxis]),
-        y,
-        np.zeros((600, 1)),
-        held=True,
-        settled=True,
+        MUSCLE.coefficients(STEP), p[:, np.newaxis], y[:, np.newaxis], np.zeros((600, 1)), held=True
     )
-    channels = {"pressure": p, "displacement": y[:, 0], "force": -lacking[:, 0]}
-    free = [recording(1), recording(2)]
-    estimator = BalanceEstimator().fit([*free, Recording(channels, STEP)])
-    assert error(estimator, recording(3)) < 3.0 * NOISE
+    held = Recording({"pressure": p, "displacement": y, "force": -lacking[:, 0]}, STEP)
+    estimator = BalanceEstimator().fit([recording(1), recording(2), held])
+    assert error(estimator, recording(3)) < 1.5 * NOISE
     np.testing.assert_allclose(balance_of(estimator).lags, MUSCLE.lags, rtol=0.35)
 
 
@@ -185,51 +230,120 @@ def test_weights_that_nobody_measured_are_found() -> None:
     ]
     estimator = BalanceEstimator().fit(runs)
     found = estimator.loads_[:, 0] * 60.0  # bar on an area at rest of 60 N/bar
-    np.testing.assert_allclose(found, [0.0, 40.0, 80.0], atol=1.0)
-    assert estimator.diagnostics_.rmse < 2.5 * NOISE
-    assert error(estimator, hung(4, 0.0)) < 3.0 * NOISE  # under the load of the first
-    heavier = under(estimator.fitted, estimator.loads_[1])
-    other = hung(5, 40.0)
-    missed = heavier.simulate(other.select(["pressure"]))["displacement"] - other["displacement"]
-    assert np.sqrt(np.mean(missed**2)) < 3.0 * NOISE
+    np.testing.assert_allclose(found, [0.0, 40.0, 80.0], atol=2.0)
+    assert estimator.diagnostics_.rmse < 1.5 * NOISE
+    assert error(estimator, hung(4, 0.0)) < 1.5 * NOISE  # under the load of the first
 
 
-TAUT = replace(MUSCLE, walls=(0.1,))
-SLACK = replace(TAUT, springs=((-20.0, 4.0),), bladders=(4.0,), pushes=(6.0,))
+def test_recordings_that_begin_under_a_pressure_long_held_count_as_a_whole() -> None:
+    def held(seed: int) -> Recording:
+        time = np.arange(1200) * STEP
+        p = 1.5 + np.minimum(time / 2.0, 1.0) * (random_wave(time, 0.3, 4.0, seed=seed) - 1.5)
+        block = replace(MUSCLE, settled=True).inverse()
+        y = block.simulate(np.column_stack([p, 0.0 * p]), sample_time=STEP)[:, 0]
+        y = y - y[0] + NOISE * np.random.default_rng(seed).standard_normal(len(p))
+        return Recording({"pressure": p, "displacement": y}, STEP)
+
+    estimator = BalanceEstimator().fit([held(1), held(2)])
+    assert balance_of(estimator).settled
+    assert estimator.diagnostics_.rmse < 1.5 * NOISE
+    assert error(estimator, held(3)) < 1.5 * NOISE
 
 
-HEAVY = replace(TAUT, mass=(0.01,))
+def test_what_recordings_cannot_tell_is_left_out() -> None:
+    steady = recording(1)
+    steady = steady.with_channels({}, force=np.full(len(steady), 20.0))
+    told = BalanceEstimator(steps=2).fit(steady)
+    assert [channel.name for channel in told.fitted.inputs] == ["pressure"]
+
+    time = np.arange(800) * STEP
+    p = 4.0 * np.abs(2.0 * (time / 8.0 % 1.0) - 1.0)[::-1]
+    y = MUSCLE.inverse().simulate(np.column_stack([p, 0 * p]), sample_time=STEP)[:, 0]
+    same = BalanceEstimator(steps=2).fit(Recording({"pressure": p, "displacement": y}, STEP))
+    assert not balance_of(same).lags
 
 
-@pytest.mark.parametrize("block", [TAUT, SLACK, HEAVY])
-def test_slopes_are_those_of_differences(block: Balance) -> None:
-    some = recording(6, n=300)
-    p, y, x = (
-        np.ascontiguousarray(some[name][:, np.newaxis])
-        for name in ("pressure", "displacement", "force")
+def test_what_does_not_move_or_means_nothing_is_refused_by_name() -> None:
+    first = recording(1)
+    both = {"pressure_1": first["pressure"], "pressure_2": first["pressure"][::-1].copy()}
+    moved = {
+        "displacement_1": first["displacement"],
+        "displacement_2": 1e-4 * first["displacement"],
+    }
+    with pytest.raises((DataError, ModelError), match="displacement_2"):
+        BalanceEstimator().fit(Recording(both | moved, STEP))
+    with pytest.raises(ModelError, match="magic"):
+        BalanceEstimator(terms=("mass", "magic")).fit(first)
+    for lags in ((12.0, 1.0), (5.0, 500.0)):
+        with pytest.raises(ModelError, match="lags"):
+            BalanceEstimator(lags=lags).fit(first)
+
+
+# -- several muscles -----------------------------------------------------------------------------
+
+
+JOINT = replace(
+    MUSCLE,
+    springs=((0.0, 12.0),),
+    elasticity=2 * ((30.0, 20.0),),
+    areas=2 * ((60.0, -30.0, -5.0),),
+    friction=2 * MUSCLE.friction,
+    relaxation=2 * MUSCLE.relaxation,
+    damping=(0.1, 0.1),
+    lines=(),
+    walls=(0.0, 0.0),
+    hull=2 * ((-20.0, 20.0),),
+    scale=20.0,
+    given=tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2)),
+    directions=((1.0,), (-1.0,)),
+    preload=2.0,
+)
+"""Two muscles that are alike, and pull a joint either way."""
+
+
+def joint(seed: int, sign: float = 1.0, n: int = 1200) -> Recording:
+    time = np.arange(n) * STEP
+    rises = np.minimum(time / 2.0, 1.0)
+    p = [rises * random_wave(time, 0.3, 4.0, seed=10 * seed + k) for k in (1, 2)]
+    force = rises * random_wave(time, 0.2, 40.0, -40.0, seed=100 + seed)
+    y = JOINT.inverse().simulate(np.column_stack([*p, force]), sample_time=STEP)[:, 0]
+    y = y + NOISE * np.random.default_rng(seed).standard_normal(n)
+    channels = {"pressure_1": p[0], "pressure_2": p[1], "displacement": y, "force": sign * force}
+    return Recording(channels, STEP)
+
+
+def test_muscles_that_are_alike_come_out_alike_at_a_joint() -> None:
+    estimator = BalanceEstimator().fit([joint(1), joint(2)])
+    assert error(estimator, joint(3)) < 1.5 * NOISE
+    balance = balance_of(estimator)
+    np.testing.assert_allclose(balance.directions, [[1.0], [-1.0]])
+    for name in ("areas", "friction", "relaxation"):
+        first, second = np.array(getattr(balance, name))
+        assert np.abs(first - second).max() < 0.2 * np.abs(first).max(), name
+    np.testing.assert_allclose(balance.areas[0][0], 60.0, rtol=0.1)
+    turned = BalanceEstimator().fit([joint(1, -1.0), joint(2, -1.0)])
+    assert turned.diagnostics_.rmse == pytest.approx(estimator.diagnostics_.rmse, rel=1e-4)
+
+
+def test_fronts_of_several_muscles_stand_before_each() -> None:
+    lost = (
+        PiecewiseLinear((0.0, 0.3, 0.6), (0.0, 0.006, 0.306), channel, channel)
+        for channel in JOINT.given
     )
+    filled = Series((PerChannel(tuple(lost)), JOINT.inverse()))
 
-    def at(values: Array) -> Array:
-        changed = replace(
-            block.unpack(values[: block.n_parameters]),
-            lags=tuple(np.exp(values[block.n_parameters :])),
-        )
-        return run(changed.coefficients(STEP), p, y, x, held=False)[0][:, 0]
+    def dead(seed: int) -> Recording:
+        plain = joint(seed)
+        moved = filled.simulate(plain.select(["pressure_1", "pressure_2", "force"]))
+        noise = NOISE * np.random.default_rng(seed).standard_normal(len(plain))
+        return plain.with_channels({}, displacement=moved["displacement"] + noise)
 
-    values = np.concatenate([block.pack(), np.log(block.lags)])
-    exact = run(block.coefficients(STEP), p, y, x, held=False)[1][:, 0]
-    width = exact.shape[1] - 1 - len(block.lags)
-    # the block packs tables first, then damping, lines, walls, grip, bladders, pushes and mass;
-    # coefficients have hull, wall, push, damping, line, bladder and mass first
-    late = ([6, 3] if block.pushes else []) + ([7] if block.mass else [])
-    places = [*range(8, width), 4, 5, 2, width, *late, *range(width + 1, exact.shape[1])]
-    for place, column in enumerate(places):
-        step = np.zeros(values.size)
-        step[place] = 1e-6 * (abs(values[place]) or 0.1)
-        slope = (at(values + step) - at(values - step)) / (2 * step[place])
-        missed = np.abs(slope - exact[:, column])
-        # but for the samples at which a stop just breaks away
-        assert np.quantile(missed, 0.97) < 1e-4 * (np.abs(slope).max() + 1e-6), place
+    estimator = BalanceEstimator().fit([dead(1), dead(2)])
+    (zones,) = placed(estimator).before
+    assert isinstance(zones, PerChannel)
+    for zone in zones.parts:
+        assert isinstance(zone, PiecewiseLinear)
+        assert zone.knots[1] == pytest.approx(0.3, rel=0.1)
 
 
 def test_least_squares_within_inequalities_meet_the_conditions_of_optimality() -> None:
@@ -246,59 +360,3 @@ def test_least_squares_within_inequalities_meet_the_conditions_of_optimality() -
     assert (x[pressed > 0] == 0.0).all()
     with pytest.raises(ModelError):
         constrained_least_squares(slopes, target, np.eye(6)[[0, 0]] * [[1.0], [-1.0]], np.ones(2))
-
-
-def test_recordings_that_begin_under_a_pressure_long_held_count_as_a_whole() -> None:
-    def held(seed: int) -> Recording:
-        time = np.arange(1200) * STEP
-        p = 1.5 + np.minimum(time / 2.0, 1.0) * (random_wave(time, 0.3, 4.0, seed=seed) - 1.5)
-        block = replace(MUSCLE, settled=True).inverse()
-        y = block.simulate(np.column_stack([p, 0.0 * p]), sample_time=STEP)[:, 0]
-        y = y - y[0] + NOISE * np.random.default_rng(seed).standard_normal(len(p))
-        return Recording({"pressure": p, "displacement": y}, STEP)
-
-    estimator = BalanceEstimator().fit([held(1), held(2)])
-    assert balance_of(estimator).settled
-    assert estimator.diagnostics_.rmse < 2.5 * NOISE
-    assert error(estimator, held(3)) < 3.0 * NOISE
-
-
-def test_what_recordings_cannot_tell_is_left_out() -> None:
-    steady = recording(1)
-    steady = steady.with_channels({}, force=np.full(len(steady), 20.0))
-    told = BalanceEstimator(steps=2).fit(steady)
-    assert [channel.name for channel in told.fitted.inputs] == ["pressure"]
-
-    time = np.arange(800) * STEP
-    p = 4.0 * np.abs(2.0 * (time / 8.0 % 1.0) - 1.0)[::-1]
-    y = MUSCLE.inverse().simulate(np.column_stack([p, 0 * p]), sample_time=STEP)[:, 0]
-    same = BalanceEstimator(steps=2).fit(Recording({"pressure": p, "displacement": y}, STEP))
-    assert not balance_of(same).lags
-
-
-def test_what_has_the_wrong_sign_or_does_not_move_is_refused_by_name() -> None:
-    def fit(*runs: Recording, **settings: Any) -> None:
-        BalanceEstimator(**settings).fit(list(runs))
-
-    first, second, third = (recording(seed) for seed in (1, 2, 3))
-    turned = second.with_channels({}, displacement=-second["displacement"])
-    pushed = recording(2, sign=-1.0)
-    weights = [hung(seed, weight) for seed, weight in enumerate((0.0, 30.0, 60.0))]
-    both = {"pressure_1": first["pressure"], "pressure_2": first["pressure"][::-1].copy()}
-    moved = {
-        "displacement_1": first["displacement"],
-        "displacement_2": 1e-4 * first["displacement"],
-    }
-    for runs, said in (
-        ((recording(1, sign=-1.0), pushed), "force"),
-        ((first, pushed, third), "run-2.*force"),
-        ([run_.with_channels({}, force=-run_["force"]) for run_ in weights], "force"),
-        ((first, turned, third), "run-2.*displacement"),
-        ((Recording(both | moved, STEP),), "displacement_2"),
-    ):
-        with pytest.raises((DataError, ModelError), match=said):
-            fit(*runs)
-    fit(*weights)
-    for settings in ({"lags": (12.0, 1.0)}, {"n_lags": 10}, {"lags": (5.0, 500.0)}):
-        with pytest.raises(ModelError, match="lags"):
-            fit(first, **settings)

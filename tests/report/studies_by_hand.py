@@ -26,7 +26,7 @@ from mckibben.studying.study import Study
 Array = NDArray[np.float64]
 
 TIME = np.arange(0, 20, 0.05)
-QUICKLY = {"balance": {"n_stops": 2, "n_lags": 0, "steps": 2, "elasticity": 3, "contact": False}}
+QUICKLY = {"balance": {"n_stops": 2, "n_lags": 0, "steps": 2, "elasticity": 3, "terms": ()}}
 """Settings with which a balance is fitted in a second."""
 
 

@@ -11,7 +11,6 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.equations import quantities
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.balance_prior import noise_of
-from mckibben.estimators.coupled.balance_starts import LARGER, opening
 from mckibben.excitation.believed import Belief, telling
 from mckibben.excitation.candidates import random_plan
 from mckibben.excitation.information import Criterion, Known, Noise, Slopes, crossed
@@ -48,6 +47,10 @@ leaves at least, over the range."""
 
 EXACT = 1e-5
 """Error over the range below which recordings are the model's own."""
+
+EARLY, LARGER = 5, 2.0
+"""Share of a recording that is its first part, one in so many, and how much larger errors are there where
+it did not begin at rest."""
 
 MOST_SAMPLES = 20_000
 """Of recordings, to know what they tell."""
@@ -260,7 +263,8 @@ def _recorded(
 
 def _begun(errors: Array) -> int:
     """Return from which sample on errors are the model's, not of what came before the recording."""
-    first, early, late = opening(errors)
+    first = len(errors) // EARLY
+    early, late = (np.mean(part**2, axis=0) for part in (errors[: first or None], errors[first:]))
     return first if (early > LARGER**2 * late).any() else 0
 
 

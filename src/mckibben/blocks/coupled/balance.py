@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, ClassVar, NamedTuple, Self
 
@@ -459,19 +460,8 @@ class Balance(Invertible):
 
     def report(self, state: Array) -> None:
         """Warn of references that would need pressures out of range, or muscles that push."""
-        if not state[-1] > 0:
-            return
-        low, high = self.pressure_range or (-np.inf, np.inf)
-        # what a sensor is off at rest is no end
-        low = 0.0 if abs(low) < 1e-3 * (high - low) else low
-        names = " or ".join(channel.name for channel in self.given)
         pushing = " or muscles to push harder than they can," if self.pushes else ""
-        warnings.warn(
-            f"{int(state[-1])} samples need {names} beyond {low:.4g} to {high:.4g} {self.given[0].unit} "
-            f"(behind a dead zone, if there is one){pushing} and were clipped there by the compensator",
-            ModelWarning,
-            stacklevel=4,
-        )
+        tell_clipped(state[-1], self.given, self.pressure_range, pushing)
 
     def n_clipped(self, state: Array) -> int:
         """Return how many samples needed pressures out of range."""
@@ -607,6 +597,27 @@ ONE_EACH = {
     "mass": "mass",
 }
 """Fields that have one number for every muscle, in words."""
+
+
+def tell_clipped(
+    n_samples: float,
+    given: Sequence[Channel],
+    reach: tuple[float, float] | None,
+    pushing: str = "",
+) -> None:
+    """Warn of samples that a balance's range of pressures did not reach, if there are any."""
+    if not n_samples > 0:
+        return
+    low, high = reach or (-np.inf, np.inf)
+    # what a sensor is off at rest is no end
+    low = 0.0 if abs(low) < 1e-3 * (high - low) else low
+    names = " or ".join(channel.name for channel in given)
+    warnings.warn(
+        f"{int(n_samples)} samples need {names} beyond {low:.4g} to {high:.4g} {given[0].unit} "
+        f"(behind a dead zone, if there is one){pushing} and were clipped there by the compensator",
+        ModelWarning,
+        stacklevel=5,
+    )
 
 
 class Placed(NamedTuple):

@@ -474,7 +474,9 @@ class Problem:
         table = np.concatenate([whole, target[..., np.newaxis]], axis=2) * weight[..., np.newaxis]
         triangle = np.linalg.qr(table.reshape(-1, table.shape[2]), mode="r")
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
-        system = np.vstack([triangle[:, :-1], np.sqrt(RIDGE) * np.diag(np.maximum(size, 1e-300))])
+        system = np.vstack(
+            [triangle[:, :-1], np.sqrt(RIDGE) * np.diag(np.where(size > 0.0, size, 1.0))]
+        )
         right = np.append(triangle[:, -1], np.zeros(size.size))
         sides, bounds = structure.conditions(structure.expanded(start[: len(terms)]))
         mix = structure.mix[:, chosen] + np.outer(structure.base, scaling)

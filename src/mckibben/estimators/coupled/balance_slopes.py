@@ -206,7 +206,7 @@ def carry(
             mix(past[row], 1.0, gain, now)
             mix(past[row], 1.0, -gain, moved)
             past[row, now.size - n_shape(c) - dp.size + 2 + int(c[2]) + i] += late[i]
-    if c[18] != 0.0:
+    if c[18] != 0.0 and way == IN_TIME:
         row = m + n * (n_s + n_l) + 2 * k
         mix(past[row + 1], 0.0, 1.0, past[row])
         mix(past[row], 0.0, 1.0, now)

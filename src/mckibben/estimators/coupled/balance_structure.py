@@ -31,6 +31,9 @@ GRID = 21
 LEAST_LEFT = 0.05
 """Area that friction has to leave, relative to that at rest."""
 
+LEAST_AREA = 1e-9
+"""Area at rest that is next to none, relative to what is about that of a muscle."""
+
 LEAST_STIFF = 1e-3
 """Stiffness that has to be left, relative to the force of the highest pressure over the stroke."""
 
@@ -397,6 +400,7 @@ class Structure:
         bench, m, n = self.bench, self.m, self.n
         of = {name: np.array([values[self.of(name, k)] for k in range(n)]) for name in self._muscle}
         of |= {name: np.maximum(of[name], 0.0) for name in NOT_NEGATIVE}
+        of["areas"][:, 0] = np.maximum(of["areas"][:, 0], LEAST_AREA * bench.unit)
         springs = np.array([values[self.on("springs", j)] for j in range(m)])
         bladders, pushes = of["bladder"][:, 0], self.shaped(values, "pushes")
         taut = bool((pushes >= NEVER).all())

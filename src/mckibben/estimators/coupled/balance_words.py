@@ -114,7 +114,7 @@ def _of_runs(search: Search, z: Array) -> list[str]:
     found += [
         f"{name} does not begin at rest: its first part does not count. Remedy: begin recordings "
         "without pressure"
-        for name in starts_elsewhere(problem.data)
+        for name in (() if structure.settled else starts_elsewhere(problem.data))
     ]
     return found
 

@@ -530,13 +530,21 @@ class Problem:
         return np.maximum(whole, 0.1 * np.median(np.abs(whole), axis=0))
 
 
-def bounded_least_squares(gram: Array, bounded: Mask) -> Array:
-    """Return the least squares of products of columns and, last, a target; some are not negative."""
+def bounded_least_squares(
+    gram: Array, bounded: Mask, near: Array | None = None, ridge: float = RIDGE
+) -> Array:
+    """Return the least squares of products of columns and, last, a target; some are not negative.
+
+    Damped towards what is ``near``, or 0, by every number's own effect.
+    """
     from scipy.optimize import nnls
 
-    size = np.sqrt(np.maximum(np.diag(gram)[:-1], 1e-300))
-    a = gram[:-1, :-1] / np.outer(size, size) + RIDGE * np.eye(size.size)
+    size = np.sqrt(np.diag(gram)[:-1])
+    size[~(size > 0.0)] = 1.0
+    a = gram[:-1, :-1] / np.outer(size, size) + ridge * np.eye(size.size)
     b, free, found = gram[:-1, -1] / size, ~bounded, np.zeros(size.size)
+    if near is not None:
+        b = b + ridge * size * near
     both = np.column_stack([a[np.ix_(free, bounded)], b[free]])
     sizes, ways = np.linalg.eigh(a[np.ix_(free, free)])
     across = ways @ ((ways.T @ both) / np.maximum(sizes, RIDGE)[:, np.newaxis])

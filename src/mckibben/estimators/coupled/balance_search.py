@@ -28,6 +28,9 @@ from mckibben.estimators.optimisers.tracker import Tracker
 BLOCKS, FOLDS = 20, 5
 """About how many blocks all runs are cut into, and in how many parts they are left out in turn."""
 
+DAMPED = 1e-2
+"""Damping of least squares of which errors are compared, towards what was found, by own effects."""
+
 AHEAD = 4
 """Groups of terms that are added in a row before they, together, have to lessen errors."""
 
@@ -243,7 +246,7 @@ class Search:
         free = np.append(active, np.ones(z.size - n, dtype=bool))
         whole = _reduced(grams.sum(axis=0)[np.newaxis], free, z)[0]
         solution, found = z.copy(), z.copy()
-        solution[free] = bounded_least_squares(whole, bounded[free])
+        solution[free] = bounded_least_squares(whole, bounded[free], z[free], DAMPED)
         low, high, much = structure.ends()
         shape = slice(structure.mix.shape[1], n)
         near = np.clip(
@@ -396,7 +399,8 @@ def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask) -> Array:
     for fold in np.unique(folds):
         out = folds == fold
         rest = whole - parts[out].sum(axis=0) if not out.all() else whole
-        theta = np.append(bounded_least_squares(rest, bounded[free]), -1.0)
+        found = bounded_least_squares(rest, bounded[free], z[free], DAMPED)
+        theta = np.append(found, -1.0)
         errors[out] = np.einsum("i,bij,j->b", theta, parts[out], theta)
     return errors
 

@@ -24,6 +24,7 @@ from mckibben.blocks.coupled.balance_law import (
     n_terms,
     shortening,
     solve_equilibrium,
+    start_at_rest,
     unbalanced,
     update_state,
 )
@@ -214,6 +215,7 @@ def follow(
     measured: Array,
     x: Array,
     held: bool,
+    rested: bool,
     every: int,
     begun: Array,
     past: Array,
@@ -231,7 +233,9 @@ def follow(
     driven, measured, x : arrays, shapes (t, n), (t, m), (t, s)
         Pressures, coordinates, what schedules and loads.
     held : bool
-        Whether muscles are where they were measured, at first with nothing loaded.
+        Whether muscles are where they were measured.
+    rested : bool
+        Whether those that are held come from rest without pressure; else nothing is loaded at first.
     every : int
     begun : array, shape (n times stops and lags,)
         Stops and lags before the first sample [mm], of muscles that are where its pressures hold them
@@ -264,7 +268,9 @@ def follow(
         tare[j] = 0.0
     for k in range(n):
         p[k] = driven[0, k] if held else 0.0
-    if held:
+    if held and rested:
+        start_at_rest(c, state, x[0], q, p, work)
+    elif held:
         update_state(c, state, AT_REST, q, p, x[0])
     else:
         move(c, state, AT_REST, False, q, x[0], p, past, rows, now, slopes[0], work)
@@ -299,6 +305,7 @@ def run(
     x: Array,
     *,
     held: bool,
+    rested: bool = False,
     every: int = 1,
     sloped: bool = True,
     begun: Array | None = None,
@@ -317,5 +324,5 @@ def run(
     scratch = np.zeros(n_states + 3 * m + 2 * n + 5 * m + m * m + 2 * terms)
     start = np.zeros(0) if begun is None else begun
     arrays = (np.ascontiguousarray(a) for a in (driven, measured, x))
-    follow(c, *arrays, held, every, start, past, rows, scratch, found, slopes)
+    follow(c, *arrays, held, rested, every, start, past, rows, scratch, found, slopes)
     return found, slopes

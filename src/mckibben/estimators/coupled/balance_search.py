@@ -45,6 +45,9 @@ UNKNOWN = 1e-10
 FAR, APART = 0.5, 0.7
 """Change of shape in one step, relative to what is much; least difference of the logarithms of lags."""
 
+NO_GAIN = 1e-6
+"""Gain by a term, relative to the squared errors, that is rounding."""
+
 SLOW, SLOWEST = 1e-3, 2
 """Relative gain of a step that is slow, and how many of them end a descent."""
 
@@ -85,7 +88,7 @@ class Search:
         far, by = self.belief.errors(self.structure, z)
         whole = np.zeros((far.size, slopes.shape[1]))
         whole[:, : by.shape[1]] = by
-        return np.append(errors, far), np.concatenate([slopes, whole]) if len(slopes) else slopes
+        return np.append(errors, far), np.concatenate([slopes, whole])
 
     def cost(self, z: Array) -> float:
         """Return the root mean square of the errors."""
@@ -219,7 +222,7 @@ class Search:
             errors = [missed(option) for option in options]
             first = int(np.argmin([one.sum() for one in errors])) if errors else 0
             gain = best - errors[first] if errors else np.zeros(1)
-            if not gain.sum() > np.sqrt(gain.size) * gain.std():
+            if not gain.sum() > max(np.sqrt(gain.size) * gain.std(), NO_GAIN * best.sum()):
                 break
             active, best = options[first], errors[first]
         free = np.append(active, np.ones(z.size - n, dtype=bool))

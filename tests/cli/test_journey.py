@@ -179,7 +179,7 @@ def test_example_writes_what_is_bundled_and_repeats(cli: Cli, tmp_path: Path) ->
 def test_a_fit_begins_from_a_muscle(cli: Cli, tmp_path: Path) -> None:
     write(moved(1, 5.0), tmp_path / "run.csv")
     asked = ["fit", "balance", tmp_path / "run.csv", "-o"]
-    few = ["--set", "steps=2", "--set", "terms="]
+    few = ["--set", "steps=2", "--set", "terms=[]"]
     plain, prior = tmp_path / "plain.json", tmp_path / "prior.json"
     assert cli(*asked, plain, *few).code == 0
     assert cli(*asked, prior, "--prior", "rail", *few).code == 0

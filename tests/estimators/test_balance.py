@@ -12,6 +12,7 @@ from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, Placed, balance_in
+from mckibben.blocks.coupled.balance_response import response_of
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE, Channel
 from mckibben.blocks.memoryless import PiecewiseLinear
@@ -141,8 +142,6 @@ def test_times_of_filling_and_venting_are_found() -> None:
     ("kind", "change"),
     [
         ("mass", {"mass": (0.02,)}),
-        ("walls", {"walls": (0.3,)}),
-        ("asymmetry", {"asymmetry": 0.4}),
         ("obstacle", {"obstacles": ((1.0, 8.0, 40.0),)}),
     ],
 )
@@ -153,6 +152,17 @@ def test_terms_are_added_that_a_muscle_has(kind: str, change: dict[str, Any]) ->
     assert kind in estimator.terms_
     assert error(estimator, other) < 1.5 * NOISE
     assert error(without, other) > 1.2 * error(estimator, other)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("walls", (0.3,)), ("asymmetry", 0.4)]
+)  # of which each can stand for the other where friction is the same along the way
+def test_friction_that_differs_by_direction_is_followed(field: str, value: Any) -> None:
+    muscle = replace(MUSCLE, **{field: value})
+    *train, other = (recording(seed, muscle=muscle) for seed in (1, 2, 3))
+    estimator = BalanceEstimator().fit(train)
+    assert {"walls", "asymmetry"} & {*estimator.terms_}
+    assert error(estimator, other) < 1.2 * NOISE
 
 
 def test_terms_that_may_not_be_added_are_none(found: BalanceEstimator) -> None:
@@ -211,7 +221,7 @@ def test_held_muscles_are_learned_from_by_their_force() -> None:
     held = Recording({"pressure": p, "displacement": y, "force": -lacking[:, 0]}, STEP)
     estimator = BalanceEstimator().fit([recording(1), recording(2), held])
     assert error(estimator, recording(3)) < 1.5 * NOISE
-    np.testing.assert_allclose(balance_of(estimator).lags, MUSCLE.lags, rtol=0.35)
+    np.testing.assert_allclose(balance_of(estimator).lags[:2], MUSCLE.lags, rtol=0.1)
 
 
 def hung(seed: int, weight: float, n: int = 1000) -> Recording:
@@ -231,8 +241,8 @@ def test_weights_that_nobody_measured_are_found() -> None:
     estimator = BalanceEstimator().fit(runs)
     found = estimator.loads_[:, 0] * 60.0  # bar on an area at rest of 60 N/bar
     np.testing.assert_allclose(found, [0.0, 40.0, 80.0], atol=2.0)
-    assert estimator.diagnostics_.rmse < 1.5 * NOISE
-    assert error(estimator, hung(4, 0.0)) < 1.5 * NOISE  # under the load of the first
+    assert estimator.diagnostics_.rmse < 2.0 * NOISE
+    assert error(estimator, hung(4, 0.0)) < 2.5 * NOISE  # under the load of the first
 
 
 def test_recordings_that_begin_under_a_pressure_long_held_count_as_a_whole() -> None:
@@ -317,9 +327,9 @@ def test_muscles_that_are_alike_come_out_alike_at_a_joint() -> None:
     assert error(estimator, joint(3)) < 1.5 * NOISE
     balance = balance_of(estimator)
     np.testing.assert_allclose(balance.directions, [[1.0], [-1.0]])
-    for name in ("areas", "friction", "relaxation"):
-        first, second = np.array(getattr(balance, name))
-        assert np.abs(first - second).max() < 0.2 * np.abs(first).max(), name
+    alike = response_of(balance, 0.0, 4.0)
+    for first, second in (alike.width, alike.friction, alike.creep, np.array(balance.areas)[:, 0]):
+        assert first == pytest.approx(second, rel=0.2)
     np.testing.assert_allclose(balance.areas[0][0], 60.0, rtol=0.1)
     turned = BalanceEstimator().fit([joint(1, -1.0), joint(2, -1.0)])
     assert turned.diagnostics_.rmse == pytest.approx(estimator.diagnostics_.rmse, rel=1e-4)

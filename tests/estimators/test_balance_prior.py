@@ -11,7 +11,8 @@ import pytest
 from mckibben import Recording, muscles
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.coupled.load_estimate import load_of, parts_of
+from mckibben.blocks.coupled.balance import balance_in
+from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.muscles import Prior, Sheet
 from mckibben.muscles.prior import of_muscles
@@ -30,7 +31,7 @@ TRUTH = muscles.scaled(RAIL.balance, RAIL.sheet, SHEET)
 """A muscle that nobody has seen."""
 
 STEP = 0.05
-SETTINGS: dict[str, Any] = {"contact": False, "n_stops": 4, "elasticity": 4, "slack": False}
+SETTINGS: dict[str, Any] = {"n_stops": 4, "elasticity": 4, "terms": ("elasticity", "areas")}
 
 
 def moved(seed: int, seconds: float, noise: float = 0.02) -> Recording:
@@ -78,8 +79,9 @@ def test_a_prior_without_doubt_returns_itself() -> None:
         shapes=dict.fromkeys(prior.shapes, 1e-3),
         zero=1e-3,
     )
-    balance, _, _ = parts_of(fitted(moved(1, 5.0), sure))
-    away = traits(balance, SHEET) - prior.mean
+    placed = balance_in(fitted(moved(1, 5.0), sure))
+    assert placed is not None
+    away = traits(placed.balance, SHEET) - prior.mean
     assert np.sqrt(np.nanmean(away**2)) < 0.1  # four stops do not make every friction
 
 

@@ -131,9 +131,11 @@ class Problem:
 
     def still(self, run: Run) -> bool:
         """Tell whether a run's forces count, not its displacements."""
-        if self.of_force:
-            return True
-        return self.data.once(("held", run.place), lambda: np.array(held(self.data, run))).item()
+        return self.of_force or not self._moves(run)
+
+    def _moves(self, run: Run) -> bool:
+        still = self.data.once(("held", run.place), lambda: np.array(held(self.data, run)))
+        return not still.item()
 
     def counting(self, run: Run, structure: Structure) -> Mask:
         """Return which of the samples compared count.
@@ -236,7 +238,8 @@ class Problem:
         begun = None if held else self.begun(structure, z, c, run, driven[0])
         return follow(
             c, driven, run.outputs, run.scheduled, by_air,
-            held=held, every=self.every, sloped=sloped, begun=begun,
+            held=held, rested=held and self.of_force and self._moves(run),
+            every=self.every, sloped=sloped, begun=begun,
         )  # fmt: skip
 
     def errors_of(

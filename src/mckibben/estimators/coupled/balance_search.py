@@ -49,6 +49,9 @@ UNKNOWN = 1e-10
 FAR, APART = 0.5, 0.7
 """Change of shape in one step, relative to what is much; least difference of the logarithms of lags."""
 
+NO_GAIN = 1e-6
+"""Gain by a term, relative to the squared errors, that is rounding."""
+
 SLOW, SLOWEST = 1e-3, 2
 """Relative gain of a step that is slow, and how many of them end a descent."""
 
@@ -89,7 +92,7 @@ class Search:
         far, by = self.belief.errors(self.structure, z)
         whole = np.zeros((far.size, slopes.shape[1]))
         whole[:, : by.shape[1]] = by
-        return np.append(errors, far), np.concatenate([slopes, whole]) if len(slopes) else slopes
+        return np.append(errors, far), np.concatenate([slopes, whole])
 
     def cost(self, z: Array) -> float:
         """Return the root mean square of the errors."""
@@ -241,7 +244,7 @@ class Search:
             first = int(np.argmin([one.sum() for one in errors]))
             ahead, gain = options[first], best - errors[first]
             passed += 1
-            if gain.sum() > np.sqrt(gain.size) * gain.std():
+            if gain.sum() > max(np.sqrt(gain.size) * gain.std(), NO_GAIN * best.sum()):
                 active, best, passed = ahead, errors[first], 0
         free = np.append(active, np.ones(z.size - n, dtype=bool))
         whole = _reduced(grams.sum(axis=0)[np.newaxis], free, z)[0]
@@ -253,7 +256,6 @@ class Search:
             solution[shape], np.maximum(low, z[shape] - much), np.minimum(high, z[shape] + much)
         )
         found[shape] = np.where((active & new)[shape], near, z[shape])
-        chosen = replace(self, active=active)
         return active, found
 
     def improved(self, z: Array, other: Search, found: Array, by: float = 0.0) -> bool:

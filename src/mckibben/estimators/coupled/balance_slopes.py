@@ -31,6 +31,7 @@ from mckibben.blocks.coupled.balance_law import (
     n_terms,
     shortening,
     solve_equilibrium,
+    start_at_rest,
     unbalanced,
     update_state,
 )
@@ -322,6 +323,7 @@ def follow(
     x: Array,
     dp: Array,
     held: bool,
+    rested: bool,
     every: int,
     begun: Array,
     past: Array,
@@ -341,7 +343,9 @@ def follow(
     dp : array, shape (t, n, f)
         How pressures that act move with what acts on them.
     held : bool
-        Whether muscles are where they were measured, at first with nothing loaded.
+        Whether muscles are where they were measured.
+    rested : bool
+        Whether those that are held come from rest without pressure; else nothing is loaded at first.
     every : int
     begun : array, shape (n times stops and lags,)
         Stops and lags before the first sample [mm], of muscles that are where its pressures hold them
@@ -374,7 +378,9 @@ def follow(
         tare[j] = 0.0
     for k in range(n):
         p[k] = driven[0, k] if held else 0.0
-    if held:
+    if held and rested:
+        start_at_rest(c, state, x[0], q, p, work)
+    elif held:
         update_state(c, state, AT_REST, q, p, x[0])
     else:
         move(c, state, AT_REST, False, q, x[0], p, dp[0], past, rows, now, slopes[0], work)
@@ -410,6 +416,7 @@ def run(
     dp: Array | None = None,
     *,
     held: bool,
+    rested: bool = False,
     every: int = 1,
     sloped: bool = True,
     begun: Array | None = None,
@@ -430,5 +437,5 @@ def run(
     scratch = np.zeros(n_states + 3 * m + 2 * n + 5 * m + m * m + 2 * terms)
     start = np.zeros(0) if begun is None else begun
     arrays = (np.ascontiguousarray(a) for a in (driven, measured, x, dp))
-    follow(c, *arrays, held, every, start, past, rows, scratch, found, slopes)
+    follow(c, *arrays, held, rested, every, start, past, rows, scratch, found, slopes)
     return found, slopes

@@ -452,8 +452,9 @@ class Structure:
         """Return the coefficients of the block, whose lines have terms even where they are nothing."""
         c = self.block(values).coefficients(sample_time)
         linear = c[c.size - self.n_linear :]
+        least = 1e-12 * self.bench.unit * self.bench.highest / self.bench.scale
         for k in range(self.n):
-            linear[self.of("line", k)] = np.maximum(values[self.of("line", k)], 1e-12)
+            linear[self.of("line", k)] = np.maximum(values[self.of("line", k)], least)
         return c
 
     def needed(self, active: Collection[Term]) -> Structure:

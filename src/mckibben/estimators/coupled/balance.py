@@ -37,7 +37,7 @@ from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, no
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
-from mckibben.estimators.coupled.balance_words import sentences
+from mckibben.estimators.coupled.balance_words import measured, said_of, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator, of_channels, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
@@ -117,6 +117,8 @@ class BalanceEstimator(CoupledEstimator):
         or, where others have a force, beyond their average. In the unit of the model's forces.
     terms_ : tuple of str
         What was added.
+    trial_, measured_ : Trial, list of Measured
+        Loops and steps of which the model was asked, and what of its response recordings determine.
     """
 
     title = "Balance of forces"
@@ -242,20 +244,32 @@ class BalanceEstimator(CoupledEstimator):
             place = search.problem.loads_at(structure, run)
             if place.stop > place.start:
                 self.loads_[run.recording] = z[place] * balance.areas[0][0]
-        acting = [front(structure, values, channel) for channel in data.inputs]
-        before = [one[0] if len(one) == 1 else PerChannel(one) for one in zip(*acting, strict=True)]
+        acting = front(structure, values, data.inputs[0])
         if data.inputs[0].unit in LIMITED:
             ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
-            for block in acting[0]:
+            for block in acting:
                 if not block.rate_dependent:
                     ends = block.simulate(ends)
             balance = replace(balance, pressure_range=(float(ends[0]), float(ends[1])))
         x = of_channels(data, balance.scheduling).stacked("scheduled")
         balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
-        tracker.notes += sentences(search, z, balance)
+
+        def model(values: Array, balance: Balance) -> Block:
+            acting = zip(*(front(structure, values, one) for one in data.inputs), strict=True)
+            before = [one[0] if len(one) == 1 else PerChannel(one) for one in acting]
+            parts = [*before, balance.inverse(), *behind]
+            return parts[0] if len(parts) == 1 else Series(tuple(parts))
+
+        def other(z: Array) -> Block:
+            values = structure.expanded(z[: len(structure.terms)])
+            return model(values, structure.block(values, final=True))
+
+        folds = search.without_folds(z)
+        self.trial_, self.measured_ = measured(search, z, folds, other)
+        tracker.notes += sentences(search, z, folds, balance)
+        tracker.notes += [said_of(self.trial_, one) for one in self.measured_]
         self._search, self._z = self._started(search, z)
-        parts = [*before, balance.inverse(), *behind]
-        return parts[0] if len(parts) == 1 else Series(tuple(parts))
+        return model(values, balance)
 
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
         """Return the structure of all that may be."""
@@ -449,7 +463,7 @@ def in_newtons(balance: Balance) -> Balance:
     obstacles[:, 2:] /= share
     return replace(
         balance,
-        obstacles=rows(obstacles.reshape(len(balance.obstacles), -1)),
+        obstacles=rows(obstacles.reshape(1, -1)) if obstacles.size else (),
         **{name: rows(scaled(getattr(balance, name))) for name in tables},
         **{
             name: vector(scaled(getattr(balance, name)))

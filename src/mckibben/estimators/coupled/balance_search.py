@@ -36,8 +36,8 @@ MOST_TRIES = 7
 MOST_CUTS = 8
 """Times that springs are made stiff where they were found soft."""
 
-LIGHTEST = 1e-7
-"""Root of the damping of a step that is hardly damped."""
+DAMPED, LIGHTEST = 1e-3, 1e-7
+"""Damping of a first step; its root of one that is hardly damped."""
 
 UNKNOWN = 1e-10
 """Effect of a number's size, relative to the largest of any, that is none."""
@@ -102,7 +102,7 @@ class Search:
 
     def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
         """Show a tracker ever better numbers, and return the best."""
-        damping, slow = 1e-3, 0
+        damping, slow = DAMPED, 0
         errors, slopes = self.errors(z, self.active)
         cost = _size(errors)
         tracker.saw(z, cost)
@@ -269,22 +269,18 @@ class Search:
         return bounded
 
     def without_folds(self, z: Array) -> list[Array]:
-        """Return what would be found without each part of the runs, were the free run straight."""
-        grams, bounded = self._grams(z, self.active), self._bounded(z.size)
+        """Return what a step finds without each part of the runs in turn; nothing if physics allows none."""
         free = np.zeros(z.size, dtype=bool)
         free[self.free] = True
-        parts, folds = _reduced(grams, free, z), np.arange(len(grams)) * FOLDS // len(grams)
-        whole = bounded_least_squares(parts.sum(axis=0), bounded[free])
-        found = []
+        parts = _reduced(self._grams(z, self.active), free, z)
+        folds, found = np.arange(len(parts)) * FOLDS // len(parts), []
         for fold in np.unique(folds):
-            moved = z.copy()
-            moved[free] += (
-                bounded_least_squares(parts[folds != fold].sum(axis=0), bounded[free]) - whole
-            )
-            low, high, _ = self.structure.ends()
-            n = self.structure.mix.shape[1]
-            moved[n : n + low.size] = np.clip(moved[n : n + low.size], low, high)
-            found.append(moved)
+            sizes, ways = np.linalg.eigh(parts[folds != fold].sum(axis=0))
+            root = np.sqrt(np.maximum(sizes, 0.0))[:, np.newaxis] * ways.T
+            try:
+                found.append(self._solved(root, z, DAMPED))
+            except ModelError:
+                return []
         return found
 
     def _candidates(self, active: Mask) -> Iterator[Mask]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import mckibben
-from mckibben.blocks.coupled.load_estimate import parts_of
+from mckibben.blocks.coupled.balance import balance_in
 from mckibben.errors import DataWarning, ModelWarning
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.muscles.library import FOLDER, Conditions, Muscle, described
@@ -129,7 +129,9 @@ def identified(
 ) -> Muscle:
     """Return a muscle as identified from recordings."""
     found = BalanceEstimator(elasticity=7, **settings).fit(recordings)
-    balance, _, _ = parts_of(found.model_)
+    placed = balance_in(found.model_)
+    assert placed is not None
+    balance = placed.balance
     moved = np.concatenate([run["displacement"] for run in recordings])
     pressed = np.concatenate([run["pressure"] for run in recordings])
     pulled = np.concatenate([run["force"] for run in recordings if "force" in run] or [[]])

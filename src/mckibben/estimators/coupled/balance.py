@@ -33,7 +33,7 @@ from mckibben.estimators.coupled.balance_bench import (
     without_held,
     without_load,
 )
-from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, noise_of, told_by
+from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, told_by
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
@@ -325,26 +325,16 @@ class BalanceEstimator(CoupledEstimator):
         """Return the search of the terms chosen, and what they are."""
         few = compared(coarser(data, FEW), FEW, of_force=self.of_force)
         search = Search(few, structure, self._first(structure), belief)
-        starts = [] if belief is None else [self._likely(search)]
-        for grip in GRIPS[: None if structure.n_stops else 1]:
-            z = np.zeros(few.size(structure))
-            z[: len(structure.terms)] = structure.begin(grip * structure.bench.highest)
-            z = few.balanced(structure, z, search.active)
-            starts.append((search.cost(z), z))
-            tracker.saw(z, starts[-1][0])
-        z = min(starts, key=lambda start: start[0])[1]
+        z = self._balanced(search, tracker) if belief is None else self._likely(search)
         tried = np.array([self._tried(term) for term in structure.terms])
-        for number in range(ROUNDS if belief is None else 1):
-            self._search, self._z = search, z = (
-                search,
-                search.descend(
-                    z,
-                    min(self.steps, STEPS_BETWEEN),
-                    tracker.part(0.1 * number, 0.1 * (number + 1)),
-                ),
-            )
+        for number in range(ROUNDS):
+            self._search, self._z = search, z
+            part = tracker.part(0.1 * number, 0.1 * (number + 1))
+            z = search.descend(z, min(self.steps, STEPS_BETWEEN), part)
+            search = search.weighed(z)
+            self._search, self._z = search, z
             active, z = search.chosen(z, tried)
-            if belief is not None or (active == search.active).all() or number == ROUNDS - 1:
+            if (active == search.active).all() or number == ROUNDS - 1:
                 break
             search = replace(search, active=active)
         added = [
@@ -363,26 +353,32 @@ class BalanceEstimator(CoupledEstimator):
         whole = compared(data, MOST, of_force=self.of_force)
         search = replace(search, problem=whole)
         for _ in range(1 if belief is None else REFINED):
-            if belief is not None:
-                noise = noise_of(whole.errors(search.structure, z)[0][: len(whole.runs)])
-                search = replace(search, belief=replace(belief, noise=noise))
+            search = search.weighed(z)
             z = search.descend(z, self.steps, tracker.part(0.6, 0.9))
         return search, z
 
-    def _likely(self, search: Search) -> tuple[float, Array]:
-        """Return what is likely before, under the constant force the recordings ask, and its cost."""
-        structure, belief = search.structure, search.belief
+    def _balanced(self, search: Search, tracker: Tracker) -> Array:
+        """Return what balances forces best where muscles were measured, of several grips."""
+        structure, problem, starts = search.structure, search.problem, []
+        for grip in GRIPS[: None if structure.n_stops else 1]:
+            z = np.zeros(problem.size(structure))
+            z[: len(structure.terms)] = structure.begin(grip * structure.bench.highest)
+            z = problem.balanced(structure, z, search.active)
+            starts.append((search.cost(z), z))
+            tracker.saw(z, starts[-1][0])
+        return min(starts, key=lambda start: start[0])[1]
+
+    def _likely(self, search: Search) -> Array:
+        """Return what is likely before anything was recorded."""
+        structure, belief, problem = search.structure, search.belief, search.problem
         assert belief is not None
-        z = np.zeros(search.problem.size(structure))
+        z = np.zeros(problem.size(structure))
         z[: len(structure.terms)] = structure.begin(FIRST_GRIP * structure.bench.highest)
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
                 z[place] = 1.0 / belief.prior.sheet.area
-        alone = replace(
-            search, problem=replace(search.problem, data=replace(search.problem.data, runs=()))
-        )
-        z = alone.descend(z, TOWARDS, Tracker())
-        return search.cost(z), z
+        alone = replace(search, problem=replace(problem, data=replace(problem.data, runs=())))
+        return alone.descend(z, TOWARDS, Tracker())
 
     def _tried(self, term: Term) -> bool:
         """Tell whether a term may be added."""

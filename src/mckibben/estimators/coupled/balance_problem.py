@@ -275,7 +275,7 @@ class Problem:
             whole = np.zeros((size - first, size))
             whole[:, first:] = np.diag(scale.ravel())
             slopes.append(whole)
-        return errors, np.concatenate(slopes) if wanted is not None else np.zeros((0, size))
+        return errors, np.concatenate([np.zeros((0, size)), *slopes])
 
     def _step(self, structure: Structure, z: Array, place: int, far: bool) -> float:
         """Return a change of a number by which slopes are found, small or not, away from its end."""

@@ -10,7 +10,7 @@ least, within what physics asks.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
-from mckibben.estimators.coupled.balance_prior import Belief
+from mckibben.estimators.coupled.balance_prior import Belief, noise_of
 from mckibben.estimators.coupled.balance_problem import Problem, bounded_least_squares
 from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
@@ -82,10 +82,17 @@ class Search:
         errors = np.concatenate(parts) if parts else np.zeros(0)
         if self.belief is None:
             return errors, slopes
-        far, by = self.belief.errors(self.structure, z)
-        whole = np.zeros((far.size, slopes.shape[1]))
+        far, by = self.belief.errors(self.structure, z, wanted)
+        whole = np.zeros((len(by), slopes.shape[1]))
         whole[:, : by.shape[1]] = by
-        return np.append(errors, far), np.concatenate([slopes, whole]) if len(slopes) else slopes
+        return np.append(errors, far), np.concatenate([slopes, whole])
+
+    def weighed(self, z: Array) -> Search:
+        """Return the search in which the belief is weighed by the noise that is left."""
+        if self.belief is None:
+            return self
+        errors = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
+        return replace(self, belief=replace(self.belief, noise=noise_of(errors)))
 
     def cost(self, z: Array) -> float:
         """Return the root mean square of the errors."""
@@ -204,12 +211,14 @@ class Search:
         """
         structure, n = self.structure, len(self.structure.terms)
         new = np.array([term.kind in NEW_SHAPE for term in structure.terms]) & ~self.active
-        grams = self._grams(z, (tried & new) | self.active, new)
+        wanted = (tried & new) | self.active
+        grams, likely = self._grams(z, wanted, new), self._likely(z, wanted)
         bounded = self._bounded(z.size)
         active = self.active.copy()
 
         def missed(free: Mask) -> Array:
-            return _left_out(grams, np.append(free, np.ones(z.size - n, dtype=bool)), z, bounded)
+            every = np.append(free, np.ones(z.size - n, dtype=bool))
+            return _left_out(grams, every, z, bounded, likely)
 
         best = missed(active)
         for _ in range(MOST_ADDED):
@@ -223,7 +232,7 @@ class Search:
                 break
             active, best = options[first], errors[first]
         free = np.append(active, np.ones(z.size - n, dtype=bool))
-        whole = _reduced(grams.sum(axis=0)[np.newaxis], free, z)[0]
+        whole = _reduced((grams.sum(axis=0) + likely)[np.newaxis], free, z)[0]
         solution, found = z.copy(), z.copy()
         solution[free] = bounded_least_squares(whole, bounded[free])
         low, high, much = structure.ends()
@@ -257,6 +266,16 @@ class Search:
         blocks = [block for part in _blocks(np.split(table, ends)) for block in part]
         return np.array([block.T @ block for block in blocks])
 
+    def _likely(self, z: Array, wanted: Mask) -> Array:
+        """Return the products of slopes of what is believed, and of their target."""
+        table = np.zeros((1, z.size + 1))
+        if self.belief is not None:
+            far, by = self.belief.errors(self.structure, z, wanted)
+            table = np.zeros((far.size, z.size + 1))
+            table[:, : by.shape[1]] = by
+            table[:, -1] = by @ z[: by.shape[1]] - far
+        return np.asarray(table.T @ table)
+
     def _bounded(self, size: int) -> Mask:
         """Return which of all numbers are not negative."""
         bounded = np.zeros(size, dtype=bool)
@@ -273,9 +292,10 @@ class Search:
         free = np.zeros(z.size, dtype=bool)
         free[self.free] = True
         parts = _reduced(self._grams(z, self.active), free, z)
+        likely = _reduced(self._likely(z, self.active)[np.newaxis], free, z)[0]
         folds, found = np.arange(len(parts)) * FOLDS // len(parts), []
         for fold in np.unique(folds):
-            sizes, ways = np.linalg.eigh(parts[folds != fold].sum(axis=0))
+            sizes, ways = np.linalg.eigh(parts[folds != fold].sum(axis=0) + likely)
             root = np.sqrt(np.maximum(sizes, 0.0))[:, np.newaxis] * ways.T
             try:
                 found.append(self._solved(root, z, DAMPED))
@@ -343,18 +363,19 @@ def _blocks(parts: list[Array]) -> list[list[Array]]:
     return [np.array_split(part, max(1, round(BLOCKS * len(part) / total))) for part in parts]
 
 
-def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask) -> Array:
+def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask, likely: Array) -> Array:
     """Return the squared errors of every block by what least squares of the others find.
 
-    ``grams`` are products of slopes and target by block; what is not free is as it is.
+    ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what is
+    not free is as it is.
     """
-    parts = _reduced(grams, free, z)
+    parts, likely = _reduced(grams, free, z), _reduced(likely[np.newaxis], free, z)[0]
     folds = np.arange(len(grams)) * FOLDS // len(grams)
     whole, errors = parts.sum(axis=0), np.zeros(len(grams))
     for fold in np.unique(folds):
         out = folds == fold
         rest = whole - parts[out].sum(axis=0) if not out.all() else whole
-        theta = np.append(bounded_least_squares(rest, bounded[free]), -1.0)
+        theta = np.append(bounded_least_squares(rest + likely, bounded[free]), -1.0)
         errors[out] = np.einsum("i,bij,j->b", theta, parts[out], theta)
     return errors
 

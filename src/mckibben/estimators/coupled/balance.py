@@ -40,6 +40,7 @@ from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
 from mckibben.estimators.coupled.balance_words import measured, said_of, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator, of_channels, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.muscles.traits import TRAVELS
 from mckibben.recording import Recording, listed
 
 PRESSURES = ("bar", "V", "")
@@ -273,7 +274,8 @@ class BalanceEstimator(CoupledEstimator):
 
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
         """Return the structure of all that may be."""
-        limits = np.geomspace(FINEST, LONGEST, self.n_stops) * bench.stroke / bench.highest
+        longest = LONGEST if self.prior is None else TRAVELS[-1]
+        limits = np.geomspace(FINEST, longest, self.n_stops) * bench.stroke / bench.highest
         shortest, longest = bench.lag_range
         lags = np.geomspace(shortest, longest, self.n_lags + 1)[1:] if bench.step and timed else ()
         if self.lags is not None:
@@ -299,11 +301,13 @@ class BalanceEstimator(CoupledEstimator):
         """Tell whether terms of a kind may be added."""
         return self.terms is None or kind in self.terms
 
-    def _first(self, structure: Structure) -> Mask:
+    def _first(self, structure: Structure, belief: Belief | None) -> Mask:
         """Return which terms are free from the beginning."""
 
         def there(term: Term) -> bool:
-            kind, which, muscle = term
+            kind, which, _ = term
+            if belief is not None and kind in OF_TRAITS:
+                return True
             if kind == "springs":
                 return which == 0 or (which - 1) % structure.degree == 0
             if kind == "friction":
@@ -324,8 +328,11 @@ class BalanceEstimator(CoupledEstimator):
     ) -> tuple[Search, Array]:
         """Return the search of the terms chosen, and what they are."""
         few = compared(coarser(data, FEW), FEW, of_force=self.of_force)
-        search = Search(few, structure, self._first(structure), belief)
-        z = self._balanced(search, tracker) if belief is None else self._likely(search)
+        search = Search(few, structure, self._first(structure, belief), belief)
+        z = self._balanced(search, tracker)
+        if belief is not None:
+            starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
+            z = min(starts, key=search.cost)
         tried = np.array([self._tried(term) for term in structure.terms])
         for number in range(ROUNDS):
             self._search, self._z = search, z
@@ -340,7 +347,7 @@ class BalanceEstimator(CoupledEstimator):
         added = [
             t
             for t, now, first in zip(
-                structure.terms, search.active, self._first(structure), strict=True
+                structure.terms, search.active, self._first(structure, belief), strict=True
             )
             if now and not first
         ]
@@ -438,6 +445,9 @@ class BalanceEstimator(CoupledEstimator):
 FIRST_GRIP, TOWARDS, REFINED = 0.1, 60, 3
 """Where what is likely begins, relative to the highest pressure; most steps from there to it; times that
 the noise of recordings is found anew."""
+
+OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
+"""Kinds of terms of which a prior is."""
 
 OWN_HELPS = 0.1
 """By how much loads of recordings' own have to lessen errors."""

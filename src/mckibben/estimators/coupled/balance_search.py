@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
-from mckibben.estimators.coupled.balance_prior import Belief, noise_of
+from mckibben.estimators.coupled.balance_prior import Belief
 from mckibben.estimators.coupled.balance_problem import Problem, bounded_least_squares
 from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
@@ -44,6 +44,9 @@ UNKNOWN = 1e-10
 
 FAR, APART = 0.5, 0.7
 """Change of shape in one step, relative to what is much; least difference of the logarithms of lags."""
+
+NOISES = tuple(np.geomspace(1e-4, 0.1, 10).tolist())
+"""Noise of recordings, relative to the range, by which a belief may be weighed."""
 
 SLOW, SLOWEST = 1e-3, 2
 """Relative gain of a step that is slow, and how many of them end a descent."""
@@ -88,11 +91,14 @@ class Search:
         return np.append(errors, far), np.concatenate([slopes, whole])
 
     def weighed(self, z: Array) -> Search:
-        """Return the search in which the belief is weighed by the noise that is left."""
+        """Return the search in which the belief has the weight by which what is left out is found best."""
         if self.belief is None:
             return self
-        errors = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
-        return replace(self, belief=replace(self.belief, noise=noise_of(errors)))
+        free, bounded = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool)), self._bounded(z.size)
+        grams = self._grams(z, self.active)
+        likely = self._likely(z, self.active) / self.belief.noise**2
+        missed = [_left_out(grams, free, z, bounded, noise**2 * likely).sum() for noise in NOISES]
+        return replace(self, belief=replace(self.belief, noise=NOISES[int(np.argmin(missed))]))
 
     def cost(self, z: Array) -> float:
         """Return the root mean square of the errors."""

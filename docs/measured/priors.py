@@ -1,18 +1,20 @@
 """What priors from the library are worth: python docs/measured/priors.py [FOLDER].
 
-The virtual MAS-20, 10 s with its data sheet and a library that lacks it beside 90 s without; and, from
-FOLDER (measured recordings, festo_isometric_20mm in it), a muscle of 300 mm from one of 150 mm.
+The muscles of virtual rigs, 10 s with a data sheet and a library that lacks the muscle beside 90 s without;
+and, from FOLDER (measured recordings, festo_isometric_20mm in it), a muscle of 300 mm from one of 150 mm.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from library import RIGS, STEP, bench
 
 import mckibben
 from mckibben import Recording, muscles
@@ -23,57 +25,54 @@ from mckibben.muscles import Sheet
 from mckibben.muscles import prior as process
 from mckibben.muscles.prior import of_muscles
 from mckibben.muscles.traits import PLACES
+from mckibben.rigs.setups.moving_end import MovingEnd
 from mckibben.signals.broadband import random_wave
 
-STEP, LITTLE, MUCH = 0.02, 10.0, 90.0
-LOW, HIGH, FASTEST = 1.0, 5.5, 0.3
-SEEDS, TESTS = range(5), range(100, 105)
+LITTLE, MUCH, TEST = 10.0, 90.0, 60.0
+LOW, HIGH, FASTEST, PULL = 0.17, 0.92, 0.3, 0.05
+"""Of random pressures, as shares of the highest, and their highest frequency [Hz]; share of the force that
+hangs at the muscle."""
 
-MAS20 = Sheet(
-    diameter_mm=20.0,
-    rest_length_mm=200.0,
-    max_force_N=1500.0,
-    max_pressure_bar=6.0,
-    max_contraction=0.25,
-)
-"""Of the maker's catalogue."""
+SEEDS, TESTS = range(5), range(100, 103)
 
 
-def random_motion(seed: int, seconds: float) -> Recording:
-    """Return the virtual MAS-20 under random pressures, which begin at rest at their lowest."""
+def random_motion(stand: MovingEnd, sheet: Sheet, seed: int, seconds: float) -> Recording:
+    """Return a muscle under random pressures, which begin at rest at their lowest."""
     time = np.arange(round(seconds / STEP) + 1) * STEP
-    wave = random_wave(time, FASTEST, HIGH, LOW, seed=seed)
-    pressure = LOW + (wave - LOW) * np.clip(time / 2.0, 0.0, 1.0)
-    rig = mckibben.load_rig("mas20-hanging")
-    return rig.run(Recording({"pressure": pressure}, STEP), seed=seed)
+    low, high = LOW * sheet.max_pressure_bar, HIGH * sheet.max_pressure_bar
+    wave = random_wave(time, FASTEST, high, low, seed=seed)
+    pressure = low + (wave - low) * np.clip(time / 2.0, 0.0, 1.0)
+    force = np.full(time.size, PULL * sheet.force)
+    run = stand.run(Recording({"pressure": pressure, "force": force}, STEP), seed=seed)
+    return run.select(["pressure", "displacement"])
 
 
-def mas20() -> None:
-    """Print errors on random motion that no model saw."""
-    tests = [random_motion(seed, 60.0) for seed in TESTS]
-    library = [muscle for muscle in muscles.list() if muscle.name != "mas20-hanging"]
-    priors = {"leaving it out": of_muscles(library, MAS20), "itself in the library":
-              muscles.prior_of("mas20-hanging")}  # fmt: skip
+def free(name: str, seeds: Iterable[int]) -> None:
+    """Print errors of a rig's muscle on random motion that no model saw."""
+    stand, sheet = bench(name)
+    tests = [random_motion(stand, sheet, seed, TEST) for seed in TESTS]
+    library = [muscle for muscle in muscles.list() if muscle.name != name]
+    prior, own = of_muscles(library, sheet), muscles.prior_of(name)
     found: dict[str, list[float]] = {}
-    for seed in SEEDS:
-        run = random_motion(seed, MUCH).select(["pressure", "displacement"])
-        short = Recording(
-            {name: run[name][: round(LITTLE / STEP) + 1] for name in run.channels}, STEP
-        )
-        for title, data, prior in (
+    for seed in seeds:
+        run = random_motion(stand, sheet, seed, MUCH)
+        short = Recording({c: run[c][: round(LITTLE / STEP) + 1] for c in run.channels}, STEP)
+        for title, data, told in (
             ("90 s", run, None),
             ("10 s", short, None),
-            *((f"10 s, prior {name}", short, prior) for name, prior in priors.items()),
-            ("90 s, prior leaving it out", run, priors["leaving it out"]),
+            ("10 s, prior leaving it out", short, prior),
+            ("10 s, prior itself in the library", short, own),
+            ("90 s, prior leaving it out", run, prior),
         ):
-            model = BalanceEstimator(prior=prior).fit(data).model_
+            model = BalanceEstimator(prior=told).fit(data).model_
             errors = [rmse(model.simulate(one)["displacement"], one) for one in tests]
             found.setdefault(title, []).append(float(np.median(errors)))
     for case, errors in found.items():
         ratio = np.array(errors) / np.array(found["90 s"])
         print(
-            f"{case}: {np.median(errors):.3f} mm ({min(errors):.3f} to {max(errors):.3f}), "
-            f"{np.median(ratio):.2f} x ({ratio.min():.2f} to {ratio.max():.2f})"
+            f"{name}, {case}: {np.median(errors):.3f} mm ({min(errors):.3f} to {max(errors):.3f}), "
+            f"{np.median(ratio):.2f} x ({ratio.min():.2f} to {ratio.max():.2f})",
+            flush=True,
         )
 
 
@@ -170,4 +169,5 @@ if __name__ == "__main__":
     if len(sys.argv) > 1:
         held(Path(sys.argv[1]))
     left_out()
-    mas20()
+    for name in RIGS:
+        free(name, SEEDS)

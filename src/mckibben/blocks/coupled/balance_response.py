@@ -1,102 +1,80 @@
-"""What muscles do at mid-range, by the response of their model: loops, creep, stiffness.
+"""What muscles do about mid-range: loops and steps, the same whether a model is asked or a rig.
 
-Nothing is read off coefficients: pressures are moved slowly up and down, stepped and held, and loads
-changed a little, as one would at a bench.
+Nothing is read off coefficients: pressures and loads are moved up and down, stepped and held, as one
+would at a bench.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_law import (
-    AT_REST,
-    solve_equilibrium,
-    start_at_rest,
-    unbalanced,
-    update_state,
-)
-from mckibben.blocks.running import run_many
+from mckibben.blocks.fields import Channel
 
-LOOP, HELD = 200, 400
-"""Samples of a half of a loop; of a step that is held."""
+KINDS = ("reach", "width", "stiffness", "creep")
+"""How far a loop moves; how far apart its branches are where the input is at the middle; range of that
+input over how far it moves; share of a step's way that comes after the first second."""
 
-SLOW = 1e4
-"""Times the longest time constant that a slow loop takes."""
-
-AMPLITUDE, STEP = 0.25, 0.1
-"""Of the range of pressure: of a loop about its middle, and of a step."""
+AFTER = 1.0
+"""Time after a step from which what moves is creep [s]."""
 
 
 @dataclass(frozen=True)
-class Response:
-    """Of every muscle's pressure, where all are at mid-range, shape (n,) but where said.
+class Trial:
+    """Loops of every pressure and load in turn, about mid-range of all, and steps of pressures.
 
     Parameters
     ----------
-    position : array, shape (m,)
-        Coordinates there [mm].
-    stiffness : array, shape (m,)
-        Of coordinates, relaxed, without friction, at held pressures: force by coordinate [N/mm].
-    width : array
-        Of a slow loop, of the coordinate that a pressure moves most [mm].
-    friction : array
-        Half the width times the stiffness [N].
-    creep : array
-        Share of the way after a step of pressure that comes after a second; 0 without lags.
+    pressures, others, outputs : tuple of Channel
+        Inputs are pressures, then what loads and schedules.
+    middle : array, shape (inputs,)
+        Pressures rise to it from 0; all else is there from the beginning.
+    swing : array, shape (inputs,)
+        Amplitude of loops, height of steps; 0 of what stays.
+    seconds : float
+        That a loop takes, and a step is held; 0 without time, and without steps.
     """
 
-    position: Array
-    stiffness: Array
-    width: Array
-    friction: Array
-    creep: Array
+    pressures: tuple[Channel, ...]
+    others: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+    middle: Array
+    swing: Array
+    seconds: float
 
+    def response(self, respond: Callable[[Array], Array], quarter: int) -> Array:
+        """Return what is found, shape (KINDS, inputs, outputs), in the units of all; NaN of no trial.
 
-def response_of(balance: Balance, low: float, high: float) -> Response:
-    """Return what a balance does about mid-range of its pressures, and of what schedules and loads it."""
-    n, m = len(balance.given), len(balance.driven)
-    x = np.array([0.5 * (a + b) for a, b in balance.known] or np.zeros(len(balance.scheduled)))
-    middle = 0.5 * (low + high)
-    slowest = max((*balance.lags, 1e-3)) * SLOW / LOOP
-    c = balance.coefficients(slowest)
-    state, q, p, work = (
-        np.zeros(balance.n_states),
-        np.zeros(m),
-        np.zeros(n),
-        np.zeros(balance.n_scratch),
-    )
-    start_at_rest(c, state, x, q, p, work)
-    p[:] = middle
-    solve_equilibrium(c, state, AT_REST, q, x, p, work)
-    update_state(c, state, AT_REST, q, p, x)
-    residual, matrix, sizes = np.zeros(m), np.zeros((m, m)), np.zeros(m)
-    unbalanced(c, state, AT_REST, q, x, p, residual, matrix, sizes, np.zeros(work.size))
-    moved, width, creep = np.zeros(n, dtype=int), np.zeros(n), np.zeros(n)
-    inverse = replace(balance, tare=False).inverse()
-    swing = np.interp(np.arange(4 * LOOP), np.arange(5) * LOOP, [0, 1, -1, 1, -1])
-    for k in range(n):
-        pressures = np.tile(p, (swing.size, 1))
-        pressures[:, k] += AMPLITUDE * (high - low) * swing
-        inputs = np.column_stack([pressures, np.tile(x, (swing.size, 1))])
-        y = run_many([inverse], inputs, sample_time=slowest)[0]
-        moved[k] = int(np.argmax(np.ptp(y, axis=0)))
-        down, up = y[LOOP : 3 * LOOP, moved[k]], y[2 * LOOP :, moved[k]]
-        # at the middle of either branch of the last loop
-        width[k] = abs(float(up[LOOP // 2] - down[LOOP // 2]))
-        if balance.lags:
-            stepped = np.tile(p, (HELD + 1, 1))
-            stepped[1:, k] += STEP * (high - low)
-            time = max(balance.lags) * 5.0 / HELD
-            inputs = np.column_stack([stepped, np.tile(x, (HELD + 1, 1))])
-            y = run_many(
-                [replace(balance, tare=False, settled=True).inverse()], inputs, sample_time=time
-            )[0]
-            way = y[:, moved[k]] - y[0, moved[k]]
-            after = min(max(round(1.0 / time), 1), HELD)
-            creep[k] = float((way[-1] - way[after]) / way[-1]) if way[-1] else 0.0
-    stiffness = np.diag(matrix).copy()
-    return Response(q, stiffness, width, 0.5 * width * stiffness[moved], creep)
+        Parameters
+        ----------
+        respond : callable
+            From inputs, shape (samples, inputs), to outputs, of muscles that rested before.
+        quarter : int
+            Samples of a quarter of a loop.
+        """
+        n, found = (
+            len(self.pressures),
+            np.full((len(KINDS), self.middle.size, len(self.outputs)), np.nan),
+        )
+
+        def moved(place: int, quarters: list[float], levels: list[float]) -> Array:
+            time = np.arange(round(quarters[-1] * quarter) + 1) / quarter
+            inputs = np.tile(self.middle, (time.size, 1))
+            inputs[:, :n] *= np.clip(time, 0.0, 1.0)[:, np.newaxis]
+            inputs[:, place] += self.swing[place] * np.interp(time, quarters, levels)
+            return respond(inputs)
+
+        for place in np.flatnonzero(self.swing).tolist():
+            y = moved(place, [0, 1, 2, 4, 6, 8], [0, 0, 1, -1, 1, -1])
+            reach = np.ptp(y[4 * quarter :], axis=0)
+            found[0, place], found[1, place] = reach, np.abs(y[7 * quarter] - y[5 * quarter])
+            found[2, place] = 2.0 * self.swing[place] / np.where(reach > 0.0, reach, np.nan)
+            if place < n and self.seconds > AFTER:
+                y = moved(place, [0, 5, 5 + 1 / quarter, 9], [0, 0, 1, 1])[5 * quarter :]
+                after, way = AFTER / self.seconds * 4 * quarter, y[-1] - y[0]
+                soon = [float(np.interp(after, np.arange(len(y)), column)) for column in y.T]
+                found[3, place] = (y[-1] - soon) / np.where(way != 0.0, way, np.nan)
+        return found

@@ -34,13 +34,14 @@ from mckibben.estimators.coupled.balance_bench import (
     without_held,
     without_load,
 )
-from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, noise_of, told_by
+from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, told_by
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
-from mckibben.estimators.coupled.balance_words import sentences
+from mckibben.estimators.coupled.balance_words import measured, said_of, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator, of_channels, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.muscles.traits import TRAVELS
 from mckibben.recording import Recording, listed
 
 PRESSURES = ("bar", "V", "")
@@ -118,6 +119,8 @@ class BalanceEstimator(CoupledEstimator):
         or, where others have a force, beyond their average. In the unit of the model's forces.
     terms_ : tuple of str
         What was added.
+    trial_, measured_ : Trial, list of Measured
+        Loops and steps of which the model was asked, and what of its response recordings determine.
     """
 
     title = "Balance of forces"
@@ -243,24 +246,37 @@ class BalanceEstimator(CoupledEstimator):
             place = search.problem.loads_at(structure, run)
             if place.stop > place.start:
                 self.loads_[run.recording] = z[place] * balance.areas[0][0]
-        acting = [front(structure, values, channel) for channel in data.inputs]
-        before = [one[0] if len(one) == 1 else PerChannel(one) for one in zip(*acting, strict=True)]
+        acting = front(structure, values, data.inputs[0])
         if data.inputs[0].unit in LIMITED:
             ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
-            for block in acting[0]:
+            for block in acting:
                 if not block.rate_dependent:
                     ends = block.simulate(ends)
             balance = replace(balance, pressure_range=(float(ends[0]), float(ends[1])))
         x = of_channels(data, balance.scheduling).stacked("scheduled")
         balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
-        tracker.notes += sentences(search, z, balance)
+
+        def model(values: Array, balance: Balance) -> Block:
+            acting = zip(*(front(structure, values, one) for one in data.inputs), strict=True)
+            before = [one[0] if len(one) == 1 else PerChannel(one) for one in acting]
+            parts = [*before, balance.inverse(), *behind]
+            return parts[0] if len(parts) == 1 else Series(tuple(parts))
+
+        def other(z: Array) -> Block:
+            values = structure.expanded(z[: len(structure.terms)])
+            return model(values, structure.block(values, final=True))
+
+        folds = search.without_folds(z)
+        self.trial_, self.measured_ = measured(search, z, folds, other)
+        tracker.notes += sentences(search, z, folds, balance)
+        tracker.notes += [said_of(self.trial_, one) for one in self.measured_]
         self._search, self._z = self._started(search, z)
-        parts = [*before, balance.inverse(), *behind]
-        return parts[0] if len(parts) == 1 else Series(tuple(parts))
+        return model(values, balance)
 
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
         """Return the structure of all that may be."""
-        limits = np.geomspace(FINEST, LONGEST, self.n_stops) * bench.stroke / bench.highest
+        longest = LONGEST if self.prior is None else TRAVELS[-1]
+        limits = np.geomspace(FINEST, longest, self.n_stops) * bench.stroke / bench.highest
         shortest, longest = bench.lag_range
         lags = np.geomspace(shortest, longest, self.n_lags + 1)[1:] if bench.step and timed else ()
         if self.lags is not None:
@@ -286,11 +302,13 @@ class BalanceEstimator(CoupledEstimator):
         """Tell whether terms of a kind may be added."""
         return self.terms is None or kind in self.terms
 
-    def _first(self, structure: Structure) -> Mask:
+    def _first(self, structure: Structure, belief: Belief | None) -> Mask:
         """Return which terms are free from the beginning."""
 
         def there(term: Term) -> bool:
-            kind, which, muscle = term
+            kind, which, _ = term
+            if belief is not None and kind in OF_TRAITS:
+                return True
             if kind == "springs":
                 return which == 0 or (which - 1) % structure.degree == 0
             if kind == "friction":
@@ -311,18 +329,14 @@ class BalanceEstimator(CoupledEstimator):
     ) -> tuple[Search, Array]:
         """Return the search of the terms chosen, and what they are."""
         few = compared(coarser(data, FEW), FEW, of_force=self.of_force)
-        search = Search(few, structure, self._first(structure), belief)
-        starts = [] if belief is None else [self._likely(search)]
-        for grip in GRIPS[: None if structure.n_stops else 1]:
-            z = np.zeros(few.size(structure))
-            z[: len(structure.terms)] = structure.begin(grip * structure.bench.highest)
-            z = few.balanced(structure, z, search.active)
-            starts.append((search.cost(z), z))
-            tracker.saw(z, starts[-1][0])
-        z = min(starts, key=lambda start: start[0])[1]
+        search = Search(few, structure, self._first(structure, belief), belief)
+        z = self._balanced(search, tracker)
+        if belief is not None:
+            starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
+            z = min(starts, key=search.cost)
         tried = np.array([self._tried(term) for term in structure.terms])
         pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
-        for number in range(ROUNDS if belief is None else 1):
+        for number in range(ROUNDS):
             self._search, self._z = search, z
             part = tracker.part(0.08 * number, 0.08 * (number + 1))
             z = search.descended(z, min(self.steps, STEPS_BETWEEN), part)
@@ -330,11 +344,13 @@ class BalanceEstimator(CoupledEstimator):
                 search, z = self._long_held(search, z)
             if number == 0 and self.may("slack") and pushed:
                 search, z = self._slack(search, z)
+            search = search.weighed(z)
+            self._search, self._z = search, z
             active, z = search.chosen(z, tried)
-            if belief is not None or (active == search.active).all() or number == ROUNDS - 1:
+            if (active == search.active).all() or number == ROUNDS - 1:
                 break
             search = replace(search, active=active)
-        added = search.active & ~self._first(structure)
+        added = search.active & ~self._first(structure, belief)
         names = (
             t.kind if t.muscle is None else "muscles" for t in compress(structure.terms, added)
         )
@@ -347,9 +363,7 @@ class BalanceEstimator(CoupledEstimator):
         whole = compared(coarser(data, MOST_SAMPLES), MOST, of_force=self.of_force)
         search = replace(search, problem=whole)
         for _ in range(1 if belief is None else REFINED):
-            if belief is not None:
-                noise = noise_of(whole.errors(search.structure, z)[0][: len(whole.runs)])
-                search = replace(search, belief=replace(belief, noise=noise))
+            search = search.weighed(z)
             z = search.descend(z, min(self.steps, LAST_STEPS), tracker.part(0.7, 0.9))
         return search, z
 
@@ -364,20 +378,28 @@ class BalanceEstimator(CoupledEstimator):
         most = min(EXPLAINED * search.cost(z), (1.0 - OWN_HELPS) * whole.cost(z))
         return (settled, found) if settled.cost(found) < most else (search, z)
 
-    def _likely(self, search: Search) -> tuple[float, Array]:
-        """Return what is likely before, under the constant force the recordings ask, and its cost."""
-        structure, belief = search.structure, search.belief
+    def _balanced(self, search: Search, tracker: Tracker) -> Array:
+        """Return what balances forces best where muscles were measured, of several grips."""
+        structure, problem, starts = search.structure, search.problem, []
+        for grip in GRIPS[: None if structure.n_stops else 1]:
+            z = np.zeros(problem.size(structure))
+            z[: len(structure.terms)] = structure.begin(grip * structure.bench.highest)
+            z = problem.balanced(structure, z, search.active)
+            starts.append((search.cost(z), z))
+            tracker.saw(z, starts[-1][0])
+        return min(starts, key=lambda start: start[0])[1]
+
+    def _likely(self, search: Search) -> Array:
+        """Return what is likely before anything was recorded."""
+        structure, belief, problem = search.structure, search.belief, search.problem
         assert belief is not None
-        z = np.zeros(search.problem.size(structure))
+        z = np.zeros(problem.size(structure))
         z[: len(structure.terms)] = structure.begin(FIRST_GRIP * structure.bench.highest)
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
                 z[place] = 1.0 / belief.prior.sheet.area
-        alone = replace(
-            search, problem=replace(search.problem, data=replace(search.problem.data, runs=()))
-        )
-        z = alone.descend(z, TOWARDS, Tracker())
-        return search.cost(z), z
+        alone = replace(search, problem=replace(problem, data=replace(problem.data, runs=())))
+        return alone.descend(z, TOWARDS, Tracker())
 
     def _tried(self, term: Term) -> bool:
         """Tell whether a term may be added."""
@@ -427,6 +449,9 @@ class BalanceEstimator(CoupledEstimator):
 FIRST_GRIP, TOWARDS, REFINED = 0.1, 60, 3
 """Where what is likely begins, relative to the highest pressure; most steps from there to it; times that
 the noise of recordings is found anew."""
+
+OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
+"""Kinds of terms of which a prior is."""
 
 OWN_HELPS = 0.1
 """By how much what recordings have of their own, or how they begin, has to lessen errors."""

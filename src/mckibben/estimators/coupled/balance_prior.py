@@ -12,8 +12,8 @@ import numpy as np
 from pydantic import InstanceOf
 
 from mckibben.arrays import Array
-from mckibben.blocks.coupled.balance import Balance
 from mckibben.errors import ModelError
+from mckibben.estimators.core.data import Mask
 from mckibben.estimators.coupled.balance_structure import Bench, Structure
 from mckibben.muscles.prior import Prior, prior_of
 from mckibben.muscles.sheet import Sheet
@@ -55,39 +55,37 @@ class Belief:
         """Rows that make independent numbers of traits."""
         return self.prior.weights()
 
-    def errors(self, structure: Structure, z: Array) -> tuple[Array, Array]:
-        """Return how far terms are from what is likely, and the slopes, shape (traits, terms).
+    def errors(
+        self, structure: Structure, z: Array, wanted: Mask | None = None
+    ) -> tuple[Array, Array]:
+        """Return how far terms are from what is likely, and the slopes by those wanted, others 0.
 
         Where displacements count from is as likely makes them most so (variable projection).
         """
         sheet, weights, unsure = self.prior.sheet, self.noise * self.weights, self.prior.zero
-        n = len(structure.terms)
+        terms, scales = z[: len(structure.terms)], structure.scales()
 
         def away(free: Array, zero: float) -> Array:
-            found = traits(self._block(structure, free), sheet, zero) - self.prior.mean
-            told = np.where(np.isfinite(found), found, 0.0)
-            return np.append(weights @ told, self.noise * zero / unsure)
+            block = structure.block(structure.expanded(free))
+            found = np.nan_to_num(traits(block, sheet, zero) - self.prior.mean)
+            return np.append(weights @ found, self.noise * zero / unsure)
 
-        zero, by_zero, terms = 0.0, np.zeros(1), z[:n]
+        zero, by_zero = 0.0, np.zeros(1)
         for _ in range(ZERO_STEPS):
             now = away(terms, zero)
             by_zero = (away(terms, zero + STEP * unsure) - now) / (STEP * unsure)
             step = -float(by_zero @ now) / float(by_zero @ by_zero)
             zero += min(max(step, -unsure), unsure)
         now = away(terms, zero)
-        slopes = np.zeros((now.size, n))
-        for place, much in enumerate(structure.scales().tolist()):
-            if structure.terms[place].kind in ("pushes", "places", "filling", "venting", "dead"):
-                continue
+        if wanted is None:
+            return now, np.zeros((0, terms.size))
+        slopes = np.zeros((now.size, terms.size))
+        for place in np.flatnonzero(wanted).tolist():
             moved = terms.copy()
-            moved[place] += STEP * much
-            slopes[:, place] = (away(moved, zero) - now) / (STEP * much)
+            moved[place] += (step := STEP * scales[place])
+            slopes[:, place] = (away(moved, zero) - now) / step
         slopes -= np.outer(by_zero, by_zero @ slopes) / float(by_zero @ by_zero)
         return now, slopes
-
-    @staticmethod
-    def _block(structure: Structure, free: Array) -> Balance:
-        return structure.block(structure.expanded(free))
 
 
 def told_by(given: Any) -> Prior:

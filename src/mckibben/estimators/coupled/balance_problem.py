@@ -317,7 +317,7 @@ class Problem:
         if self.starts:
             far, by = self._unlikely(structure, z)
             errors, slopes = [*errors, far], [*slopes, by]
-        return errors, np.concatenate(slopes) if slopes else np.zeros((0, z.size))
+        return errors, np.concatenate([np.zeros((0, z.size)), *slopes])
 
     def _by_air(
         self, structure: Structure, z: Array, run: Run, kinds: list[str], new: Mask | None

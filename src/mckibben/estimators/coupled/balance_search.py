@@ -40,8 +40,8 @@ MOST_TRIES = 7
 MOST_CUTS = 8
 """Times that springs are made stiff where they were found soft."""
 
-LIGHTEST = 1e-7
-"""Root of the damping of a step that is hardly damped."""
+DAMPED, LIGHTEST = 1e-3, 1e-7
+"""Damping of a first step; its root of one that is hardly damped."""
 
 UNKNOWN = 1e-10
 """Effect of a number's size, relative to the largest of any, that is none."""
@@ -51,6 +51,9 @@ FAR, APART = 0.5, 0.7
 
 NO_GAIN = 1e-6
 """Gain by a term, relative to the squared errors, that is rounding."""
+
+NOISES = tuple(np.geomspace(1e-4, 0.1, 10).tolist())
+"""Noise of recordings, relative to the range, by which a belief may be weighed."""
 
 SLOW, SLOWEST = 1e-3, 2
 """Relative gain of a step that is slow, and how many of them end a descent."""
@@ -89,10 +92,23 @@ class Search:
         errors = np.concatenate(parts) if parts else np.zeros(0)
         if self.belief is None:
             return errors, slopes
-        far, by = self.belief.errors(self.structure, z)
-        whole = np.zeros((far.size, slopes.shape[1]))
+        far, by = self.belief.errors(self.structure, z, wanted)
+        whole = np.zeros((len(by), slopes.shape[1]))
         whole[:, : by.shape[1]] = by
         return np.append(errors, far), np.concatenate([slopes, whole])
+
+    def weighed(self, z: Array) -> Search:
+        """Return the search in which the belief has the weight by which what is left out is found best."""
+        if self.belief is None:
+            return self
+        free, bounded = (
+            np.append(self.active, np.ones(z.size - self.active.size, dtype=bool)),
+            self._bounded(z.size),
+        )
+        grams = self._grams(z, self.active)
+        likely = self._likely(z, self.active) / self.belief.noise**2
+        missed = [_left_out(grams, free, z, bounded, noise**2 * likely).sum() for noise in NOISES]
+        return replace(self, belief=replace(self.belief, noise=NOISES[int(np.argmin(missed))]))
 
     def cost(self, z: Array) -> float:
         """Return the root mean square of the errors."""
@@ -124,7 +140,7 @@ class Search:
 
     def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
         """Show a tracker ever better numbers, and return the best."""
-        damping, slow = 1e-3, 0
+        damping, slow = DAMPED, 0
         errors, slopes = self.errors(z, self.active)
         cost = _size(errors)
         tracker.saw(z, cost)
@@ -226,12 +242,14 @@ class Search:
         """
         structure, n = self.structure, len(self.structure.terms)
         new = np.array([term.kind in NEW_SHAPE for term in structure.terms]) & ~self.active
-        grams = self._grams(z, (tried & new) | self.active, new)
+        wanted = (tried & new) | self.active
+        grams, likely = self._grams(z, wanted, new), self._likely(z, wanted)
         bounded = self._bounded(z.size)
         active = self.active.copy()
 
         def missed(free: Mask) -> Array:
-            return _left_out(grams, np.append(free, np.ones(z.size - n, dtype=bool)), z, bounded)
+            every = np.append(free, np.ones(z.size - n, dtype=bool))
+            return _left_out(grams, every, z, bounded, likely)
 
         best, ahead, passed = missed(active), active, 0
         while passed < AHEAD:
@@ -247,7 +265,7 @@ class Search:
             if gain.sum() > max(np.sqrt(gain.size) * gain.std(), NO_GAIN * best.sum()):
                 active, best, passed = ahead, errors[first], 0
         free = np.append(active, np.ones(z.size - n, dtype=bool))
-        whole = _reduced(grams.sum(axis=0)[np.newaxis], free, z)[0]
+        whole = _reduced((grams.sum(axis=0) + likely)[np.newaxis], free, z)[0]
         solution, found = z.copy(), z.copy()
         solution[free] = bounded_least_squares(whole, bounded[free], z[free], DAMPED)
         low, high, much = structure.ends()
@@ -281,6 +299,16 @@ class Search:
         blocks = [block for part in _blocks(np.split(table, ends)) for block in part]
         return np.array([block.T @ block for block in blocks])
 
+    def _likely(self, z: Array, wanted: Mask) -> Array:
+        """Return the products of slopes of what is believed, and of their target."""
+        table = np.zeros((1, z.size + 1))
+        if self.belief is not None:
+            far, by = self.belief.errors(self.structure, z, wanted)
+            table = np.zeros((far.size, z.size + 1))
+            table[:, : by.shape[1]] = by
+            table[:, -1] = by @ z[: by.shape[1]] - far
+        return np.asarray(table.T @ table)
+
     def _bounded(self, size: int) -> Mask:
         """Return which of all numbers are not negative."""
         bounded = np.zeros(size, dtype=bool)
@@ -293,22 +321,19 @@ class Search:
         return bounded
 
     def without_folds(self, z: Array) -> list[Array]:
-        """Return what would be found without each part of the runs, were the free run straight."""
-        grams, bounded = self._grams(z, self.active), self._bounded(z.size)
+        """Return what a step finds without each part of the runs in turn; nothing if physics allows none."""
         free = np.zeros(z.size, dtype=bool)
         free[self.free] = True
-        parts, folds = _reduced(grams, free, z), np.arange(len(grams)) * FOLDS // len(grams)
-        whole = bounded_least_squares(parts.sum(axis=0), bounded[free])
-        found = []
+        parts = _reduced(self._grams(z, self.active), free, z)
+        likely = _reduced(self._likely(z, self.active)[np.newaxis], free, z)[0]
+        folds, found = np.arange(len(parts)) * FOLDS // len(parts), []
         for fold in np.unique(folds):
-            moved = z.copy()
-            moved[free] += (
-                bounded_least_squares(parts[folds != fold].sum(axis=0), bounded[free]) - whole
-            )
-            low, high, _ = self.structure.ends()
-            n = self.structure.mix.shape[1]
-            moved[n : n + low.size] = np.clip(moved[n : n + low.size], low, high)
-            found.append(moved)
+            sizes, ways = np.linalg.eigh(parts[folds != fold].sum(axis=0) + likely)
+            root = np.sqrt(np.maximum(sizes, 0.0))[:, np.newaxis] * ways.T
+            try:
+                found.append(self._solved(root, z, DAMPED))
+            except ModelError:
+                return []
         return found
 
     def _candidates(self, active: Mask, z: Array) -> Iterator[Mask]:
@@ -390,18 +415,19 @@ def _blocks(parts: list[Array]) -> list[list[Array]]:
     return [np.array_split(part, max(1, round(BLOCKS * len(part) / total))) for part in parts]
 
 
-def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask) -> Array:
+def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask, likely: Array) -> Array:
     """Return the squared errors of every block by what least squares of the others find.
 
-    ``grams`` are products of slopes and target by block; what is not free is as it is.
+    ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what is
+    not free is as it is.
     """
-    parts = _reduced(grams, free, z)
+    parts, likely = _reduced(grams, free, z), _reduced(likely[np.newaxis], free, z)[0]
     folds = np.arange(len(grams)) * FOLDS // len(grams)
     whole, errors = parts.sum(axis=0), np.zeros(len(grams))
     for fold in np.unique(folds):
         out = folds == fold
         rest = whole - parts[out].sum(axis=0) if not out.all() else whole
-        found = bounded_least_squares(rest, bounded[free], z[free], DAMPED)
+        found = bounded_least_squares(rest + likely, bounded[free], z[free], DAMPED)
         theta = np.append(found, -1.0)
         errors[out] = np.einsum("i,bij,j->b", theta, parts[out], theta)
     return errors

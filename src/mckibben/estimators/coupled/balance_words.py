@@ -1,97 +1,133 @@
 """What a balance of forces says of muscles: only what its own response shows, and recordings determine.
 
-Every number is found again without each fifth of the recordings; one that then differs by more than a
-factor of two, or half of itself, is not determined, and not said.
+A number varies as a step without each fifth of recordings finds it (jackknife), and as two displacements do
+that the model misses. One that is not known within a factor of two is not said.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_response import AMPLITUDE, Response, response_of
-from mckibben.errors import ModelError
+from mckibben.blocks.coupled.balance_response import KINDS, Trial
+from mckibben.blocks.running import run_many
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_bench import starts_elsewhere
 from mckibben.estimators.coupled.balance_search import Search
+from mckibben.estimators.coupled.base import LOADS
 from mckibben.numerals import numeral
 
 POOR = 0.1
 """Error relative to the range from which a model is said not to explain the recordings."""
 
 WORSE = 3.0
-"""Times its error of the others from which a recording seems to have been under something else."""
+"""Times the error of the others from which a recording's is said."""
 
-DETERMINED, CREEP = 0.5, 0.25
-"""Standard error, relative to a number, up to which it is said; of creep, which friction resembles."""
+AMPLITUDE, QUARTER = 0.25, 100
+"""Of loops, relative to the range of a pressure; samples of a quarter of one."""
 
-
-def sentences(search: Search, z: Array, balance: Balance) -> list[str]:
-    """Return what is said of a fit."""
-    structure, problem = search.structure, search.problem
-    low, high = min(float(problem.data.lowest.min()), 0.0), float(problem.data.highest.max())
-    others = search.without_folds(z)
-    found = [*_of_runs(search, z), *_of_loads(search, z, others, balance)]
-
-    def all_of(numbers: object) -> tuple[Array, Array] | None:
-        """Return numbers of the fit, and their standard errors by what is left out."""
-        assert callable(numbers)
-        try:
-            every = np.array([numbers(one) for one in (z, *others)], dtype=np.float64)
-        except (ModelError, ArithmeticError):
-            return None
-        count = len(every) - 1
-        if count < 2 or not np.isfinite(every).all():
-            return None
-        return every[0], np.sqrt(
-            (count - 1) * ((every[1:] - every[1:].mean(axis=0)) ** 2).mean(axis=0)
-        )
-
-    def response(one: Array) -> Response:
-        block = structure.block(structure.expanded(one[: len(structure.terms)]), final=True)
-        share = balance.areas[0][0] / block.areas[0][0]
-        return _scaled(response_of(block, low, high), share)
-
-    unit, per, n = balance.driven[0].unit, balance.given[0].unit, structure.n
-    newtons = balance.areas[0][0] != 1.0
-    at = f"at {numeral(0.5 * (low + high), 3)} {per}"
-    reach = f"{numeral(AMPLITUDE * (high - low), 3)} {per}"
-    loops = all_of(lambda one: np.concatenate([response(one).width, response(one).stiffness]))
-    for k, channel in enumerate(balance.given if loops is not None else ()):
-        assert loops is not None
-        said = _with_error(loops[0][k], loops[1][k], unit)
-        found += [f"{channel.name}: a slow loop of ± {reach} {at} is {said} wide"] if said else []
-    for j, channel in enumerate(balance.driven if loops is not None and newtons else ()):
-        assert loops is not None
-        said = _with_error(loops[0][n + j], loops[1][n + j], f"N/{unit}")
-        found += (
-            [f"{channel.name}: stiffness {at}, relaxed, without friction: {said}"] if said else []
-        )
-    creep = all_of(lambda one: response(one).creep) if balance.lags else None
-    for k, channel in enumerate(balance.given if creep is not None else ()):
-        assert creep is not None
-        said = _with_error(100.0 * creep[0][k], 100.0 * creep[1][k], "%", CREEP)
-        found += (
-            [f"{channel.name}: of a step {at} {said} comes after the first second"] if said else []
-        )
-    return found
+DETERMINED = 0.25
+"""Standard error, relative to a number, up to which it is said: twice that is a factor of two."""
 
 
-def _scaled(response: Response, share: float) -> Response:
-    return Response(
-        response.position,
-        share * response.stiffness,
-        response.width,
-        share * response.friction,
-        response.creep,
+class Measured(NamedTuple):
+    """A number of muscles: one of `KINDS`, of an input and an output, its standard error and unit."""
+
+    kind: str
+    place: int
+    output: int
+    value: float
+    error: float
+    unit: str
+
+
+def trial_of(data: TrainingData) -> Trial:
+    """Return loops and steps like those of recordings: within their ranges, of half their length."""
+    low, high, x = np.minimum(data.lowest, 0.0), data.highest, data.stacked("scheduled")
+    loads = np.array([channel.unit in LOADS for channel in data.scheduled], dtype=bool)
+    middles = np.where(loads, 0.5 * (x.min(axis=0) + x.max(axis=0)), np.median(x, axis=0))
+    return Trial(
+        data.inputs,
+        data.scheduled,
+        data.outputs,
+        middle=np.append(0.5 * (low + high), middles),
+        swing=np.append(AMPLITUDE * (high - low), 0.5 * loads * np.ptp(x, axis=0)),
+        seconds=0.5 * max(len(run.outputs) * (run.sample_time or 0.0) for run in data.runs),
     )
 
 
-def _with_error(value: float, error: float, unit: str, most: float = DETERMINED) -> str:
-    """Return a number with its standard error and unit; empty where it is not determined."""
-    if not 0.0 < error <= most * abs(value):
-        return ""
-    return f"{numeral(value, 3)} ± {numeral(error, 2)} {unit}".rstrip()
+def measured(
+    search: Search, z: Array, others: list[Array], model: Callable[[Array], Block]
+) -> tuple[Trial, list[Measured]]:
+    """Return how the model of numbers z is asked, and what of its response recordings determine."""
+    trial = trial_of(search.problem.data)
+
+    def response(one: Array) -> Array:
+        block = model(one)
+
+        def respond(inputs: Array) -> Array:
+            return run_many([block], inputs, sample_time=0.25 * trial.seconds / QUARTER or 1.0)[0]
+
+        return trial.response(respond, QUARTER)
+
+    value, *every = (response(one) for one in (z, *others))
+    if len(every) < 2:
+        return trial, []
+    away, found = np.array(every) - np.mean(every, axis=0), []
+    # a model knows no better what moves than it follows recordings
+    reach, missed = value[KINDS.index("reach")], np.sqrt(2.0) * _missed(search, z)
+    share = missed / reach
+    follows = np.stack([share * reach, share * reach, share * value[2], 2.0 * share])
+    error = np.sqrt((len(every) - 1) * (away**2).mean(axis=0) + follows**2)
+    for place in np.flatnonzero(trial.swing).tolist():
+        pressure, output = place < len(trial.pressures), int(np.argmax(value[0, place]))
+        unit = trial.outputs[output].unit
+        per = "" if pressure else f"{trial.others[place - len(trial.pressures)].unit}/{unit}"
+        units = {"width": unit, "creep": ""} if pressure else {"stiffness": per}
+        for kind, unit in units.items():
+            at = KINDS.index(kind), place, output
+            if 0.0 < error[at] <= DETERMINED * value[at]:
+                number = Measured(kind, place, output, float(value[at]), float(error[at]), unit)
+                found.append(number)
+    return trial, found
+
+
+def _missed(search: Search, z: Array) -> Array:
+    """Return the root mean square error of every output where muscles move, shape (m,)."""
+    problem, structure = search.problem, search.structure
+    errors = zip(problem.runs, problem.errors(structure, z)[0], strict=False)
+    moved = [one for run, one in errors if not problem.still(run)] or [np.full(structure.m, np.nan)]
+    whole = np.concatenate(moved).reshape(-1, structure.m)
+    return np.asarray(structure.bench.travel * np.sqrt((whole**2).mean(axis=0)))
+
+
+def said_of(trial: Trial, one: Measured) -> str:
+    """Return a number as a sentence."""
+    channel, output = (*trial.pressures, *trial.others)[one.place], trial.outputs[one.output]
+    middle, swing = (numeral(v[one.place], 3) for v in (trial.middle, trial.swing))
+    within = f" in {numeral(trial.seconds, 2)} s" if trial.seconds else ""
+    loop = f"a loop of ± {swing} about {middle} {channel.unit}{within}"
+    if one.kind == "creep":
+        return (
+            f"{channel.name}: of a step of {swing} from {middle} {channel.unit}, held for "
+            f"{numeral(trial.seconds, 2)} s, {numeral(100.0 * one.value, 3)} ± "
+            f"{numeral(100.0 * one.error, 2)} % comes after the first second"
+        )
+    number = f"{numeral(one.value, 3)} ± {numeral(one.error, 2)} {one.unit}"
+    if one.kind == "width":
+        return f"{channel.name}: {loop} is {number} wide"
+    at = " and ".join(numeral(float(p), 3) for p in trial.middle[: len(trial.pressures)])
+    return f"{output.name}: stiffness at {at} {trial.pressures[0].unit}, {loop}: {number}"
+
+
+def sentences(search: Search, z: Array, others: list[Array], balance: Balance) -> list[str]:
+    """Return what is said of recordings and loads."""
+    return [*_of_runs(search, z), *_of_loads(search, z, others, balance)]
 
 
 def _of_runs(search: Search, z: Array) -> list[str]:
@@ -100,8 +136,7 @@ def _of_runs(search: Search, z: Array) -> list[str]:
     parts = problem.errors(structure, z)[0][: len(problem.runs)]
     sizes = np.array([float(np.sqrt(np.mean(part**2))) for part in parts])
     found = [
-        f"{run.name} is followed {size / np.median(np.delete(sizes, place)):.2g} times worse than others, "
-        "as if something varied that was not measured. Remedy: record it, or leave this one out"
+        f"{run.name} is followed {size / np.median(np.delete(sizes, place)):.2g} times worse than others"
         for place, (run, size) in enumerate(zip(problem.runs, sizes.tolist(), strict=True))
         if len(sizes) > 1 and size > WORSE * np.median(np.delete(sizes, place))
     ]
@@ -134,7 +169,11 @@ def _of_loads(search: Search, z: Array, others: list[Array], balance: Balance) -
     for run in search.problem.runs:
         place = search.problem.loads_at(search.structure, run)
         values, among = z[place], np.array([one[place] for one in others])
-        if values.size and (np.abs(values) > 2.0 * np.sqrt(len(among)) * among.std(axis=0)).any():
+        if (
+            others
+            and values.size
+            and (np.abs(values) > 2.0 * np.sqrt(len(among)) * among.std(axis=0)).any()
+        ):
             share = balance.areas[0][0]
             listed[run.recording] = (
                 f"{' and '.join(numeral(float(share * v), 3) for v in values)} in {run.name}"

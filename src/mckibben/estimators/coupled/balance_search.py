@@ -40,7 +40,7 @@ MOST_TRIES = 7
 MOST_CUTS = 8
 """Times that springs are made stiff where they were found soft."""
 
-DAMPED, LIGHTEST = 1e-3, 1e-7
+FIRST_DAMPING, LIGHTEST = 1e-3, 1e-7
 """Damping of a first step; its root of one that is hardly damped."""
 
 UNKNOWN = 1e-10
@@ -140,7 +140,7 @@ class Search:
 
     def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
         """Show a tracker ever better numbers, and return the best."""
-        damping, slow = DAMPED, 0
+        damping, slow = FIRST_DAMPING, 0
         errors, slopes = self.errors(z, self.active)
         cost = _size(errors)
         tracker.saw(z, cost)
@@ -331,7 +331,7 @@ class Search:
             sizes, ways = np.linalg.eigh(parts[folds != fold].sum(axis=0) + likely)
             root = np.sqrt(np.maximum(sizes, 0.0))[:, np.newaxis] * ways.T
             try:
-                found.append(self._solved(root, z, DAMPED))
+                found.append(self._solved(root, z, FIRST_DAMPING))
             except ModelError:
                 return []
         return found

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -463,24 +463,18 @@ EXPLAINED = 1.5
 def in_newtons(balance: Balance) -> Balance:
     """Return a balance of which forces are in the unit of its load, if that is one on one coordinate."""
     share = abs(balance.loads[0][0]) if np.shape(balance.loads) == (1, 1) else 0.0
-    reach = max(abs(end) for end in np.ravel(balance.hull)) if share else 0.0
-    if not share * reach > 0.0:
+    if not share > 0.0:
         return balance
 
-    def scaled(table: object) -> Array:
-        return np.array(table, dtype=np.float64) / share
+    def scaled(name: str) -> Array:
+        return np.array(getattr(balance, name), dtype=np.float64) / share
 
     tables = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
     single = ("damping", "lines", "bladders", "pushes", "mass")
+    changed: dict[str, Any] = {name: rows(scaled(name)) for name in tables}
+    changed |= {name: vector(scaled(name)) for name in single}
     obstacles = np.reshape(balance.obstacles, (-1, 3 + balance.n_schedules)).copy()
     obstacles[:, 2:] /= share
     return replace(
-        balance,
-        obstacles=rows(obstacles.reshape(np.shape(balance.obstacles))),
-        **{name: rows(scaled(getattr(balance, name))) for name in tables},
-        **{
-            name: vector(scaled(getattr(balance, name)))
-            for name in single
-            if getattr(balance, name)
-        },
+        balance, obstacles=rows(obstacles.reshape(np.shape(balance.obstacles))), **changed
     )

@@ -80,8 +80,8 @@ def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
 
 def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
     """Return data without loads and schedules that never change, the loads last; and what was left out."""
-    kept, constant = [], []
-    for place, channel in enumerate(data.scheduled):
+    kept, constant = list[int](), list[int]()
+    for place in range(len(data.scheduled)):
         columns = [run.scheduled[:, place] for run in data.runs]
         means = np.concatenate(
             [
@@ -190,7 +190,7 @@ def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block
     ]
     if (gains == 1.0).all() and not any(offsets):
         sensors = []
-    behind = sensors if len(sensors) < 2 else [PerChannel(tuple(sensors))]
+    behind: list[Block] = sensors if len(sensors) < 2 else [PerChannel(tuple(sensors))]
     return replace(data, runs=runs), behind, np.eye(*ways.shape) if own else ways
 
 

@@ -475,7 +475,8 @@ class Problem:
         scaling = np.zeros(chosen.size)
         scaling[narrowing] = means
         table = np.concatenate([whole, target[..., np.newaxis]], axis=2) * weight[..., np.newaxis]
-        triangle = np.linalg.qr(table.reshape(-1, table.shape[2]), mode="r")
+        flat = table.reshape(-1, table.shape[2])
+        triangle: Array = np.linalg.qr(flat, mode="r")  # type: ignore[assignment]
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
         system = np.vstack(
             [triangle[:, :-1], np.sqrt(RIDGE) * np.diag(np.where(size > 0.0, size, 1.0))]

@@ -148,7 +148,8 @@ class Search:
             usable = np.isfinite(slopes).all(axis=1) & np.isfinite(errors)
             moving = slopes[usable][:, self.free]
             target = moving @ z[self.free] - errors[usable]
-            triangle = np.linalg.qr(np.column_stack([moving, target]), mode="r")
+            both = np.column_stack([moving, target])
+            triangle: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
             for _ in range(MOST_TRIES):
                 try:
                     tried = self._solved(triangle, z, damping)

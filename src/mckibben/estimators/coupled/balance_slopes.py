@@ -436,6 +436,6 @@ def run(
     rows = np.zeros((2 * n + 2 * m + 1, max(n_c, m, n * n_l)))
     scratch = np.zeros(n_states + 3 * m + 2 * n + 5 * m + m * m + 2 * terms)
     start = np.zeros(0) if begun is None else begun
-    arrays = (np.ascontiguousarray(a) for a in (driven, measured, x, dp))
-    follow(c, *arrays, held, rested, every, start, past, rows, scratch, found, slopes)
+    p, y, x, dp = (np.ascontiguousarray(one) for one in (driven, measured, x, dp))
+    follow(c, p, y, x, dp, held, rested, every, start, past, rows, scratch, found, slopes)
     return found, slopes

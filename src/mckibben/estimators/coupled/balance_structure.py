@@ -9,14 +9,14 @@ at rest is 1.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
@@ -24,6 +24,7 @@ from mckibben.blocks.coupled.balance_law import NEVER, OWN
 from mckibben.blocks.fields import Channel, rows, vector
 
 Places = NDArray[np.intp]
+Item = TypeVar("Item")
 
 GRID = 21
 """Places along what is known of every muscle's shortening where conditions are asked for."""
@@ -319,11 +320,12 @@ class Structure:
         """Return what is free where nothing was found yet: the shape that does nothing, but the grip."""
         free = np.zeros(len(self.terms))
         shift = self.mix.shape[1] - self.n_linear
-        put = {"grip": grip, "lags": np.log(self.lags), "pushes": NEVER, "walls": 0.0}
+        put: dict[str, ArrayLike] = {"grip": grip, "lags": np.log(self.lags), "pushes": NEVER}
         low = self.bench.lowest[:, np.newaxis]
         put["places"] = (low + np.outer(self.bench.travel, [p for _, p in self.obstacles])).ravel()
         for name, numbers in put.items():
-            free[self.shape[name].start + shift : self.shape[name].stop + shift] = numbers
+            place = slice(self.shape[name].start + shift, self.shape[name].stop + shift)
+            free[place] = np.asarray(numbers)
         return free
 
     def moved_to(self, other: Structure, free: Array, behind: Array | None = None) -> Array:
@@ -340,8 +342,8 @@ class Structure:
     @cached_property
     def keys(self) -> list[tuple[object, ...]]:
         """Names of what may be free by which structures share it: limits, lags and obstacles by theirs."""
-        by = {"friction": self.limits, "relaxation": self.lags, "lags": self.lags}
-        by |= {"obstacle": self.obstacles, "places": self.m * self.obstacles}
+        by: dict[str, Sequence[object]] = {"friction": self.limits, "relaxation": self.lags}
+        by |= {"lags": self.lags, "obstacle": self.obstacles, "places": self.m * self.obstacles}
         return [
             (kind, by[kind][which] if kind in by else which, muscle)
             for kind, which, muscle in self.terms
@@ -370,7 +372,7 @@ class Structure:
         most_x = np.abs(bench.levels).max(axis=1) if len(bench.levels) else np.zeros(0)
         per_x = bench.highest / np.where(most_x > 0, most_x, 1.0)
         ratio, (shortest, longest) = np.log(MOST_ASYMMETRIC), np.log(bench.lag_range)
-        ends = {
+        ends: dict[str, tuple[ArrayLike, ArrayLike, ArrayLike]] = {
             "grip": (0.0, MOST_GRIP * bench.highest, bench.highest),
             "grips": (0.0, MOST_GRIP * per_x, per_x),
             "asymmetry": (-ratio, ratio, 1.0),
@@ -386,7 +388,7 @@ class Structure:
         low, high, size = np.zeros((3, self.size - self.n_linear))
         for name, place in self.shape.items():
             own = slice(place.start - self.n_linear, place.stop - self.n_linear)
-            low[own], high[own], size[own] = ends[name]
+            low[own], high[own], size[own] = map(np.asarray, ends[name])
         return low, high, size
 
     # -- block -----------------------------------------------------------------------------------
@@ -461,7 +463,7 @@ class Structure:
         """Return the structure without stops, lags, obstacles and powers of which none is active."""
         kept = {(term.kind, term.which) for term in active}
 
-        def chosen(kind: str, items: tuple[object, ...]) -> tuple[object, ...]:
+        def chosen(kind: str, items: tuple[Item, ...]) -> tuple[Item, ...]:
             return tuple(item for i, item in enumerate(items) if (kind, i) in kept)
 
         def highest(kind: str, least: int) -> int:
@@ -509,7 +511,8 @@ class Structure:
             elastic, bladder = self.of("elasticity", k).tolist(), int(self.of("bladder", k)[0])
             ask({areas[0]: 1.0}, 0.1 * self.bench.unit)
             order, power = np.arange(1, self.n_area), np.arange(2, 2 + self.n_elastic)
-            for u in np.linspace(*self.bench.hull[k], GRID) / self.bench.scale:
+            low, high = self.bench.hull[k].tolist()
+            for u in np.linspace(low, high, GRID) / self.bench.scale:
                 left = dict(zip(areas, (u ** np.arange(self.n_area)).tolist(), strict=True))
                 left[areas[0]] -= LEAST_LEFT
                 ask(left | dict(zip(friction, taken.tolist(), strict=True)), 0.0)

@@ -168,15 +168,12 @@ def _of_loads(search: Search, z: Array, others: list[Array], balance: Balance) -
     listed = {}
     for run in search.problem.runs:
         place = search.problem.loads_at(search.structure, run)
-        values, among = z[place], np.array([one[place] for one in others])
-        if (
-            others
-            and values.size
-            and (np.abs(values) > 2.0 * np.sqrt(len(among)) * among.std(axis=0)).any()
-        ):
+        found_load, among = z[place], np.array([one[place] for one in others])
+        unsure = 2.0 * np.sqrt(len(among)) * among.std(axis=0) if others else np.abs(found_load)
+        if (np.abs(found_load) > unsure).any():
             share = balance.areas[0][0]
             listed[run.recording] = (
-                f"{' and '.join(numeral(float(share * v), 3) for v in values)} in {run.name}"
+                f"{' and '.join(numeral(float(share * v), 3) for v in found_load)} in {run.name}"
             )
     if listed:
         unit = "N" if balance.areas[0][0] != 1.0 else f"{balance.given[0].unit} on the area at rest"

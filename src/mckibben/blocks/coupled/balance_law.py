@@ -29,7 +29,7 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.kernels import DERIVED, kernel
+from mckibben.blocks.kernels import DERIVED, kernel, short_kernel
 from mckibben.blocks.solving import eliminate
 
 HEAD = 21
@@ -105,7 +105,7 @@ def work_size(c: Array) -> int:
 # -- forces --------------------------------------------------------------------------------------
 
 
-@kernel
+@short_kernel
 def shortening(c: Array, k: int, q: Array) -> float:
     """Return how much shorter muscle k is at coordinates."""
     if c[20] == 0.0:
@@ -156,7 +156,7 @@ def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> flo
     return force
 
 
-@kernel
+@short_kernel
 def area(c: Array, k: int, y: float) -> tuple[float, float]:
     """Return a muscle's effective area, and its slope; beyond what is known it goes on straight."""
     own, place = muscle_at(c, k), terms_at(c, k) + DYNAMIC + int(c[7])
@@ -174,7 +174,7 @@ def area(c: Array, k: int, y: float) -> tuple[float, float]:
     return least, 0.0
 
 
-@kernel
+@short_kernel
 def friction_pressure(c: Array, p: float, x: Array) -> float:
     """Return the pressure that the limits of friction are proportional to."""
     total = p + c[11]
@@ -184,7 +184,7 @@ def friction_pressure(c: Array, p: float, x: Array) -> float:
     return max(total, 0.0)
 
 
-@kernel
+@short_kernel
 def friction(
     c: Array,
     k: int,

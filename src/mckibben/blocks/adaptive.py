@@ -6,8 +6,9 @@ inverse runs with them as they are, so that model and inverse match at every ste
 
 A measurement answers the reference of the step before, as behind a compensator: since the model gives
 exactly what was asked for, what it predicts is known from the inverse's own memory. One part of a series
-learns (mpi, cpi and their kin): parts behind it are undone on what is measured as on the reference, each
-with a memory of its own, and parts before it on what the inverse gives.
+learns (mpi, cpi, a balance behind its valves): parts behind it are undone on what is measured as on the
+reference, each with a memory of its own, and parts before it on what the inverse gives. What comes late
+by a dead time is moved on first by as much as the reference has gone on since (`Prompt`).
 """
 
 from __future__ import annotations
@@ -351,11 +352,9 @@ class Adaptive(Block):
     @cached_property
     def _prompt(self) -> tuple[Prompt, ...]:
         """What makes up for a dead time, of every measurement."""
-        late, channels = (
-            self.forward.dead_time,
-            zip(self.forward.outputs, self.measured, strict=True),
-        )
-        return tuple(Prompt(late, *pair) for pair in channels) if late > 0 else ()
+        late = self.forward.dead_time
+        pairs = zip(self.forward.outputs, self.measured, strict=True)
+        return tuple(Prompt(late, *pair) for pair in pairs) if late > 0 else ()
 
     @cached_property
     def learnable(self) -> Learnable:

@@ -922,8 +922,11 @@ class _Parallel:
             row = block.springs[j][power * (1 + m) : (power + 1) * (1 + m)]
             force += x_q * (row[0] + sum(s * v for s, v in zip(row[1:], q, strict=True)))
         if block.obstacles:
-            place, stiff, *by = block.obstacles[j]
-            force += (stiff + _sum(tuple(by), scheduling)) * max(q[j] - place, 0.0)
+            width = 3 + len(scheduling)
+            for first in range(0, len(block.obstacles[j]), width):
+                side, place, stiff, *by = block.obstacles[j][first : first + width]
+                stiffness = stiff + _sum(tuple(by), scheduling)
+                force += stiffness * side * max(side * (q[j] - place), 0.0)
         return force
 
     def area(self, k: int, y: float) -> float:

@@ -156,7 +156,10 @@ def _crowded(**changes: Any) -> Any:
         pressure_range=(0.0, 6.0),
         asymmetry=0.7,
         grips=(0.2,),
-        obstacles=((5.0, 4.0, 1.0), (4.0, 6.0, 0.0)),
+        obstacles=(
+            (1.0, 5.0, 4.0, 1.0, -1.0, 1.0, 3.0, 0.0),
+            (1.0, 4.0, 6.0, 0.0, -1.0, -2.0, 5.0, 1.0),
+        ),
         directions=((0.9, 0.0), (-0.4, 0.7), (-0.5, -0.8)),
         preload=1.0,
         **changes,

@@ -164,8 +164,8 @@ class Balance(Invertible):
         How much of all that schedules friction is proportional to, beside pressure; not negative [bar by
         its unit]. Default none.
     obstacles : sequence of m sequences of float
-        Where every coordinate meets an obstacle [mm], and its stiffness [N/mm]: a constant, and by each
-        that schedules. Default none.
+        What every coordinate meets, one after another: 1 on the way up or -1 on the way down, where
+        [mm], and its stiffness [N/mm]: a constant, and by each that schedules. Default none.
     directions : sequence of n sequences of m float
         Shortening of every muscle by coordinates. Default the identity.
     preload : float
@@ -273,7 +273,7 @@ class Balance(Invertible):
             "hull": (n, 2),
         }
         if self.obstacles:
-            widths["obstacles"] = (m, 2 + n_x)
+            widths["obstacles"] = (m, self.n_obstacles * (3 + n_x))
         if self.directions:
             widths["directions"] = (n, m)
         if self.known:
@@ -312,7 +312,7 @@ class Balance(Invertible):
                     f"{name} of {self.kind!r} are {values}. Remedy: give positive ones"
                     f"{', in increasing order' if name == 'limits' else ''}."
                 )
-        stiffnesses = [row[1:] for row in self.obstacles]
+        stiffnesses = np.reshape(self.obstacles, (-1, 3 + self.n_schedules))[:, 2:]
         named = {name: getattr(self, name) for name in NOT_NEGATIVE} | {"obstacles": stiffnesses}
         for name, values in named.items():
             if any(value < 0 for value in np.ravel(values)):
@@ -336,7 +336,7 @@ class Balance(Invertible):
         on_coordinates = {
             r"\sum_l C_{kl} F_l": any(map(any, self.loads)),
             springs if schedules else rf"S_{{k0}} + {springs}": True,
-            rf"o_k \max({y}_k - o_{{k1}}, 0)": bool(self.obstacles),
+            rf"\sum_i o_{{ki3}} \left[{y}_k - o_{{ki2}}\right]_{{o_{{ki1}}}}": bool(self.obstacles),
         }
         of_muscles = {
             "E_k(y_k)": True,
@@ -391,6 +391,11 @@ class Balance(Invertible):
         return np.stack([ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)], axis=1)
 
     @property
+    def n_obstacles(self) -> int:
+        """How many obstacles every coordinate may meet."""
+        return len(self.obstacles[0]) // (3 + self.n_schedules) if self.obstacles else 0
+
+    @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
         """Whether anything relaxes, damps or is heavy."""
         return bool(self.lags) or any(self.damping) or any(self.lines) or any(self.mass)
@@ -421,7 +426,7 @@ class Balance(Invertible):
         low, high = self.pressure_range or (-np.inf, np.inf)
         head = [
             *(n, m, n_x, self.degree, self.n_loads, len(self.limits), len(self.lags)),
-            *(len(self.elasticity[0]), len(self.areas[0]), bool(self.obstacles), self.scale),
+            *(len(self.elasticity[0]), len(self.areas[0]), self.n_obstacles, self.scale),
             *(self.grip, self.asymmetry or 1.0, low, high, 1.0 / step, self.tare, not self.settled),
             *(bool(self.mass), self.preload, bool(self.directions)),
         ]
@@ -504,17 +509,16 @@ class Balance(Invertible):
         """Return the unit of a number: forces are in N, or, of relative areas, in the input's."""
         moved, driving = self.driven[0].unit, self.given[0].unit
         force = driving if self.areas[0][0] == 1.0 else "N"
-        below = ""
         if field in ("springs", "obstacles"):
-            width = 1 + len(self.driven)
-            power, place = divmod(index[-1], width) if field == "springs" else (0, index[-1])
-            if field == "obstacles" and place == 0:
-                return moved
-            below = moved * (place > 0)
-            by = (power - 1) // self.degree if field == "springs" else place - 2
-            if by >= 0:
-                degree = (power - 1) % self.degree + 1 if field == "springs" else 1
-                raised = f"{self.scheduled[by].unit}^{degree}".replace("^1", "")
+            width, degree = (1 + len(self.driven), self.degree) if field == "springs" else (1, 1)
+            place = index[-1] if field == "springs" else index[-1] % (3 + self.n_schedules) - 2
+            if place < 0:
+                return moved if place == -1 else ""
+            power, to = divmod(place, width)
+            below = moved * (to > 0 or field == "obstacles")
+            if power > 0:
+                by, order = divmod(power - 1, degree)
+                raised = f"{self.scheduled[by].unit}^{order + 1}".replace("^1", "")
                 below += f"{' ' if below else ''}{raised}"
             return f"{force}/{below}" if below else force
         if field == "loads":
@@ -550,8 +554,10 @@ class Balance(Invertible):
         if field == "loads":
             return f"share{of} of {self.scheduled[place - self.n_loads].name}"
         if field == "obstacles":
-            by = f" by {self.scheduled[place - 2].name}" if place > 1 else ""
-            return f"{'stiffness' if place else 'place'} of the obstacle{of}{by}"
+            number, place = divmod(place, 3 + self.n_schedules)
+            by = f" by {self.scheduled[place - 3].name}" if place > 2 else ""
+            what = ("side", "place", "stiffness")[min(place, 2)]
+            return f"{what} of obstacle {number + 1}{of}{by}"
         if field in ("friction", "relaxation"):
             return f"{'stop' if field == 'friction' else field} {place + 1}{of}"
         if field == "areas" and place == 0:

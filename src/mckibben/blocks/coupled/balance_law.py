@@ -3,25 +3,26 @@
 Of coordinates q that n muscles move, with y_k = W_k q the shortening of muscle k (W is the identity
 where every coordinate has a muscle of its own), virtual work asks at every coordinate j
 
-    sum_l C_jl F_l + S_j(x) (1, q) + K_j(x) max(q_j - o_j, 0) + sum_k W_kj min(R_k, b_k) = 0,
+    sum_l C_jl F_l + S_j(x) (1, q) + K_j(x) (q_j - o_j) + sum_k W_kj min(R_k, b_k) = 0,
 
     R = E(y) + sum_m h_m s_m + sum_l kappa_l v_l + (d + l (A / A_0)^2) y' + m y'' - p A(y),
 
-where R is what a muscle resists shortening with, up to b, at which it goes slack. R is linear in its
-coefficients, and `resistance` fills the terms that they multiply. Stops s follow the stretch y + w p of
-the wall, up to r (p + p_0 + g x) and down to that times a ratio; v, what a lag is behind, relaxes with
-its time constant; the line, which resists a flow of A y', has the area of the last sample; accelerations
-are Houbolt's differences of four samples: of second order, stable, and without echo in pressures.
+the obstacle where q is beyond it alone, and R what a muscle resists shortening with, up to b, at which
+it goes slack. R is linear in its coefficients, and `resistance` fills the terms that they multiply.
+Stops s follow the stretch y + w p of the wall, up to r (p + p_0 + g x) and down to that times a ratio;
+v, what a lag is behind, relaxes with its time constant; the line, which resists a flow of A y', has the
+area of the last sample; accelerations are Houbolt's differences of four samples: of second order,
+stable, and without echo in pressures.
 
 Pressures follow from coordinates muscle by muscle; coordinates from pressures as the minimum of a convex
 energy, by Newton's method with a search along every step.
 
 Coefficients: the head, r (m), decays and gains of the lags (l each), g (schedules); of every coordinate
-its springs (powers of what schedules by 1 + coordinates), loads, and the obstacle's place and stiffness;
-of every muscle lowest and highest shortening known, w, b, W, then the coefficients of its terms: d, l,
-m, own spring, elasticity, area, friction, relaxation. State: coordinates, stretches, stops (muscle by
-muscle), lags (the same), with mass the last two moves of each muscle, the tare of coordinates, whether
-nothing came before, samples amiss.
+its springs (powers of what schedules by 1 + coordinates), loads, and of every obstacle its side (1 or
+-1), place and stiffness; of every muscle lowest and highest shortening known, w, b, W, then the
+coefficients of its terms: d, l, m, own spring, elasticity, area, friction, relaxation. State:
+coordinates, stretches, stops (muscle by muscle), lags (the same), with mass the last two moves of each
+muscle, the tare of coordinates, whether nothing came before, samples amiss.
 """
 
 from __future__ import annotations
@@ -33,10 +34,10 @@ from mckibben.blocks.kernels import DERIVED, kernel, short_kernel
 from mckibben.blocks.solving import eliminate
 
 HEAD = 21
-"""Muscles, coordinates, schedules, degree, loads, stops, lags, elastic terms, area's terms, whether
-there are obstacles, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a
-second, whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there
-is mass, pressure shared by muscles that are more than coordinates, whether they are."""
+"""Muscles, coordinates, schedules, degree, loads, stops, lags, elastic terms, area's terms, obstacles of
+a coordinate, scale, p_0, ratio of lower to upper limits, lowest and highest pressure, samples a second,
+whether there is a tare, what is left at the start to relax (1, or 0 if settled), whether there is mass,
+pressure shared by muscles that are more than coordinates, whether they are."""
 
 OWN, DYNAMIC = 4, 4
 """Coefficients of a muscle before its directions; terms before elasticity."""
@@ -73,7 +74,7 @@ SINGLE = {"BALANCED": 1e-6, "NEARLY": 1e-4, "SURE": 1e-5, "HAIR": 1e-6}
 def coordinate_at(c: Array, j: int) -> int:
     """Return the place of the first coefficient of a coordinate."""
     springs = (1 + int(c[2]) * int(c[3])) * (1 + int(c[1]))
-    width = springs + int(c[4]) + int(c[9]) * (2 + int(c[2]))
+    width = springs + int(c[4]) + int(c[9]) * (3 + int(c[2]))
     return HEAD + int(c[5]) + 2 * int(c[6]) + int(c[2]) + j * width
 
 
@@ -147,12 +148,15 @@ def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> flo
     for i in range(n_loads):
         force += c[place + i] * x[n_x + i]
     place += n_loads
-    if c[9] != 0.0 and q[j] > c[place]:
-        stiffness = c[place + 1]
-        for s in range(n_x):
-            stiffness += c[place + 2 + s] * x[s]
-        force += stiffness * (q[j] - c[place])
-        gradient[j] += stiffness
+    for _ in range(int(c[9])):
+        beyond = q[j] - c[place + 1]
+        if c[place] * beyond > 0.0:
+            stiffness = c[place + 2]
+            for s in range(n_x):
+                stiffness += c[place + 3 + s] * x[s]
+            force += stiffness * beyond
+            gradient[j] += stiffness
+        place += 3 + n_x
     return force
 
 

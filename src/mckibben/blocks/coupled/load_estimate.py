@@ -175,41 +175,34 @@ class LoadEstimate(Block):
         return np.concatenate([self.forward.coefficients(sample_time), solving.ravel()])
 
 
-def parts_of(model: Block) -> tuple[Balance, Block | None, Block | None]:
-    """Return the balance that a model solves, what acts of its pressures, and what its sensors make.
-
-    Raises
-    ------
-    ModelError
-        If the model solves none.
-    """
-    match balance_in(model):
-        case (balance, True, before, behind) if max(len(before), len(behind)) <= 1:
-            return balance, next(iter(before), None), next(iter(behind), None)
-    raise ModelError(
-        f"{model.title!r} does not tell loads by displacements and pressures. Remedy: identify "
-        "'balance', on recordings with a measured force."
-    )
-
-
 def load_of(model: Block) -> Block:
     """Return what tells the loads of a model by its balance, whose sensors may count otherwise.
 
     Raises
     ------
     ModelError
-        If the model knows no load.
+        If the model knows no load, or its coordinates are not measured one by one.
     """
     if isinstance(model, LoadEstimate):
         raise ModelError("this is an estimate of loads already. Remedy: simulate it.")
     if isinstance(model, Balance):
         return LoadEstimate(model)
-    balance, acting, sensors = parts_of(model)
-    if acting is None and sensors is None:
-        return LoadEstimate(balance)
-    shortening = _each(sensors.inverse() if sensors else None, balance.driven)
-    parts = (*shortening, *_each(acting, balance.given))
-    return Series((PerChannel(parts), LoadEstimate(balance)))
+    placed = balance_in(model)
+    if placed is None or not placed.solved or len(placed.behind) > 1:
+        raise ModelError(
+            f"{model.title!r} does not tell loads by displacements and pressures. Remedy: identify "
+            "'balance', on recordings with a measured force."
+        )
+    balance, before = placed.balance, placed.before
+    measured = [_each(block.inverse(), balance.driven) for block in placed.behind]
+    same = _each(None, balance.driven)
+    coordinates = [*measured, *(same for _ in before[len(measured) :])]
+    pressures = [_each(block, balance.given) for block in before] or [_each(None, balance.given)]
+    stages = [
+        PerChannel((*there, *acting))
+        for there, acting in zip(coordinates or [same], pressures, strict=True)
+    ]
+    return Series((*stages, LoadEstimate(balance))) if before or measured else LoadEstimate(balance)
 
 
 def _each(block: Block | None, channels: Sequence[Channel]) -> tuple[Block, ...]:

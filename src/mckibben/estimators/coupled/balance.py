@@ -1,9 +1,8 @@
 """Identification of a balance of forces.
 
-First the forces that the muscles lack where they were measured, linear in almost all coefficients, by
-least squares weighted by stiffness; then the displacements of the free run, by Gauss-Newton steps with
-exact derivatives. Both keep to what physics asks (`mckibben.estimators.coupled.balance_structure`).
-Muscles may be more than the coordinates (`mckibben.estimators.coupled.balance_coordinates`).
+Forces are made to balance where the muscles were measured, by least squares within what physics asks;
+from there the free run is followed by Gauss-Newton steps. In between terms are chosen that lessen errors
+of what was left out (`mckibben.estimators.coupled.balance_search`).
 """
 
 from __future__ import annotations
@@ -18,64 +17,60 @@ from annotated_types import Gt, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.coupled.load_estimate import parts_of
-from mckibben.blocks.fields import rows
-from mckibben.blocks.memoryless import LOST, Affine, Contact
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.fields import rows, vector
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Grid
-from mckibben.estimators.core.uncertainty import unknown
-from mckibben.estimators.coupled.balance_checks import (
-    check_directions,
-    moving,
-    not_at_rest,
+from mckibben.estimators.coupled.balance_bench import (
+    bench_of,
+    check_numbers,
+    directions,
+    from_zero,
     one_speed,
-    other_zeros,
-    telling,
-    turned,
-)
-from mckibben.estimators.coupled.balance_coordinates import (
-    directions_of,
-    in_words,
-    shortened,
-    together,
-)
-from mckibben.estimators.coupled.balance_loads import (
-    held_told,
-    loads_told,
     varying,
     with_loads,
     without_held,
     without_load,
 )
-from mckibben.estimators.coupled.balance_prior import Told, believed, refined, told_by
+from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, noise_of, told_by
+from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
-from mckibben.estimators.coupled.balance_stages import Stages, acted, acting
-from mckibben.estimators.coupled.balance_starts import simulate_started
-from mckibben.estimators.coupled.balance_structure import APART, Structure
-from mckibben.estimators.coupled.balance_words import held_back, missed, sentences
-from mckibben.estimators.coupled.base import LOADS, CoupledEstimator, of_channels, schedules
+from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
+from mckibben.estimators.coupled.balance_words import sentences
+from mckibben.estimators.coupled.base import CoupledEstimator, of_channels, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
+
+PRESSURES = ("bar", "V", "")
+"""Units of what drives a muscle; where none is said, whoever names it is believed."""
 
 LIMITED = ("bar", "V")
 """Units of what the hardware limits."""
 
-FAR = 0.5
-"""Displacements that all are further from zero than this share of their range count from elsewhere."""
+FEW, MOST = 6_000, 12_000
+"""Errors that are looked at to find terms, and in the end."""
 
-FIRST_SAMPLES, MORE_SAMPLES, MOST_SAMPLES = 8_000, 15_000, 60_000
-"""By which starts, slack and dead zones are compared; to find the way by; and for the last steps."""
+GRIPS = (0.05, 0.3, 1.0, 4.0)
+"""Pressures below zero at which friction holds nothing, relative to the highest, to begin from."""
 
-LAST_STEPS = 10
-"""On all recordings, after those on a few of them."""
+ROUNDS, STEPS_BETWEEN = 5, 4
+"""Times that terms are added, and steps before each."""
 
-AT_START = 0.02
-"""Displacement at the start of a run that is none, relative to the range."""
+FIRM = 0.7
+"""Of the most that muscles resist with, share at which they go slack at first."""
 
+FINEST, LONGEST = 0.003, 0.5
+"""Shortest and longest travels at which stops break away, relative to the stroke."""
 
-PRESSURES = ("bar", "V", "")
-"""Units of what drives a muscle; where none is said, whoever names it is believed."""
+PLACES = (0.5, 0.65, 0.8, 0.9, 0.97)
+"""Of obstacles on the way up, along the range of what is moved; of those on the way down from its end."""
+
+TERMS = (
+    *("elasticity", "areas", "friction", "relaxation", "line", "mass", "obstacle", "springs"),
+    *("grips", "asymmetry", "walls", "filling", "venting", "dead", "muscles", "slack"),
+)
+"""Kinds of terms that may be added."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -84,20 +79,22 @@ class BalanceEstimator(CoupledEstimator):
 
     Parameters
     ----------
+    terms : sequence of str, optional
+        Kinds of terms that may be added to springs, area, friction, relaxation and damping: more degrees
+        of ``elasticity`` and ``areas``, more stops (``friction``) and lags (``relaxation``), the ``line``,
+        ``mass``, an ``obstacle`` either way, springs by squares of what schedules (``springs``), friction
+        that grows with what schedules (``grips``) or differs by direction (``asymmetry``), stretch of the
+        wall (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, ``muscles`` that
+        differ, and that go ``slack``. Each is added if the error of what is left out falls by more than
+        its standard error. Default all.
     n_stops : int
-        Friction elements, which break away after travels from ``finest`` to half the stroke.
-    finest : float
-        Shortest such travel, relative to the stroke.
-    lags : sequence of float, optional
-        Time constants of what relaxes [s], where to begin: in order, each twice the last or more, from
-        two samples to half the longest recording. Default ``n_lags`` from half a second to a third of
-        that recording.
+        Stops that may be, from which it begins with every other.
     n_lags : int
-        How many; 0 for muscles without time.
-    elasticity : int
-        Degree of the elastic polynomial.
-    area : int
-        Degree of the area's.
+        Time constants that may be, from which it begins with two; 0 for muscles without time.
+    lags : sequence of float, optional
+        Time constants to begin with instead [s]: in order, each twice the last or more.
+    elasticity, area : int
+        Highest degrees.
     degree : int
         Highest power of what schedules the springs.
     tare : bool, optional
@@ -107,16 +104,6 @@ class BalanceEstimator(CoupledEstimator):
         Whether every recording but the first hung under a constant load of its own, which is found.
         Default: recordings without the force that others have did; of a muscle alone, where none has
         any, if this makes the model much better.
-    contact : bool
-        Whether a dead zone of small pressures is looked for; default so.
-    slack : bool, optional
-        Whether it is looked for forces at which muscles go slack; default of several muscles, and of
-        recordings in which a muscle is held.
-    mass : bool
-        Whether what hangs at the muscles is so heavy that its acceleration matters; then they are not
-        found to go slack.
-    ridge : float
-        Damping of the coefficients.
     steps : int
         Most Gauss-Newton steps.
     prior : str, Path, Sheet or Prior, optional
@@ -125,49 +112,49 @@ class BalanceEstimator(CoupledEstimator):
 
     Attributes
     ----------
-    loads_ : array, shape (recordings, n)
-        Constant loads that were found, of every muscle in every recording: beyond that of the first or,
-        where others have a force, beyond their average. In N or, without a measured force, in bar on
-        muscle 1's area at rest.
+    loads_ : array, shape (recordings, m)
+        Constant loads that were found, on every coordinate in every recording: beyond that of the first
+        or, where others have a force, beyond their average. In the unit of the model's forces.
+    terms_ : tuple of str
+        What was added.
     """
 
     title = "Balance of forces"
     can = (
-        "Springs, areas, friction and relaxation of one muscle or several in parallel, under "
-        "load, stiffness and rate included; holds off the patterns of its training."
+        "Springs, areas, friction and relaxation of one muscle or several, on coordinates of their own "
+        "or a joint, under loads and torques; terms chosen by cross-validation."
     )
     cannot = (
-        "Friction is the same in contraction and extension; one set of lags serves all "
-        "muscles; air's delay between command and pressure is not in it: put air in front."
+        "One set of lags serves all muscles; areas and springs follow shortening, not temperature."
     )
     inverse_kind = "exact"
     quick = True
     default_for = "plan of displacement"
-    param_grid: ClassVar[Grid] = {
-        "n_lags": (1, 2, 3),
-        "n_stops": (4, 6, 8),
-        "area": (2, 3),
-    }
-    makes = ("balance", "balance-inverse", "contact balance-inverse")
+    param_grid: ClassVar[Grid] = {"n_lags": (3, 6), "n_stops": (5, 8), "area": (2, 4)}
+    makes = (
+        "balance",
+        "balance-inverse",
+        "air balance-inverse",
+        "piecewise-linear balance-inverse",
+    )
     effort: ClassVar[float] = 1.0
     alone: ClassVar[bool] = True
     unmeasured: ClassVar[bool] = True
     fewer_outputs: ClassVar[bool] = True
+    of_force: ClassVar[bool] = False
+    """Whether errors of the load count, instead of those of displacements."""
+
     through: ClassVar[bool] = True
 
-    n_stops: Annotated[int, Interval(ge=0, le=30)] = 6
-    finest: Annotated[float, Interval(gt=0, lt=0.5)] = 0.003
+    terms: tuple[str, ...] | None = None
+    n_stops: Annotated[int, Interval(ge=0, le=30)] = 8
+    n_lags: Annotated[int, Interval(ge=0, le=10)] = 6
     lags: tuple[Annotated[float, Gt(0)], ...] | None = None
-    n_lags: Annotated[int, Interval(ge=0, le=10)] = 2
     elasticity: Annotated[int, Interval(ge=1, le=9)] = 9
-    area: Annotated[int, Interval(ge=0, le=6)] = 2
-    degree: Annotated[int, Interval(ge=1, le=4)] = 2
+    area: Annotated[int, Interval(ge=0, le=6)] = 4
+    degree: Annotated[int, Interval(ge=1, le=2)] = 2
     tare: bool | None = None
     unknown_load: bool | None = None
-    contact: bool = True
-    slack: bool | None = None
-    mass: bool = False
-    ridge: Annotated[float, Interval(ge=0, le=1)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
     prior: Told = None
 
@@ -208,206 +195,265 @@ class BalanceEstimator(CoupledEstimator):
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data without what tells nothing."""
-        data, notes = without_held(data)
-        tracker.notes += notes
+        data, names = without_held(data)
+        tracker.notes += [
+            f"in {name} nothing moves and no force was measured: it is left out. Remedy: record the force"
+            for name in names
+        ]
         return super().find(data, tracker)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        """Return the balance, solved for displacements."""
-        data, notes = telling(data)
-        tracker.notes += notes
-        recorded, behind = data, None
-        if len(data.inputs) > len(data.outputs):
-            along = directions_of(data)
-            tracker.notes.append(in_words(data, along))
-            coordinates, data = data.outputs, shortened(data, along)
-            behind = together(data, along, coordinates)
-        check_directions(data)
-        ways = directions(data)
-        data = turned(data, ways)
-        structure, belief = self.structure(data, tracker), None
-        if self.prior is not None:
-            structure, belief = believed(structure, self.prior)
-        few = Search(data, structure, self.ridge, belief).of_few(FIRST_SAMPLES)
-        pushed = len(data.inputs) > 1 or any(few.still)  # by other muscles, or what holds it
-        slack = pushed if self.slack is None else self.slack
-        none = np.zeros((1 + data.runs[-1].recording, len(data.inputs)))
-        same = not other_zeros(recorded, none)
-        stages = Stages(few, tracker, self.steps, slack and not self.mass, same_zeros=same)
-        search = None
-        with tracker.searching():
-            alone = len(data.inputs) == 1  # of several, what drifts would be taken for loads
-            loads = self.unknown_load is None and alone
-            stages.run(data, loads=loads, contact=self.contact)
-            search = stages.few.having(acting(data, stages.dead)).of_few(MOST_SAMPLES)
-            few = search.of_few(MORE_SAMPLES)
-            assert tracker.best is not None
-            tracker.best_cost = few.cost(tracker.best)
-            few.descend(tracker.best, self.steps, tracker)
-            tracker.reached(0.7)
-            if few.belief is not None:
-                few = refined(few, tracker, self.steps)
-                search.belief = few.belief
-            if len(few.runs) < len(search.runs) or few.n_rows < search.n_rows:
-                tracker.best_cost = search.cost(tracker.best)
-                search.descend(tracker.best, min(self.steps, LAST_STEPS), tracker)
-        if tracker.best is None or not np.isfinite(tracker.best_cost):
+        """Return the balance, solved for coordinates, behind what acts in front of it."""
+        if unknown := {*(self.terms or ())} - {*TERMS}:
             raise ModelError(
-                "no balance of forces runs free over these recordings. Remedy: check that displacements "
-                "count as shortening and loads as pulling the muscle longer"
+                f"terms names {', '.join(sorted(unknown))}. Remedy: choose from {', '.join(TERMS)}"
             )
-        search, structure, dead = search or stages.few, stages.few.structure, stages.dead
-        limited = data.inputs[0].unit in LIMITED
-        ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
-        low, high = acted(ends, dead).tolist()
-        balance = structure.block(tracker.best, (low, high) if limited else None)
-        x = of_channels(data, balance.scheduling).stacked("scheduled")
-        balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
-        self._found = structure, tracker.best
-        self.loads_ = structure.own.table_of_loads(tracker.best, 1 + data.runs[-1].recording)
-        tracker.notes += not_at_rest(data, settled=structure.settled, found=structure.n_starts > 0)
-        tracker.notes += other_zeros(recorded, self.loads_)
-        tracker.notes += loads_told(data, self.loads_, balance, newtons=structure.in_newtons)
-        tracker.notes += [*varying(search, tracker.best), *held_told(search, tracker.best)]
-        tracker.notes += [*missed(tracker.best_cost), *held_back(balance, structure)]
-        tracker.notes += sentences(balance, structure)
-        if dead:
-            tracker.notes.append(
-                f"small pressures act little: as if {LOST * dead:.3g} {data.inputs[0].unit} were lost, "
-                "fully from about four times that"
-            )
-        contacts = [Contact(dead, channel, channel) for channel in data.inputs] if dead else []
-        sensors = [
-            Affine(gain, offset, channel, channel)
-            for (gain, offset), channel in zip(ways, data.outputs, strict=True)
-            if any(way != (1.0, 0.0) for way in ways)
+        data, names = varying(data)
+        tracker.notes += [
+            f"{name} is about the same in all recordings, and is left out. Remedy: record at other "
+            "values too"
+            for name in names
         ]
-        parts = [*_side_by_side(contacts), balance.inverse(), *_side_by_side(sensors)]
-        parts += [behind] if behind else []
-        return parts[0] if len(parts) == 1 else Series(tuple(parts))
-
-    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks, each run under its own load from its own start."""
-        structure, values = self._found
-        if structure.size == structure.own.first:
-            return super().free_runs(blocks, data)
-        return np.array([simulate_started(block, data, structure, values) for block in blocks])
-
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return condition and covariance of what is free, from the exact slopes of the free run."""
-        if len(data.inputs) > len(data.outputs):
-            return np.nan, unknown(block)  # directions are not among what is free
-        balance, contacts, _ = parts_of(block)
-        dead = 0.0 if contacts is None else float(contacts.pack()[0])
-        structure, values = self._found
-        search = Search(acting(turned(data, directions(data)), dead), structure, self.ridge)
-        condition, found = search.covariance(
-            structure.values(balance, values[structure.own.first :])
-        )
-        packed = structure.packed()
-        covariance = unknown(block)
-        # dead zones come before; a sensor's gain and offset follow, which are not fitted
-        own = slice(0 if contacts is None else contacts.n_parameters, None)
-        own = slice(own.start, own.start + len(packed))
-        covariance[own, own] = found[np.ix_(packed, packed)]
-        covariance[list(at_bounds)] = covariance[:, list(at_bounds)] = np.nan
-        return condition, covariance
-
-    def structure(self, data: TrainingData, tracker: Tracker) -> Structure:
-        """Return sizes and settings that suit the recordings.
-
-        Raises
-        ------
-        ModelError
-            If there never is pressure.
-        """
-        y = data.stacked("outputs")
-        span = data.travel
-        if not data.highest.max() > 0:
-            raise ModelError(
-                f"{data.inputs[0].name} never exceeds 0. Remedy: give pressures above the atmosphere's"
-            )
-        loaded = [channel.unit in LOADS for channel in data.scheduled]
-        scheduled = [i for i, load in enumerate(loaded) if not load]
-        x = data.stacked("scheduled")[:, scheduled]
-        levels = [np.unique(np.round(v / (0.1 * (float(np.ptp(v)) or 1.0)))).size for v in x.T]
-        degree = max(min([self.degree, *(n - 1 for n in levels)]), 1)
-        highest = float(data.highest.max())
-        margin = 0.02 * span
-        tare = self.tare
-        if tare is None:
-            first = np.array([run.outputs[0] for run in data.runs])
-            tare = bool(scheduled) and bool((np.abs(first) <= AT_START * span).all())
-        if tare:
-            margin = 0.15 * span
+        check_numbers(data)
+        data, behind, ways = from_zero(data, np.eye(1) if self.of_force else directions(data))
+        bench = replace(bench_of(data, ways, tare=self.tare), of_force=self.of_force)
+        if not bench.tare:
+            lacking = without_load(data, every=bool(self.unknown_load))
+            bench = replace(bench, unmeasured=lacking)
+        belief = None
+        if self.prior is not None:
+            bench, belief = believed(bench, self.prior)
         still = self.prior is None and one_speed(data)
         if still and self.n_lags and self.lags is None:
             tracker.notes.append(
-                "all moves at about one speed, so that relaxation cannot be told from friction, and is "
-                "left out. Remedy: record at other speeds too, or give lags"
+                "all moves at about one speed: relaxation and friction cannot be distinguished, and "
+                "relaxation is left out. Remedy: record at other speeds too, or give lags"
             )
+        structure = self.widest(bench, timed=not still or self.lags is not None)
+        with tracker.searching():
+            search, z = self._found(data, structure, belief, tracker)
+            self._search, self._z = search, z
+        search, z = self._search, self._z
+        structure = search.structure
+        values = structure.expanded(z[: len(structure.terms)])
+        balance = in_newtons(structure.block(values, final=True))
+        self.loads_ = np.zeros((1 + data.runs[-1].recording, structure.m))
+        for run in data.runs:
+            place = search.problem.loads_at(structure, run)
+            if place.stop > place.start:
+                self.loads_[run.recording] = z[place] * balance.areas[0][0]
+        acting = [front(structure, values, channel) for channel in data.inputs]
+        before = [one[0] if len(one) == 1 else PerChannel(one) for one in zip(*acting, strict=True)]
+        if data.inputs[0].unit in LIMITED:
+            ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
+            for block in acting[0]:
+                if not block.rate_dependent:
+                    ends = block.simulate(ends)
+            balance = replace(balance, pressure_range=(float(ends[0]), float(ends[1])))
+        x = of_channels(data, balance.scheduling).stacked("scheduled")
+        balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
+        tracker.notes += sentences(search, z, balance)
+        self._search, self._z = self._started(search, z)
+        parts = [*before, balance.inverse(), *behind]
+        return parts[0] if len(parts) == 1 else Series(tuple(parts))
+
+    def widest(self, bench: Bench, *, timed: bool) -> Structure:
+        """Return the structure of all that may be."""
+        limits = np.geomspace(FINEST, LONGEST, self.n_stops) * bench.stroke / bench.highest
+        shortest, longest = bench.lag_range
+        lags = np.geomspace(shortest, longest, self.n_lags + 1)[1:] if bench.step and timed else ()
+        if self.lags is not None:
+            lags = np.array(self.lags)
+            if lags[0] < shortest or lags[-1] > longest or (np.diff(np.log(lags)) < 0.69).any():
+                raise ModelError(
+                    f"lags of {np.array2string(lags, precision=3)} s are not what these recordings tell. "
+                    "Remedy: give fewer lags, in order, each twice the last or more, from "
+                    f"{shortest:.3g} to {longest:.3g} s"
+                )
+        sides = [(1, place) for place in PLACES] + [(-1, 1.0 - place) for place in PLACES]
         return Structure(
-            driven=data.outputs,
-            scheduled=tuple(data.scheduled[i] for i in scheduled),
-            loaded=tuple(c for c, load in zip(data.scheduled, loaded, strict=True) if load),
-            given=data.inputs,
-            degree=degree,
+            bench,
             n_elastic=self.elasticity - 1,
             n_area=self.area + 1,
-            limits=np.geomspace(self.finest, 0.5, self.n_stops) * float(span.max()) / highest,
-            lags=self._lags(data) if self.lags or not still else np.zeros(0),
-            lag_range=(2.0 * (data.sample_time or 1.0), max(0.5 * self._longest(data), 1.0)),
-            hull=np.column_stack([y.min(axis=0) - margin, y.max(axis=0) + margin]),
-            scheduled_hull=np.column_stack([x.min(axis=0), x.max(axis=0)]),
-            highest=highest,
-            heaviest=float(np.abs(data.stacked("scheduled")[:, loaded]).max(initial=0.0)) or 1.0,
-            tare=tare,
-            slack=False,
-            mass=self.mass,
-            unmeasured=() if tare else without_load(data, every=bool(self.unknown_load)),
+            limits=vector(limits),
+            lags=vector(lags),
+            obstacles=tuple(sides) if self.may("obstacle") else (),
+            degree=self.degree if bench.curved else 1,
         )
 
-    def _lags(self, data: TrainingData) -> Array:
-        """Return time constants [s] that the recordings can tell."""
-        longest = self._longest(data)
-        shortest, most = 2.0 * (data.sample_time or 1.0), max(0.5 * longest, 1.0)
-        last = min(max(longest / 3.0, 1.0), max(60.0, 8.0 * shortest), most)
-        first = max(min(0.5, last / 4.0), shortest)
-        default = np.geomspace(first, last, self.n_lags) if self.n_lags else ()
-        lags = np.array(default if self.lags is None else self.lags)
-        if lags.size and (
-            lags[0] < shortest or lags[-1] > most or (np.diff(np.log(lags)) < APART).any()
-        ):
-            raise ModelError(
-                f"lags of {np.array2string(lags, precision=3)} s are not what recordings of "
-                f"{longest:.3g} s tell. Remedy: give fewer lags, in order, each twice the last or more, "
-                f"from {shortest:.3g} to {most:.3g} s"
+    def may(self, kind: str) -> bool:
+        """Tell whether terms of a kind may be added."""
+        return self.terms is None or kind in self.terms
+
+    def _first(self, structure: Structure) -> Mask:
+        """Return which terms are free from the beginning."""
+
+        def there(term: Term) -> bool:
+            kind, which, muscle = term
+            if kind == "springs":
+                return which == 0 or (which - 1) % structure.degree == 0
+            if kind == "friction":
+                return which % 2 == 1 or structure.n_stops == 1
+            if kind in ("relaxation", "lags"):
+                few = structure.n_lags < 3 or self.lags is not None
+                return few or which in (structure.n_lags // 3, 2 * structure.n_lags // 3)
+            if kind in ("elasticity", "areas"):
+                return which < 2
+            return kind in ("loads", "damping", "bladder") or (
+                kind == "grip" and structure.n_stops > 0
             )
-        return lags
 
-    def _longest(self, data: TrainingData) -> float:
-        """Return the duration of the longest run [s]."""
-        return max(len(run.outputs) * (run.sample_time or 0.0) for run in data.runs)
+        return np.array([term.muscle is None and there(term) for term in structure.terms])
+
+    def _found(
+        self, data: TrainingData, structure: Structure, belief: Belief | None, tracker: Tracker
+    ) -> tuple[Search, Array]:
+        """Return the search of the terms chosen, and what they are."""
+        few = compared(coarser(data, FEW), FEW, of_force=self.of_force)
+        search = Search(few, structure, self._first(structure), belief)
+        starts = [] if belief is None else [self._likely(search)]
+        for grip in GRIPS[: None if structure.n_stops else 1]:
+            z = np.zeros(few.size(structure))
+            z[: len(structure.terms)] = structure.begin(grip * structure.bench.highest)
+            z = few.balanced(structure, z, search.active)
+            starts.append((search.cost(z), z))
+            tracker.saw(z, starts[-1][0])
+        z = min(starts, key=lambda start: start[0])[1]
+        tried = np.array([self._tried(term) for term in structure.terms])
+        for number in range(ROUNDS if belief is None else 1):
+            self._search, self._z = search, z = (
+                search,
+                search.descend(
+                    z,
+                    min(self.steps, STEPS_BETWEEN),
+                    tracker.part(0.1 * number, 0.1 * (number + 1)),
+                ),
+            )
+            active, z = search.chosen(z, tried)
+            if belief is not None or (active == search.active).all() or number == ROUNDS - 1:
+                break
+            search = replace(search, active=active)
+        added = [
+            t
+            for t, now, first in zip(
+                structure.terms, search.active, self._first(structure), strict=True
+            )
+            if now and not first
+        ]
+        self.terms_ = tuple(dict.fromkeys(t.kind if t.muscle is None else "muscles" for t in added))
+        search, z = self._needed(search, z)
+        if self.may("slack") and (structure.n > 1 or any(held(data, run) for run in data.runs)):
+            search, z = self._slack(search, z)
+        if structure.n == 1 and self.unknown_load is None:
+            search, z = self._own_loads(search, z, data)
+        whole = compared(data, MOST, of_force=self.of_force)
+        search = replace(search, problem=whole)
+        for _ in range(1 if belief is None else REFINED):
+            if belief is not None:
+                noise = noise_of(whole.errors(search.structure, z)[0][: len(whole.runs)])
+                search = replace(search, belief=replace(belief, noise=noise))
+            z = search.descend(z, self.steps, tracker.part(0.6, 0.9))
+        return search, z
+
+    def _likely(self, search: Search) -> tuple[float, Array]:
+        """Return what is likely before, under the constant force the recordings ask, and its cost."""
+        structure, belief = search.structure, search.belief
+        assert belief is not None
+        z = np.zeros(search.problem.size(structure))
+        z[: len(structure.terms)] = structure.begin(FIRST_GRIP * structure.bench.highest)
+        for place, term in enumerate(structure.terms):
+            if term.kind == "loads":
+                z[place] = 1.0 / belief.prior.sheet.area
+        alone = replace(
+            search, problem=replace(search.problem, data=replace(search.problem.data, runs=()))
+        )
+        z = alone.descend(z, TOWARDS, Tracker())
+        return search.cost(z), z
+
+    def _tried(self, term: Term) -> bool:
+        """Tell whether a term may be added."""
+        if term.muscle is not None:
+            return self.may("muscles")
+        shape = {"lags": "relaxation", "places": "obstacle", "pushes": "none"}
+        return self.may(shape.get(term.kind, term.kind)) and term.kind != "pushes"
+
+    def _needed(self, search: Search, z: Array) -> tuple[Search, Array]:
+        """Return the search of the terms that are free alone."""
+        structure, n = search.structure, len(search.structure.terms)
+        free = {key for key, there in zip(structure.keys, search.active, strict=True) if there}
+        needed = structure.needed(
+            [t for t, on in zip(structure.terms, search.active, strict=True) if on]
+        )
+        active = np.array([key in free for key in needed.keys])
+        moved = np.append(structure.moved_to(needed, z[:n]), z[n:])
+        return replace(search, structure=needed, active=active), moved
+
+    def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
+        """Return the search in which muscles go slack, if that lessens errors; else the same."""
+        structure, place = search.structure, list(search.structure.terms).index(Term("pushes"))
+        active = search.active.copy()
+        active[place] = True
+        slack, started = replace(search, active=active), z.copy()
+        started[place] = FIRM * search.problem.most_resisted(structure, z)
+        found = slack.descend(started, STEPS_BETWEEN, Tracker())
+        return (slack, found) if search.improved(z, slack, found) else (search, z)
+
+    def _own_loads(self, search: Search, z: Array, data: TrainingData) -> tuple[Search, Array]:
+        """Return the search in which recordings have loads of their own, if that helps much."""
+        bench, every = search.structure.bench, without_load(data, every=True)
+        if bench.loaded or bench.unmeasured or bench.tare or not every:
+            return search, z
+        own = replace(
+            search, structure=replace(search.structure, bench=replace(bench, unmeasured=every))
+        )
+        started = np.append(z, np.zeros(own.problem.size(own.structure) - z.size))
+        found = own.descend(started, STEPS_BETWEEN, Tracker())
+        return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
+
+    def _started(self, search: Search, z: Array) -> tuple[Search, Array]:
+        """Return the search in which runs that do not begin at rest have starts, found by themselves."""
+        problem = search.problem
+        if problem.all_at_rest or search.structure.bench.tare:
+            return search, z
+        none = np.zeros(search.active.size, dtype=bool)
+        started = replace(search, problem=replace(problem, starts=True), active=none)
+        z = np.append(z, np.zeros(started.problem.size(search.structure) - z.size))
+        return started, started.descend(z, STEPS_BETWEEN, Tracker())
+
+    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
+        """Return the free-running outputs of blocks, each run under its own load from its own start."""
+        return self._search.problem.simulated(blocks, data, self._search.structure, self._z)
 
 
-def directions(data: TrainingData) -> list[tuple[float, float]]:
-    """Return gain and offset of every measured output over a shortening from about zero."""
-    y = data.stacked("outputs")
-    free = moving(data)
-    falls = len(data.outputs) == 1 and bool(free.runs) and free.falls
-    gain = -1.0 if falls else 1.0
-    found = []
-    for column, span in zip((gain * y).T, data.travel.tolist(), strict=True):
-        far = FAR * (np.ptp(column) if data.spans is None else span)
-        away = column.min() > far or column.max() < 0.0
-        found.append((gain, gain * float(column.min()) if away else 0.0))
-    return found
+FIRST_GRIP, TOWARDS, REFINED = 0.1, 60, 3
+"""Where what is likely begins, relative to the highest pressure; most steps from there to it; times that
+the noise of recordings is found anew."""
+
+OWN_HELPS = 0.1
+"""By how much loads of recordings' own have to lessen errors."""
 
 
-def _side_by_side(parts: Sequence[Block]) -> list[Block]:
-    """Return one block a channel as a part of a series, or none."""
-    if len(parts) < 2:
-        return list(parts)
-    return [PerChannel(tuple(parts))]
+def in_newtons(balance: Balance) -> Balance:
+    """Return a balance of which forces are in the unit of its load, if that is one on one coordinate."""
+    share = abs(balance.loads[0][0]) if np.shape(balance.loads) == (1, 1) else 0.0
+    reach = max(abs(end) for end in np.ravel(balance.hull)) if share else 0.0
+    if not share * reach > 0.0:
+        return balance
+
+    def scaled(table: object) -> Array:
+        return np.array(table, dtype=np.float64) / share
+
+    tables = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
+    single = ("damping", "lines", "bladders", "pushes", "mass")
+    obstacles = np.reshape(balance.obstacles, (-1, 3 + balance.n_schedules)).copy()
+    obstacles[:, 2:] /= share
+    return replace(
+        balance,
+        obstacles=rows(obstacles.reshape(len(balance.obstacles), -1)),
+        **{name: rows(scaled(getattr(balance, name))) for name in tables},
+        **{
+            name: vector(scaled(getattr(balance, name)))
+            for name in single
+            if getattr(balance, name)
+        },
+    )

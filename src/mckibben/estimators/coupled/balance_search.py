@@ -1,39 +1,36 @@
-"""The search for a balance of forces: least squares of its forces, then descent of its free run."""
+"""The search for a balance of forces: which terms it has, and what they are, by its free run.
+
+Terms are found by a forward search on the free run made straight: its slopes by everything that may be
+free, what is not yet included, give by least squares the errors that any choice of terms would leave. A
+choice is judged by blocks of time that are left out: terms are added while the error there falls by more
+than its standard error over blocks. Then Gauss-Newton steps bring the terms chosen to where errors are
+least, within what physics asks.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import polynomial
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import Mask, Run, TrainingData
-from mckibben.estimators.core.uncertainty import inverted
-from mckibben.estimators.coupled.balance_checks import at_rest, held
-from mckibben.estimators.coupled.balance_slopes import run as follow
-from mckibben.estimators.coupled.balance_structure import Structure
+from mckibben.estimators.core.data import Mask
+from mckibben.estimators.coupled.balance_prior import Belief
+from mckibben.estimators.coupled.balance_problem import Problem, bounded_least_squares
+from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
 
-if TYPE_CHECKING:
-    from mckibben.estimators.coupled.balance_prior import Belief
+BLOCKS, FOLDS = 20, 5
+"""About how many blocks all runs are cut into, and in how many parts they are left out in turn."""
 
-MOST_ROWS = 12_000
-"""Errors to learn from; more are thinned evenly."""
+MOST_ADDED = 12
+"""Groups of terms that are added before the free run is made straight anew."""
 
-STRAIGHT = 0.01
-"""What pressures may be off a straight line, relative to the highest."""
-
-WARMING = 0.2
-"""Share of a run that does not begin at rest before which its errors do not count."""
-
-UNLIKELY = 0.03
-"""Error, relative to the range, as bad as a start with all friction loaded, or a range behind."""
-
-MOST_TRIES = 9
+MOST_TRIES = 7
 """Dampings tried for a step, each ten times the last."""
 
 MOST_CUTS = 8
@@ -45,347 +42,337 @@ LIGHTEST = 1e-7
 UNKNOWN = 1e-10
 """Effect of a number's size, relative to the largest of any, that is none."""
 
+FAR, APART = 0.5, 0.7
+"""Change of shape in one step, relative to what is much; least difference of the logarithms of lags."""
 
+SLOW, SLOWEST = 1e-3, 2
+"""Relative gain of a step that is slow, and how many of them end a descent."""
+
+DEVIATIONS = (("areas",), ("elasticity", "bladder"), ("friction",), ("relaxation", "damping"))
+"""Kinds by which muscles may differ, together."""
+
+NEW_SHAPE = ("asymmetry", "grips", "walls", "filling", "dead", "venting")
+"""Shape that is added by itself."""
+
+POSITIVE_SHAPE = ("grip", "grips", "walls", "filling", "dead")
+"""Shape that is not negative."""
+
+
+@dataclass
 class Search:
-    """Coefficients that make the free run follow the recordings.
+    """Numbers z of a structure's terms, and of what recordings and runs have of their own.
 
     Parameters
     ----------
-    data : TrainingData
+    problem : Problem
     structure : Structure
-    ridge : float
-        Damping.
+    active : array of bool
+        Which terms are free; others are what they begin with.
     belief : Belief, optional
-        What is likely before.
     """
 
-    def __init__(
-        self,
-        data: TrainingData,
-        structure: Structure,
-        ridge: float,
-        belief: Belief | None = None,
-    ) -> None:
-        self.data, self.structure, self.ridge, self.belief = data, structure, ridge, belief
-        loads = {channel.name for channel in structure.loaded}
-        order = [i for i, c in enumerate(data.scheduled) if c.name not in loads]
-        order += [i for i, c in enumerate(data.scheduled) if c.name in loads]
-        self.runs = [replace(run, scheduled=run.scheduled[:, order]) for run in data.runs]
-        self.span = data.travel
-        n_rows = sum(len(run.outputs) for run in self.runs) * structure.n
-        self.n_rows = n_rows
-        self.every = max(1, n_rows // MOST_ROWS)
-        self.cuts: list[tuple[Array, Array]] = []
-        self.still = [bool(structure.loaded) and held(data, run) for run in self.runs]
-        self.resting = [at_rest(data, run) for run in self.runs]
-        self.warming = [
-            0.0 if still or resting else WARMING
-            for still, resting in zip(self.still, self.resting, strict=True)
-        ]
+    problem: Problem
+    structure: Structure
+    active: Mask
+    belief: Belief | None = None
 
-    def having(self, data: TrainingData | None = None, **changed: Any) -> Search:
-        """Return the same search over other data of the same ranges, or with a changed structure."""
-        structure = replace(self.structure, **changed) if changed else self.structure
-        found = Search(data or self.data, structure, self.ridge, self.belief)
-        found.span = self.span
-        return found
+    def errors(self, z: Array, wanted: Mask | None = None) -> tuple[Array, Array]:
+        """Return all errors, and the slopes that are wanted, those of the belief last."""
+        parts, slopes = self.problem.errors(self.structure, z, wanted)
+        errors = np.concatenate(parts) if parts else np.zeros(0)
+        if self.belief is None:
+            return errors, slopes
+        far, by = self.belief.errors(self.structure, z)
+        whole = np.zeros((far.size, slopes.shape[1]))
+        whole[:, : by.shape[1]] = by
+        return np.append(errors, far), np.concatenate([slopes, whole]) if len(slopes) else slopes
 
-    def of_few(self, most: int) -> Search:
-        """Return the same search over fewer samples, where there are very many.
-
-        Those are thinned where inputs go straight between them; else recordings are chosen evenly.
-        """
-        total = sum(len(run.outputs) for run in self.runs)
-        if total <= most:
-            return self
-        every = -(-total // most)
-        while not self._straight(every):
-            every //= 2
-        count = max(min(most * every * len(self.runs) // total, len(self.runs)), 1)
-        chosen = np.unique(np.linspace(0, len(self.runs) - 1, count).round().astype(int))
-        runs = tuple(self.data.runs[i].thinned(every) for i in chosen.tolist())
-        found = self.having(replace(self.data, runs=runs))
-        found.cuts = self.cuts
-        return found
-
-    def _straight(self, every: int) -> bool:
-        """Tell whether pressures go straight between every so many samples."""
-        missed = []
-        for run in self.runs:
-            t = np.arange(len(run.driven))
-            for column in run.driven.T:
-                missed.append(np.interp(t, t[::every], column[::every]) - column)
-        return _size(np.concatenate(missed)) <= STRAIGHT * self.structure.highest
-
-    def followed(
-        self, values: Array, place: int, *, held: bool, sloped: bool = True
-    ) -> tuple[Array, Array]:
-        """Return displacements of a run, or forces that are lacking, and their slopes."""
-        structure, run, own = self.structure, self.runs[place], self.structure.own
-        load = own.load(run.recording)
-        if load.size:
-            values = values.copy()
-            values[structure.constants] += values[load]
-        begun, by = own.begun(values, run.place, structure.grip, run.driven[0])
-        if held:
-            begun = begun[:0]
-        found, slopes = follow(
-            structure.block(values).coefficients(run.sample_time or 1.0),
-            np.ascontiguousarray(run.driven),
-            np.ascontiguousarray(run.outputs),
-            np.ascontiguousarray(run.scheduled),
-            held=held,
-            every=self.every,
-            settled=self.still[place] or (held and self.resting[place] and not structure.tare),
-            sloped=sloped,
-            begun=begun,
-        )
-        if structure.size == own.first or not sloped:
-            return found, slopes
-        whole = np.zeros((*slopes.shape[:2], structure.size))
-        whole[..., : own.first] = slopes[..., : own.first]
-        whole[..., load] = slopes[..., structure.constants[: load.size]]
-        if begun.size:
-            whole += slopes[..., own.first :] @ by
-        return found, whole
-
-    def compared(self, run: Run) -> tuple[Array, Mask]:
-        """Return the displacements that are compared, and which of them count."""
-        n = len(run.outputs)
-        kept = np.arange(-(-n // self.every)) * self.every + self.every - 1
-        kept = np.minimum(kept, n - 1)
-        return run.outputs[kept], run.counts[kept]
-
-    def begun(self, grip: float, *, plain: bool = False) -> Array:
-        """Return coefficients that balance the forces where the muscles were.
-
-        ``plain``: by areas that do not change.
-        """
-        structure = self.structure
-        values = structure.start
-        values[structure.grip] = grip
-        found = [self.followed(values, place, held=True)[1] for place in range(len(self.runs))]
-        for run, unsure, of_run in zip(self.runs, self.warming, found, strict=True):
-            of_run[: round(unsure * len(of_run))] = 0.0
-            of_run[~self.compared(run)[1]] = 0.0
-        slopes = np.concatenate(found)
-        slopes[:, :, structure.grip : structure.timing.stop] = 0.0
-        for k in range(structure.n):
-            slopes[:, :, structure.places("wall", k)] = 0.0
-        mix = structure.free(moving=False, plain=plain)
-        base = values.copy()
-        for k in range(structure.n):  # on areas at rest of 1, loads are found instead
-            base[structure.places("loads", k)] = 0.0
-        weights = np.ones((1, structure.n))
-        for _ in range(2):
-            rows = slopes * weights[..., np.newaxis]
-            flat = rows.reshape(-1, rows.shape[2])
-            triangle = _triangle(flat @ mix, -(flat @ base))
-            values = self.solved(triangle, base, mix, np.zeros(mix.shape[1]), self.ridge)
-            weights = 1.0 / self.stiffness(values)
-        if structure.in_newtons:
-            forces = slice(structure.slices["damping"].start, structure.slices["loads"].stop)
-            load = values[structure.places("loads", 0)[0]]
-            values[forces] /= load
-            values[structure.own.first : structure.own.starts] /= load
-        return values
-
-    def slackened(self, values: Array, share: float) -> Array:
-        """Return coefficients by which muscles go slack at a share of the most they resist with."""
-        structure, values = self.structure, values.copy()
-        for k in range(structure.n):
-            springs = values[structure.places("springs", k)].reshape(-1, 1 + structure.n)
-            most = 0.0
-            for run in self.runs:
-                x, loads = np.split(run.scheduled, [len(structure.scheduled)], axis=1)
-                around = np.column_stack([np.ones(len(x)), run.outputs])
-                pulled = ((structure.powers(x.T).T @ springs) * around).sum(axis=1)
-                pulled += loads @ values[structure.places("loads", k)]
-                most = max(most, -float(pulled.min()))
-            values[structure.places("push", k)] = share * most
-        return values
-
-    def stiffness(self, values: Array) -> Array:
-        """Return how stiff every muscle is at every sample kept, shape (samples, n)."""
-        structure, found = self.structure, []
-        for run in self.runs:
-            y = self.compared(run)[0]
-            u = y / structure.scale
-            x = run.scheduled[:: self.every, : len(structure.scheduled)]
-            p = run.driven[:: self.every]
-            powers = structure.powers(x.T)
-            own = np.empty_like(u)
-            for k in range(structure.n):
-                springs = values[structure.places("springs", k)].reshape(-1, 1 + structure.n)
-                elastic = values[structure.places("elasticity", k)]
-                areas = values[structure.places("areas", k)]
-                slope = polynomial.polyder([0.0, 0.0, *elastic]) / structure.scale
-                narrowing = polynomial.polyder(areas) / structure.scale
-                own[:, k] = springs[:, 1 + k] @ powers + polynomial.polyval(u[:, k], slope)
-                own[:, k] -= p[:, k] * polynomial.polyval(u[:, k], narrowing)
-                own[:, k] += values[structure.places("bladder", k)[0]]
-                own[:, k] += 0.3 * values[structure.places("friction", k)].sum()
-            found.append(own)
-        table = np.concatenate(found)
-        return np.maximum(table, 0.1 * np.median(np.abs(table), axis=0))
-
-    def solved(
-        self, triangle: Array, base: Array, mix: Array, prior: Array, damping: float
-    ) -> Array:
-        """Return coefficients base + mix free with the least |slopes free - target| physics allows.
-
-        ``triangle`` is that of slopes and target. Damped towards ``prior``, by every number's own
-        effect, so that units do not matter; where it has none it stays. Springs are made stiff where
-        they were found soft.
-        """
-        structure = self.structure
-        size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
-        effect = size * (mix.T @ structure.sizes(base + mix @ prior)) / mix.sum(axis=0)
-        known = effect > UNKNOWN * effect.max()
-        base = base + mix[:, ~known] @ prior[~known]
-        triangle = triangle[:, np.append(known, True)]
-        mix, prior, size = mix[:, known], prior[known], size[known]
-        held = np.maximum(np.sqrt(damping), LIGHTEST) * size
-        system = np.vstack([triangle[:, :-1], np.diag(held)])
-        right = np.concatenate([triangle[:, -1], held * prior])
-        sides, least = structure.conditions(base + mix @ prior)
-        stiff = float(least[-1])
-        for _ in range(MOST_CUTS):
-            softened = [structure.spring_condition(x, way, stiff) for x, way in self.cuts]
-            all_sides = np.vstack([sides, *(row for row, _ in softened)])
-            all_least = np.append(least, [bound for _, bound in softened])
-            on_free, missing = all_sides @ mix, all_least - all_sides @ base
-            asks = (on_free != 0).any(axis=1)  # not only of what stays
-            free, _ = constrained_least_squares(system, right, on_free[asks], missing[asks])
-            values = base + mix @ free
-            x, way, softest = structure.softest(values)
-            if softest >= 0.5 * stiff:
-                break
-            self.cuts.append((x, way))
-        return values
-
-    def missed(
-        self, values: Array, place: int, *, sloped: bool = True, whole: bool = False
-    ) -> tuple[Array, Array]:
-        """Return the errors over a run relative to the ranges, and their slopes by coefficients.
-
-        Of a run that begins in an unknown state, that is not found, the first part does not count, until
-        it has forgotten, but where the ``whole`` is asked for.
-        """
-        still, (measured, counts) = self.still[place], self.compared(self.runs[place])
-        found, by = self.followed(values, place, held=still, sloped=sloped)
-        if still:
-            areas = [values[self.structure.places("areas", k)[0]] for k in range(self.structure.n)]
-            scale = 1.0 / (np.array(areas) * self.structure.highest)
-        else:
-            found = found - measured
-            scale = 1.0 / self.span
-        known = whole or self.structure.settled or self.structure.n_starts
-        unsure = 0.0 if known else self.warming[place]
-        counts &= np.arange(len(found)) >= unsure * len(found)
-        weights = scale * counts[:, np.newaxis]
-        by *= weights[..., np.newaxis]
-        return (found * weights).ravel(), by.reshape(found.size, by.shape[2])
-
-    def unlikely(self, values: Array) -> tuple[Array, Array]:
-        """Return how far from rest the starts of runs are, as errors and slopes."""
-        structure = self.structure
-        places = np.arange(structure.own.starts, structure.size)
-        scale = np.full((structure.n_starts, structure.n, 1 + structure.lags.size), UNLIKELY)
-        scale[:, :, 1:] /= self.span[:, np.newaxis]
-        slopes = np.zeros((places.size, structure.size))
-        slopes[np.arange(places.size), places] = scale.ravel()
-        return scale.ravel() * values[places], slopes
-
-    def errors(
-        self, values: Array, *, sloped: bool = True, whole: bool = False
-    ) -> tuple[Array, Array]:
-        """Return the errors over all runs, and their slopes, of no columns if not wanted."""
-        of_runs = [
-            self.missed(values, place, sloped=sloped, whole=whole)
-            for place in range(len(self.runs))
-        ]
-        if self.structure.n_starts:
-            far, by = self.unlikely(values)
-            of_runs.append((far, by if sloped else by[:, :0]))
-        if self.belief is not None:
-            far, by = self.belief.errors(self.structure, values)
-            of_runs.append((far, by if sloped else by[:, :0]))
-        errors, slopes = zip(*of_runs, strict=True)
-        return np.concatenate(errors), np.concatenate(slopes)
-
-    def covariance(self, values: Array) -> tuple[float, Array]:
-        """Return the condition of what is free, and the covariance of all coefficients.
-
-        As if errors were independent; NaN of what is fixed, or what the runs do not determine.
-        """
-        mix = self.structure.free(moving=True)
-        if not self.structure.slack:  # bladders cannot be told from springs
-            bladders = [
-                int(self.structure.places("bladder", k)[0]) for k in range(self.structure.n)
-            ]
-            mix = mix[:, ~mix[bladders].any(axis=0)]
-        errors, slopes = self.errors(values)
-        moving = slopes @ mix
-        size = np.maximum(np.sqrt((moving**2).sum(axis=0)), 1e-300)
-        condition, own = inverted(moving / size)
-        n_free = errors.size * self.every - mix.shape[1]
-        # of all samples, of which some are looked at
-        variance = float(errors @ errors) / max(n_free, 1)
-        scaled = mix / size
-        told = np.isfinite(np.diag(own))
-        covariance = variance * scaled[:, told] @ own[np.ix_(told, told)] @ scaled[:, told].T
-        lost = ~mix.any(axis=1) | mix[:, ~told].any(axis=1)
-        covariance[lost] = covariance[:, lost] = np.nan
-        return condition, covariance
-
-    def cost(self, values: Array, *, whole: bool = False) -> float:
-        """Return the root mean square of the errors, or of those over ``whole`` runs."""
-        found = _size(self.errors(values, sloped=False, whole=whole)[0])
+    def cost(self, z: Array) -> float:
+        """Return the root mean square of the errors."""
+        found = _size(self.errors(z)[0])
         return found if np.isfinite(found) else np.inf
 
-    def descend(self, values: Array, steps: int, tracker: Tracker, *, first: bool = False) -> None:
-        """Show a tracker ever better coefficients; at ``first`` walls and lags stay what they are."""
-        mix = self.structure.free(moving=True, first=first)
-        damping = 1e-3
-        errors, slopes = self.errors(values)
+    @property
+    def free(self) -> NDArray[np.intp]:
+        """Places of what is found."""
+        rest = self.problem.size(self.structure) - self.active.size
+        return np.flatnonzero(np.append(self.active, np.ones(rest, dtype=bool)))
+
+    # -- descent ---------------------------------------------------------------------------------
+
+    def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
+        """Show a tracker ever better numbers, and return the best."""
+        damping, slow = 1e-3, 0
+        errors, slopes = self.errors(z, self.active)
         cost = _size(errors)
-        slow = 0
+        tracker.saw(z, cost)
         for _ in range(steps):
-            moving = slopes @ mix
-            usable = np.isfinite(moving).all(axis=1)
-            now = mix.T @ values / mix.sum(axis=0)
-            base = values - mix @ now
-            moving, errors = moving[usable], errors[usable]
-            triangle = _triangle(moving, moving @ now - errors)
-            for number in range(MOST_TRIES):
+            usable = np.isfinite(slopes).all(axis=1) & np.isfinite(errors)
+            moving = slopes[usable][:, self.free]
+            target = moving @ z[self.free] - errors[usable]
+            triangle = np.linalg.qr(np.column_stack([moving, target]), mode="r")
+            for _ in range(MOST_TRIES):
                 try:
-                    tried = self.solved(triangle, base, mix, now, damping)
+                    tried = self._solved(triangle, z, damping)
+                    found = self.cost(tried)
                 except ModelError:
-                    damping = max(10.0 * damping, 1e-9)
-                    continue
-                # most first tries are good, so that slopes are found at once
-                errors, slopes = self.errors(tried, sloped=number == 0)
-                found = _size(errors)
+                    found = np.inf
                 if found < cost:
-                    if number:
-                        errors, slopes = self.errors(tried)
                     break
                 damping = max(10.0 * damping, 1e-9)
             else:
-                return
-            gained = (cost - found) / cost
-            values, cost = tried, found
-            tracker.saw(values, cost)
+                return z
+            slow = slow + 1 if found > (1.0 - SLOW) * cost else 0
+            z, cost = tried, found
+            tracker.saw(z, cost)
+            if slow >= SLOWEST:
+                return z
             damping = max(damping / 5.0, LIGHTEST**2)
-            slow = slow + 1 if gained < 1e-3 else 0
-            if slow >= 3:
-                return
+            errors, slopes = self.errors(z, self.active)
+        return z
+
+    def _solved(self, triangle: Array, z: Array, damping: float) -> Array:
+        """Return numbers with the least errors, were these straight, that physics allows.
+
+        ``triangle`` is that of slopes and target. Damped towards what they are, by every number's own
+        effect, so that units do not matter; where it has none it stays. Springs are made stiff where
+        they were found soft.
+        """
+        structure, free = self.structure, self.free
+        n, n_terms = structure.mix.shape[1], len(structure.terms)
+        sizes = np.append(structure.scales(), np.ones(z.size - n_terms))[free]
+        size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
+        known = size * sizes > UNKNOWN * (size * sizes).max()
+        free, size, reduced = free[known], size[known], triangle[:, np.append(known, True)]
+        held = np.maximum(np.sqrt(damping), LIGHTEST) * size
+        reduced[:, -1] -= triangle[:, :-1][:, ~known] @ z[self.free[~known]]
+        system = np.vstack([reduced[:, :-1], np.diag(held)])
+        right = np.append(reduced[:, -1], held * z[free])
+        sides, least = self._conditions(z)
+        tried = z.copy()
+        for _ in range(MOST_CUTS):
+            others = np.ones(z.size, dtype=bool)
+            others[free] = False
+            missing = least - sides[:, others] @ z[others]
+            asks = (sides[:, free] != 0).any(axis=1)  # not only of what stays
+            tried[free] = constrained_least_squares(
+                system, right, sides[asks][:, free], missing[asks]
+            )[0]
+            linear = structure.base + structure.mix @ tried[:n]
+            side, softest = structure.softest(linear)
+            if softest >= 0.5 * structure.least_stiffness:
+                break
+            sides = np.vstack([sides, np.append(side @ structure.mix, np.zeros(z.size - n))])
+            least = np.append(least, structure.least_stiffness - side @ structure.base)
+        return tried
+
+    def _conditions(self, z: Array) -> tuple[Array, Array]:
+        """Return what is asked of all numbers: sides @ z >= least."""
+        structure = self.structure
+        n, n_terms = structure.mix.shape[1], len(structure.terms)
+        sides, least = structure.conditions(structure.expanded(z[:n_terms]))
+        on_all = np.zeros((len(sides), z.size))
+        on_all[:, :n] = sides @ structure.mix
+        low, high, much = structure.ends()
+        box, shape = np.eye(z.size)[n:n_terms], z[n:n_terms]
+        bounds = np.append(
+            np.maximum(low, shape - FAR * much), -np.minimum(high, shape + FAR * much)
+        )
+        lags = [
+            i for i, term in enumerate(structure.terms) if term.kind == "lags" and self.active[i]
+        ]
+        apart = np.array(
+            [np.eye(z.size)[j] - np.eye(z.size)[i] for i, j in zip(lags, lags[1:], strict=False)]
+        )
+        starts = np.eye(z.size)[z.size - self._n_starts :: 1 + len(structure.lags)]
+        every = [on_all, box, -box, apart.reshape(-1, z.size), starts, -starts]
+        asked = [least - sides @ structure.base, bounds, np.full(len(apart), APART)]
+        asked.append(np.full(2 * len(starts), -1.0))
+        return np.concatenate(every), np.concatenate(asked)
+
+    @property
+    def _n_starts(self) -> int:
+        own = len(self.structure.bench.unmeasured) * self.structure.m
+        return self.problem.size(self.structure) - len(self.structure.terms) - own
+
+    # -- choice ----------------------------------------------------------------------------------
+
+    def chosen(self, z: Array, tried: Mask) -> tuple[Mask, Array]:
+        """Return which terms are free after a forward search, of those ``tried``, and where to go on.
+
+        New shape begins where least squares have it.
+        """
+        structure, n = self.structure, len(self.structure.terms)
+        new = np.array([term.kind in NEW_SHAPE for term in structure.terms]) & ~self.active
+        grams = self._grams(z, (tried & new) | self.active, new)
+        bounded = self._bounded(z.size)
+        active = self.active.copy()
+
+        def missed(free: Mask) -> Array:
+            return _left_out(grams, np.append(free, np.ones(z.size - n, dtype=bool)), z, bounded)
+
+        best = missed(active)
+        for _ in range(MOST_ADDED):
+            options = [
+                active | more for more in self._candidates(active) if not (more & ~tried).any()
+            ]
+            errors = [missed(option) for option in options]
+            first = int(np.argmin([one.sum() for one in errors])) if errors else 0
+            gain = best - errors[first] if errors else np.zeros(1)
+            if not gain.sum() > np.sqrt(gain.size) * gain.std():
+                break
+            active, best = options[first], errors[first]
+        free = np.append(active, np.ones(z.size - n, dtype=bool))
+        whole = _reduced(grams.sum(axis=0)[np.newaxis], free, z)[0]
+        solution, found = z.copy(), z.copy()
+        solution[free] = bounded_least_squares(whole, bounded[free])
+        low, high, much = structure.ends()
+        shape = slice(structure.mix.shape[1], n)
+        near = np.clip(
+            solution[shape], np.maximum(low, z[shape] - much), np.minimum(high, z[shape] + much)
+        )
+        found[shape] = np.where((active & new)[shape], near, z[shape])
+        return active, found
+
+    def improved(self, z: Array, other: Search, found: Array, by: float = 0.0) -> bool:
+        """Tell whether another search has less error, by more than its standard error over blocks."""
+        before, after = self._by_block(z), other._by_block(found)
+        gain = before - after
+        least = max(np.sqrt(gain.size) * gain.std(), (1.0 - (1.0 - by) ** 2) * before.sum())
+        return bool(gain.sum() > least)
+
+    def _by_block(self, z: Array) -> Array:
+        """Return the squared errors by block of time."""
+        parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
+        return np.array([float(block @ block) for part in _blocks(parts) for block in part])
+
+    def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> Array:
+        """Return the products of all slopes and of their target, by block of time."""
+        parts, slopes = self.problem.errors(self.structure, z, wanted, new)
+        parts = parts[: len(self.problem.runs)]  # without what is likely of starts
+        slopes = slopes[: sum(part.size for part in parts)]
+        table = np.column_stack([slopes, slopes @ z - np.concatenate(parts)])
+        table[~np.isfinite(table).all(axis=1)] = 0.0
+        ends = np.cumsum([part.size for part in parts])[:-1]
+        blocks = [block for part in _blocks(np.split(table, ends)) for block in part]
+        return np.array([block.T @ block for block in blocks])
+
+    def _bounded(self, size: int) -> Mask:
+        """Return which of all numbers are not negative."""
+        bounded = np.zeros(size, dtype=bool)
+        bounded[: self.structure.mix.shape[1]] = (
+            self.structure.not_negative @ self.structure.mix > 0
+        )
+        for place, term in enumerate(self.structure.terms):
+            shaped = term.kind in POSITIVE_SHAPE
+            bounded[place] = (bounded[place] or shaped) and term.muscle is None
+        return bounded
+
+    def without_folds(self, z: Array) -> list[Array]:
+        """Return what would be found without each part of the runs, were the free run straight."""
+        grams, bounded = self._grams(z, self.active), self._bounded(z.size)
+        free = np.zeros(z.size, dtype=bool)
+        free[self.free] = True
+        parts, folds = _reduced(grams, free, z), np.arange(len(grams)) * FOLDS // len(grams)
+        whole = bounded_least_squares(parts.sum(axis=0), bounded[free])
+        found = []
+        for fold in np.unique(folds):
+            moved = z.copy()
+            moved[free] += (
+                bounded_least_squares(parts[folds != fold].sum(axis=0), bounded[free]) - whole
+            )
+            low, high, _ = self.structure.ends()
+            n = self.structure.mix.shape[1]
+            moved[n : n + low.size] = np.clip(moved[n : n + low.size], low, high)
+            found.append(moved)
+        return found
+
+    def _candidates(self, active: Mask) -> Iterator[Mask]:
+        """Yield groups of terms that may be added to those that are active."""
+        terms = self.structure.terms
+
+        def group(*wanted: Term) -> Mask:
+            return np.array([term in wanted for term in terms])
+
+        on = {(term.kind, term.which) for term, there in zip(terms, active, strict=True) if there}
+        own = {
+            term.kind for term, there in zip(terms, active, strict=True) if there and term.muscle
+        }
+        for kind in ("elasticity", "areas"):
+            known = [which for name, which in on if name == kind]
+            following = max(known, default=0) + 1
+            for more in range(1, 3):
+                whole = range(following, following + more)
+                yield group(*self._with_own(kind, whole, own))
+        for kind in ("friction", "relaxation", "line", "mass"):
+            for which in {term.which for term in terms if term.kind == kind} - {
+                w for k, w in on if k == kind
+            }:
+                yield group(Term("lags", which), *self._with_own(kind, (which,), own)) & ~(
+                    group(Term("lags", which))
+                    if kind != "relaxation"
+                    else np.zeros(len(terms), dtype=bool)
+                )
+        met = {self.structure.obstacles[which][0] for kind, which in on if kind == "obstacle"}
+        for which, (side, _) in enumerate(self.structure.obstacles):
+            if side not in met:
+                places = [
+                    which + j * len(self.structure.obstacles) for j in range(self.structure.m)
+                ]
+                yield group(Term("obstacle", which), *(Term("places", place) for place in places))
+        for which in {w for k, w in ((t.kind, t.which) for t in terms) if k == "springs"}:
+            if ("springs", which) not in on:
+                yield group(Term("springs", which))
+        for which in range(len(self.structure.bench.scheduled)):
+            if ("grips", which) not in on:
+                yield group(Term("grips", which))
+        for kind in ("asymmetry", "walls", "filling", "dead", "venting"):
+            if (kind, 0) not in on and (kind != "venting" or ("filling", 0) in on):
+                yield group(Term(kind))
+        for kinds in DEVIATIONS if self.structure.n > 1 else ():
+            if not own & set(kinds):
+                whiches = [(kind, which) for kind, which in on if kind in kinds]
+                whiches += [("areas", 0)] if "areas" in kinds else []
+                yield group(*(Term(*one, k) for one in whiches for k in range(1, self.structure.n)))
+
+    def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
+        """Return terms of a kind, and those by which muscles differ if they do."""
+        muscles = [None, *(range(1, self.structure.n) if kind in own else ())]
+        return [Term(kind, which, muscle) for which in whiches for muscle in muscles]
 
 
-def _triangle(slopes: Array, target: Array) -> Array:
-    """Return the triangle that has all that least squares of slopes and target ask of both."""
-    return np.linalg.qr(np.column_stack([slopes, target]), mode="r")  # type: ignore[return-value]
+def _blocks(parts: list[Array]) -> list[list[Array]]:
+    """Return the blocks of time of every run."""
+    total = sum(len(part) for part in parts)
+    return [np.array_split(part, max(1, round(BLOCKS * len(part) / total))) for part in parts]
+
+
+def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask) -> Array:
+    """Return the squared errors of every block by what least squares of the others find.
+
+    ``grams`` are products of slopes and target by block; what is not free is as it is.
+    """
+    parts = _reduced(grams, free, z)
+    folds = np.arange(len(grams)) * FOLDS // len(grams)
+    whole, errors = parts.sum(axis=0), np.zeros(len(grams))
+    for fold in np.unique(folds):
+        out = folds == fold
+        rest = whole - parts[out].sum(axis=0) if not out.all() else whole
+        theta = np.append(bounded_least_squares(rest, bounded[free]), -1.0)
+        errors[out] = np.einsum("i,bij,j->b", theta, parts[out], theta)
+    return errors
+
+
+def _reduced(grams: Array, free: Mask, z: Array) -> Array:
+    """Return products of the slopes of what is free and of the target less what is fixed."""
+    fixed = np.flatnonzero(~free)
+    keep = np.append(np.flatnonzero(free), grams.shape[1] - 1)
+    parts = grams[:, keep][:, :, keep].copy()
+    known = grams[:, :, fixed] @ z[fixed]
+    parts[:, :, -1] -= known[:, keep]
+    parts[:, -1, :-1] -= known[:, keep[:-1]]
+    parts[:, -1, -1] += known[:, fixed] @ z[fixed] - known[:, -1]
+    return parts
 
 
 def _size(errors: Array) -> float:

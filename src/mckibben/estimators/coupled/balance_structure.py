@@ -1,425 +1,559 @@
-"""What of a balance of forces is fixed, what is free, and what physics asks of it.
+"""The terms that a balance of forces may have, as numbers to find, and what physics asks of them.
 
-Coefficients are those of the block, muscle by muscle, then the grip and the lags' logarithms, then what
-recordings and runs have of their own (`mckibben.estimators.coupled.balance_own`). What is
-free is fewer numbers, of which they are an affine function: springs between two muscles are one number.
-Every muscle has a spring of its own, which makes up for elasticity and area that soften; of muscles that
-do not go slack nothing tells it from the others, to which it is added in the end.
+Values are the linear coefficients of the block, in the order of `mckibben.blocks.coupled.balance_law`
+from those of the first coordinate on, then its shape: what is not linear. What is free is fewer numbers,
+of which the linear ones are an affine function: springs between two coordinates are one number, and
+muscles share theirs, from which each may differ. One number sets the unit of force: the area of muscle 1
+at rest is 1.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_law import NEVER
+from mckibben.blocks.coupled.balance_law import NEVER, OWN
 from mckibben.blocks.fields import Channel, rows, vector
-from mckibben.estimators.coupled.balance_own import Own
+
+Places = NDArray[np.intp]
 
 GRID = 21
-"""Places along what is known of every muscle's displacement where conditions are asked for."""
+"""Places along what is known of every muscle's shortening where conditions are asked for."""
 
 LEAST_LEFT = 0.05
 """Area that friction has to leave, relative to that at rest."""
 
-MOST_LONGER, APART = 0.5, 0.7
-"""Logarithms by which a lag may become longer or shorter at once, and by which lags differ."""
-
-LEAST_PULL = 1e-3
-"""Pull of the heaviest load, over that of the highest pressure on the area at rest, that is none."""
-
 LEAST_STIFF = 1e-3
 """Stiffness that has to be left, relative to the force of the highest pressure over the stroke."""
 
+MOST_ASYMMETRIC, MOST_GRIP, MOST_WALL = 5.0, 4.0, 0.1
+"""Bounds of the ratio of limits; of the grip, over the highest pressure; of the wall's stretch by that
+pressure, over the stroke."""
+
+LONGEST_AIR = 2.0
+"""Time constant of air in front [s]."""
+
 
 @dataclass(frozen=True)
-class Structure:
-    """Sizes and settings of a balance.
+class Bench:
+    """What the recordings settle before anything is found.
 
     Parameters
     ----------
     driven, scheduled, loaded, given : tuple of Channel
-        Displacements, what schedules, loads, and pressures.
-    degree, n_elastic, n_area : int
-        Highest power of what schedules; elastic terms; area's terms.
-    limits, lags : arrays
-        [mm/bar], [s].
+        Coordinates, what schedules, loads, and pressures.
+    directions : array, shape (n, m)
+        Shortening of every muscle by coordinates.
     hull : array, shape (n, 2)
-        Displacements known [mm].
-    scheduled_hull : array, shape (s, 2)
+        Shortenings known [mm].
+    lowest, travel : array, shape (m,)
+        Lowest value and range of every coordinate.
+    levels : array, shape (s, 2)
         What schedules, lowest and highest.
-    highest : float
-        Pressure [bar].
-    heaviest : float
-        Largest load; 1 without one.
+    highest, heaviest : float
+        Pressure [bar]; load, 1 without one.
+    preload : float
+        Mean pressure [bar].
     tare : bool
-        Whether displacements count from rest at the start.
-    slack : bool
-        Whether muscles can go slack.
+        Whether coordinates count from rest at the start.
     lag_range : (float, float)
         Shortest and longest time constant that the recordings can tell [s].
-    settled : bool
-        Whether muscles had long been where every recording begins.
-    mass : bool
-        Whether what moves is heavy.
+    step : float
+        Shortest sample time [s]; 0 without time.
+    of_force : bool
+        Whether errors of the one load count, not those of coordinates: then it sets the unit of force.
+    curved : bool
+        Whether all that schedules has been at three levels or more.
     unmeasured : tuple of int
-        Recordings that hung under constant loads of their own, which are found too.
-    n_starts : int
-        Runs whose memories at the start are found too: all, or none.
+        Recordings under constant loads of their own, which are found too.
     """
 
     driven: tuple[Channel, ...]
     scheduled: tuple[Channel, ...]
     loaded: tuple[Channel, ...]
     given: tuple[Channel, ...]
-    degree: int
-    n_elastic: int
-    n_area: int
-    limits: Array
-    lags: Array
+    directions: Array
     hull: Array
-    scheduled_hull: Array
+    lowest: Array
+    travel: Array
+    levels: Array
     highest: float
     heaviest: float
+    preload: float
     tare: bool
-    slack: bool
     lag_range: tuple[float, float]
-    settled: bool = False
-    mass: bool = False
+    step: float
+    of_force: bool = False
+    curved: bool = True
     unmeasured: tuple[int, ...] = ()
-    n_starts: int = 0
+
+    @property
+    def directed(self) -> bool:
+        """Whether muscles shorten along directions, not each by a coordinate of its own."""
+        n, m = self.directions.shape
+        return n != m or not bool((self.directions == np.eye(n)).all())
+
+    @property
+    def unit(self) -> float:
+        """Area that is about that of a muscle."""
+        return self.heaviest / self.highest if self.of_force else 1.0
+
+    @property
+    def scale(self) -> float:
+        """Largest shortening known [mm]."""
+        return float(np.abs(self.hull).max())
+
+    @property
+    def stroke(self) -> float:
+        """Largest range of a shortening known [mm]."""
+        return float(np.ptp(self.hull, axis=1).max())
+
+    def corners(self) -> list[Array]:
+        """Return what schedules, at all its ends and between."""
+        low, high = self.levels.T if len(self.levels) else (np.zeros(0), np.zeros(0))
+        return [low + np.array(s) * (high - low) for s in product((0.0, 0.5, 1.0), repeat=len(low))]
+
+
+class Term(NamedTuple):
+    """A number that is free: its kind, which of that kind, and of which muscle alone, if of one."""
+
+    kind: str
+    which: int = 0
+    muscle: int | None = None
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Sizes of a balance, and what of it is free.
+
+    Parameters
+    ----------
+    bench : Bench
+    n_elastic, n_area : int
+        Elastic terms from the square on; terms of the area, the constant one included.
+    limits, lags : tuple of float
+        Travels at which stops break away [mm/bar]; time constants to begin with [s].
+    obstacles : tuple of (int, float)
+        Side, 1 or -1, and place along the range of every coordinate, from 0 to 1, to begin with.
+    degree : int
+        Highest power of what schedules.
+    settled : bool
+        Whether muscles had long been where every recording begins.
+    """
+
+    bench: Bench
+    n_elastic: int
+    n_area: int
+    limits: tuple[float, ...]
+    lags: tuple[float, ...]
+    obstacles: tuple[tuple[int, float], ...] = ()
+    degree: int = 1
+    settled: bool = False
+
+    # -- where things are ------------------------------------------------------------------------
 
     @property
     def n(self) -> int:
         """Muscles."""
-        return len(self.driven)
+        return len(self.bench.given)
 
     @property
-    def scale(self) -> float:
-        """Largest displacement known [mm]."""
-        return float(np.abs(self.hull).max())
+    def m(self) -> int:
+        """Coordinates."""
+        return len(self.bench.driven)
+
+    @property
+    def n_stops(self) -> int:
+        """Stops of every muscle."""
+        return len(self.limits)
+
+    @property
+    def n_lags(self) -> int:
+        """Time constants."""
+        return len(self.lags)
 
     @cached_property
-    def slices(self) -> dict[str, slice]:
-        """Where the coefficients of a muscle are."""
+    def _coordinate(self) -> dict[str, slice]:
+        n_x = len(self.bench.scheduled)
+        springs = (1 + n_x * self.degree) * (1 + self.m)
+        loads = len(self.bench.loaded)
+        return _slices({"springs": springs, "loads": loads, "met": len(self.obstacles) * (3 + n_x)})
+
+    @cached_property
+    def _muscle(self) -> dict[str, slice]:
+        widths = {"own": OWN + self.m, "damping": 1, "line": 1, "mass": 1, "bladder": 1}
+        widths |= {"elasticity": self.n_elastic, "areas": self.n_area}
+        return _slices(widths | {"friction": len(self.limits), "relaxation": len(self.lags)})
+
+    def on(self, name: str, j: int) -> Places:
+        """Return the places of coefficients of a coordinate among all."""
+        part, width = self._coordinate[name], self._coordinate["met"].stop
+        return np.arange(part.start, part.stop) + j * width
+
+    def of(self, name: str, k: int) -> Places:
+        """Return the places of coefficients of a muscle among all."""
+        part, width = self._muscle[name], self._muscle["relaxation"].stop
+        return np.arange(part.start, part.stop) + k * width + self.m * self._coordinate["met"].stop
+
+    @cached_property
+    def n_linear(self) -> int:
+        """How many linear coefficients there are, with what stands between them."""
+        return self.n * self._muscle["relaxation"].stop + self.m * self._coordinate["met"].stop
+
+    def spring(self, q: int, j: int, i: int) -> int:
+        """Return the place of a spring of coordinate j to i, or, of i = -1, of its constant."""
+        return int(self.on("springs", j)[q * (1 + self.m) + 1 + i])
+
+    @cached_property
+    def shape(self) -> dict[str, slice]:
+        """Where the shape is, behind the linear coefficients.
+
+        The grip [bar]; what friction grows with by schedules; the logarithms of the ratio of limits and
+        of the lags; stretch of walls [mm/bar], the force at which muscles go slack, places of obstacles;
+        time constants of air in front, while filling [s], the logarithm of the ratio of venting, and the
+        dead zone [bar].
+        """
         widths = {
-            "hull": 2,
-            "wall": 1,
-            "push": 1,
-            "damping": 1,
-            "line": 1,
-            "bladder": 1,
-            "mass": 1,
-            "springs": (1 + len(self.scheduled) * self.degree) * (1 + self.n),
-            "elasticity": self.n_elastic,
-            "areas": self.n_area,
-            "friction": self.limits.size,
-            "relaxation": self.lags.size,
-            "loads": len(self.loaded),
+            "grip": 1,
+            "grips": len(self.bench.scheduled),
+            "asymmetry": 1,
+            "lags": len(self.lags),
         }
-        ends = np.cumsum([0, *widths.values()]).tolist()
+        widths |= {"walls": 1, "pushes": 1, "places": self.m * len(self.obstacles)}
+        widths |= {"filling": 1, "venting": 1, "dead": 1}
         return {
-            name: slice(first, last)
-            for name, first, last in zip(widths, ends[:-1], ends[1:], strict=True)
+            k: slice(p.start + self.n_linear, p.stop + self.n_linear)
+            for k, p in _slices(widths).items()
         }
-
-    @property
-    def width(self) -> int:
-        """Coefficients of a muscle."""
-        return self.slices["loads"].stop
-
-    def places(self, name: str, k: int) -> NDArray[np.intp]:
-        """Return where coefficients of a muscle are among all."""
-        part = self.slices[name]
-        return np.arange(part.start, part.stop) + k * self.width
-
-    @property
-    def grip(self) -> int:
-        """Place of the grip among coefficients; those of the lags follow."""
-        return self.n * self.width
-
-    @property
-    def timing(self) -> slice:
-        """Places of the lags' logarithms."""
-        return slice(self.grip + 1, self.grip + 1 + self.lags.size)
-
-    @cached_property
-    def own(self) -> Own:
-        """Places of what recordings and runs have of their own."""
-        n_lags, first = self.lags.size, self.timing.stop
-        return Own(first, self.n, n_lags, self.limits, self.unmeasured, self.n_starts)
 
     @property
     def size(self) -> int:
-        """How many coefficients there are."""
-        return self.own.stop
+        """How many values there are."""
+        return self.shape["dead"].stop
 
-    @property
-    def constants(self) -> NDArray[np.intp]:
-        """Places of the muscles' constant forces."""
-        return np.array([self._spring(0, k, -1) for k in range(self.n)])
+    def shaped(self, values: Array, name: str) -> Array:
+        """Return the numbers of a kind of shape."""
+        found = values[self.shape[name]]
+        return np.exp(found) if name in LOGARITHMIC else found
 
-    @property
-    def start(self) -> Array:
-        """Coefficients that are not found by least squares: areas at rest or loads 1, all others 0."""
-        values = np.zeros(self.size)
-        values[self.timing] = np.log(self.lags)
-        for k in range(self.n):
-            values[self.places("push", k)] = NEVER
-            values[self.places("hull", k)] = self.hull[k]
-            values[self.places("areas", k)[0]] = 1.0
-            values[self.places("loads", k)] = 1.0
-        return values
+    # -- what is free ----------------------------------------------------------------------------
 
-    def block(self, values: Array, pressure_range: tuple[float, float] | None = None) -> Balance:
-        """Return the balance of some coefficients."""
-        table = values[: self.grip].reshape(self.n, self.width)
-        part = {name: table[:, place] for name, place in self.slices.items()}
-        springs, bladders = part["springs"].copy(), np.maximum(part["bladder"][:, 0], 0.0)
-        if not self.slack:
-            for k in range(self.n):
-                springs[k, 1 + k] += bladders[k]
-        return Balance(
-            springs=rows(springs),
-            elasticity=rows(part["elasticity"]),
-            areas=rows(part["areas"]),
-            friction=rows(np.maximum(part["friction"], 0.0)),
-            relaxation=rows(np.maximum(part["relaxation"], 0.0)),
-            loads=rows(part["loads"]),
-            damping=vector(np.maximum(part["damping"][:, 0], 0.0)),
-            lines=vector(np.maximum(part["line"][:, 0], 0.0)),
-            walls=vector(np.maximum(part["wall"][:, 0], 0.0)),
-            bladders=vector(bladders) if self.slack else (),
-            pushes=vector(np.maximum(part["push"][:, 0], 0.0)) if self.slack else (),
-            limits=vector(self.limits),
-            grip=float(max(values[self.grip], 0.0)),
-            lags=vector(np.clip(np.exp(values[self.timing]), *self.lag_range)),
-            hull=rows(part["hull"]),
-            scale=self.scale,
-            degree=self.degree,
-            driven=self.driven,
-            scheduled=(*self.scheduled, *self.loaded),
-            given=self.given,
-            tare=self.tare,
-            settled=self.settled,
-            pressure_range=pressure_range,
-            mass=vector(np.maximum(part["mass"][:, 0], 0.0)) if self.mass else (),
-        )
+    @cached_property
+    def _columns(self) -> list[tuple[Term, list[int]]]:
+        """Every linear number that may be free, and the places of the coefficients that are it."""
+        found: list[tuple[Term, list[int]]] = []
+        for q, j in product(range(1 + len(self.bench.scheduled) * self.degree), range(self.m)):
+            if q or not self.bench.tare:  # coordinates from rest make a constant of their own
+                found.append((Term("springs", q), [self.spring(q, j, -1)]))
+            for i in range(j, self.m):
+                found.append(
+                    (Term("springs", q), sorted({self.spring(q, j, i), self.spring(q, i, j)}))
+                )
+        for j in range(self.m):
+            if not self.bench.of_force:
+                found += [(Term("loads", j), [place]) for place in self.on("loads", j).tolist()]
+            table = self.on("met", j).reshape(len(self.obstacles), 3 + len(self.bench.scheduled))
+            for number, stiffnesses in enumerate(table[:, 2:].tolist()):
+                found += [(Term("obstacle", number), [place]) for place in stiffnesses]
+        for kind in OF_MUSCLES:
+            places = [self.of(kind, k).tolist() for k in range(self.n)]
+            for which, same in enumerate(zip(*places, strict=True)):
+                if kind != "areas" or which or self.bench.of_force:
+                    found.append((Term(kind, which), list(same)))
+                found += [(Term(kind, which, k), [same[k]]) for k in range(1, self.n)]
+        return found
 
-    def values(self, block: Balance, own: Array) -> Array:
-        """Return the coefficients of a balance of this structure, behind them what runs have alone."""
-        none, never = self.n * (0.0,), self.n * (NEVER,)
-        single = [block.walls, block.pushes or never, block.damping]
-        single += [block.lines or none, block.bladders or none, block.mass or none]
-        tables = [block.hull, np.transpose(single)]
-        tables += [block.springs, block.elasticity, block.areas]
-        tables += [block.friction, block.relaxation, block.loads]
-        table = np.hstack([np.asarray(part, dtype=np.float64) for part in tables])
-        return np.concatenate([table.ravel(), [block.grip], np.log(block.lags), own])
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """What may be free, linear numbers first, then the shape."""
+        shape = [
+            Term(name, which) for name, p in self.shape.items() for which in range(p.stop - p.start)
+        ]
+        return (*(term for term, _ in self._columns), *shape)
 
-    def packed(self) -> NDArray[np.intp]:
-        """Return, for every parameter that a balance packs, its place among coefficients."""
-        tables = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
-        slack = ("bladder", "push") if self.slack else ()
-        heavy = ("mass",) if self.mass else ()
-        groups = ((*tables, "damping", "line", "wall"), (*slack, *heavy))
-        first, last = (
-            [place for name in names for k in range(self.n) for place in self.places(name, k)]
-            for names in groups
-        )
-        return np.array([*first, self.grip, *last], dtype=np.intp)
-
-    @property
-    def in_newtons(self) -> bool:
-        """Whether forces are in newtons: those of a muscle alone under one load."""
-        return self.n == len(self.loaded) == 1
-
-    @property
-    def least_pull(self) -> float:
-        """Least pull of a load's unit, on an area at rest of 1."""
-        return LEAST_PULL * self.highest / self.heaviest
-
-    def sizes(self, values: Array) -> Array:
-        """Return the sizes of coefficients, in their units, beside areas at rest as they are now."""
-        area = float(np.max([values[self.places("areas", k)[0]] for k in range(self.n)]))
-        force = area * self.highest
-        stiff = force / self.scale
-        x = np.abs(self.scheduled_hull).max(axis=1)
-        powers = 1.0 / self.powers(np.where(x > 0, x, 1.0))
-        sizes = np.full(self.size, stiff)  # of damping and mass, too, by seconds
-        for k in range(self.n):
-            sizes[self.places("hull", k)] = self.scale
-            sizes[self.places("wall", k)] = self.scale / self.highest
-            sizes[self.places("push", k)] = force
-            sizes[self.places("springs", k)] = np.outer(powers, [force, *self.n * [stiff]]).ravel()
-            sizes[self.places("elasticity", k)] = force
-            sizes[self.places("areas", k)] = area
-            sizes[self.places("loads", k)] = force / self.heaviest
-        sizes[self.grip], sizes[self.timing] = self.highest, 1.0
-        sizes[self.own.first : self.own.starts] = force
-        lags = np.full((self.n_starts, self.n, 1 + self.lags.size), self.scale)
-        lags[:, :, 0] = 1.0
-        sizes[self.own.starts :] = lags.ravel()
-        return sizes
-
-    def free(self, *, moving: bool, plain: bool = False, first: bool = False) -> Array:
-        """Return how coefficients follow from what is free, shape (coefficients, free).
-
-        ``moving`` frees walls, grip, lags, pushes, and areas at rest too. One number sets the unit of
-        force: of a muscle alone its load's, while moving; else the first area at rest. ``plain``: areas
-        stay what they are at rest. ``first``: walls and lags stay, which else make up for slack that is
-        not there yet, and do not come back.
-        """
-        n_all = self.size
-        columns: list[list[int]] = []
-        for k in range(self.n):
-            for name in ("bladder", "elasticity", "friction", "relaxation", "damping"):
-                columns += [[place] for place in self.places(name, k).tolist()]
-            areas = self.places("areas", k).tolist()
-            newtons = moving and self.in_newtons
-            free_areas = areas if moving and (newtons or k) else areas[1:]
-            columns += [[place] for place in ([] if plain else free_areas)]
-            columns += [[place] for place in self.places("loads", k).tolist() if not newtons]
-            for name, is_free in (
-                ("wall", not first),
-                ("line", True),
-                ("push", self.slack),
-                ("mass", self.mass),
-            ):
-                columns += [
-                    [place] for place in self.places(name, k).tolist() if moving and is_free
-                ]
-        for q in range(1 + len(self.scheduled) * self.degree):
-            for k in range(self.n):
-                if q or not self.tare:  # displacements from rest make a constant of their own
-                    columns.append([self._spring(q, k, -1)])
-                columns += [
-                    sorted({self._spring(q, k, j), self._spring(q, j, k)}) for j in range(k, self.n)
-                ]
-        if moving:
-            stop = self.grip + 1 if first else self.timing.stop
-            columns += [[place] for place in range(self.grip, stop)]
-        columns += [[place] for place in range(self.own.first, self.size)]
-        mix = np.zeros((n_all, len(columns)))
-        for number, places in enumerate(columns):
+    @cached_property
+    def mix(self) -> Array:
+        """How linear coefficients follow from what is free of them, shape (linear, free)."""
+        mix = np.zeros((self.n_linear, len(self._columns)))
+        for number, (_, places) in enumerate(self._columns):
             mix[places, number] = 1.0
         return mix
 
-    def _spring(self, q: int, k: int, j: int) -> int:
-        """Return the place of a spring between two muscles, or, of j = -1, of muscle k's constant."""
-        return int(self.places("springs", k)[q * (1 + self.n) + 1 + j])
+    @cached_property
+    def base(self) -> Array:
+        """Linear coefficients where nothing is free: areas at rest or the load 1, all others 0."""
+        values = np.zeros(self.n_linear)
+        if self.bench.of_force:
+            values[self.on("loads", 0)] = 1.0
+        for k in range(0 if self.bench.of_force else self.n):
+            values[self.of("areas", k)[0]] = 1.0
+        return values
+
+    @cached_property
+    def not_negative(self) -> NDArray[np.bool_]:
+        """Which linear coefficients are not negative."""
+        found = np.zeros(self.n_linear, dtype=bool)
+        for kind, k in product(NOT_NEGATIVE, range(self.n)):
+            found[self.of(kind, k)] = True
+        for j in range(self.m):
+            found[self.on("met", j)] = True
+        return found
+
+    def expanded(self, free: Array) -> Array:
+        """Return values of what is free."""
+        n = self.mix.shape[1]
+        return np.concatenate([self.base + self.mix @ free[:n], free[n:]])
+
+    def begin(self, grip: float) -> Array:
+        """Return what is free where nothing was found yet: the shape that does nothing, but the grip."""
+        free = np.zeros(len(self.terms))
+        shift = self.mix.shape[1] - self.n_linear
+        put = {"grip": grip, "lags": np.log(self.lags), "pushes": NEVER, "walls": 0.0}
+        low = self.bench.lowest[:, np.newaxis]
+        put["places"] = (low + np.outer(self.bench.travel, [p for _, p in self.obstacles])).ravel()
+        for name, numbers in put.items():
+            free[self.shape[name].start + shift : self.shape[name].stop + shift] = numbers
+        return free
+
+    def moved_to(self, other: Structure, free: Array) -> Array:
+        """Return what is free in another structure, that has of this one what is not 0 alone."""
+        found = other.begin(0.0)
+        named: dict[tuple[object, ...], list[float]] = {}
+        for key, number in zip(self.keys, free.tolist(), strict=True):
+            named.setdefault(key, []).append(number)
+        for place, key in enumerate(other.keys):
+            if named.get(key):
+                found[place] = named[key].pop(0)
+        return found
+
+    @cached_property
+    def keys(self) -> list[tuple[object, ...]]:
+        """Names of what may be free by which structures share it: limits, lags and obstacles by theirs."""
+        by = {"friction": self.limits, "relaxation": self.lags, "lags": self.lags}
+        by |= {"obstacle": self.obstacles, "places": self.m * self.obstacles}
+        return [
+            (kind, by[kind][which] if kind in by else which, muscle)
+            for kind, which, muscle in self.terms
+        ]
+
+    def scales(self) -> Array:
+        """Return how much is much of everything that may be free, beside an area at rest of 1."""
+        bench = self.bench
+        force = bench.highest * bench.unit
+        stiff = force / bench.scale
+        linear = np.full(self.n_linear, stiff)
+        x = np.abs(bench.levels).max(axis=1) if len(bench.levels) else np.zeros(0)
+        powers = 1.0 / self.powers(np.where(x > 0, x, 1.0))
+        for j in range(self.m):
+            linear[self.on("springs", j)] = np.outer(powers, [force, *self.m * [stiff]]).ravel()
+            linear[self.on("loads", j)] = force / bench.heaviest
+        for k in range(self.n):
+            linear[self.of("elasticity", k)] = force
+            linear[self.of("areas", k)] = bench.unit
+        return np.append(self.mix.T @ linear / self.mix.sum(axis=0), self.ends()[2])
+
+    def ends(self) -> tuple[Array, Array, Array]:
+        """Return lowest and highest values of the shape, and how much of it is much."""
+        bench = self.bench
+        much = bench.scale / bench.highest
+        most_x = np.abs(bench.levels).max(axis=1) if len(bench.levels) else np.zeros(0)
+        per_x = bench.highest / np.where(most_x > 0, most_x, 1.0)
+        ratio, (shortest, longest) = np.log(MOST_ASYMMETRIC), np.log(bench.lag_range)
+        ends = {
+            "grip": (0.0, MOST_GRIP * bench.highest, bench.highest),
+            "grips": (0.0, MOST_GRIP * per_x, per_x),
+            "asymmetry": (-ratio, ratio, 1.0),
+            "lags": (shortest, longest, 1.0),
+            "walls": (0.0, MOST_WALL * much, 0.2 * MOST_WALL * much),
+            "pushes": (0.0, 1.1 * NEVER, bench.highest * bench.unit),
+            "places": (-np.inf, np.inf, 0.2 * bench.travel.repeat(len(self.obstacles))),
+            "filling": (0.0, LONGEST_AIR, max(4.0 * bench.step, 1e-9)),
+            "venting": (-ratio, ratio, 1.0),
+            "dead": (0.0, 0.5 * bench.highest, 0.1 * bench.highest),
+        }
+        low, high, size = np.zeros((3, self.size - self.n_linear))
+        for name, place in self.shape.items():
+            own = slice(place.start - self.n_linear, place.stop - self.n_linear)
+            low[own], high[own], size[own] = ends[name]
+        return low, high, size
+
+    # -- block -----------------------------------------------------------------------------------
+
+    def block(self, values: Array, *, final: bool = False) -> Balance:
+        """Return the balance of some values, without what acts in front of it.
+
+        In the ``final`` one springs of muscles' own are among those of coordinates, unless they can go
+        slack with them, and what does nothing is left out.
+        """
+        bench, m, n = self.bench, self.m, self.n
+        of = {name: np.array([values[self.of(name, k)] for k in range(n)]) for name in self._muscle}
+        of |= {name: np.maximum(of[name], 0.0) for name in NOT_NEGATIVE}
+        springs = np.array([values[self.on("springs", j)] for j in range(m)])
+        bladders, push = of["bladder"][:, 0], float(self.shaped(values, "pushes")[0])
+        merged = final and push >= NEVER and not bench.directed
+        if merged:
+            springs[np.arange(m), 1 + np.arange(m)] += bladders
+        grips, ratio = self.shaped(values, "grips"), float(self.shaped(values, "asymmetry")[0])
+        sides = [[side] for side, _ in self.obstacles]
+        met = [np.hstack([sides, self.met(values, j)]).ravel() for j in range(m if sides else 0)]
+        heavy = not final or of["mass"].any()
+        return Balance(
+            springs=rows(springs),
+            elasticity=rows(of["elasticity"]),
+            areas=rows(of["areas"]),
+            friction=rows(of["friction"]),
+            relaxation=rows(of["relaxation"]),
+            loads=rows(np.array([values[self.on("loads", j)] for j in range(m)])),
+            damping=vector(of["damping"][:, 0]),
+            lines=vector(of["line"][:, 0]) if not final or of["line"].any() else (),
+            walls=vector(np.full(n, self.shaped(values, "walls")[0])),
+            bladders=() if merged else vector(bladders),
+            pushes=vector(np.full(n, push)) if push < NEVER else (),
+            limits=self.limits,
+            grip=float(self.shaped(values, "grip")[0]),
+            grips=vector(grips) if not final or grips.any() else (),
+            asymmetry=None if final and ratio == 1.0 else ratio,
+            obstacles=rows(np.array(met)),
+            lags=vector(self.shaped(values, "lags")),
+            hull=rows(bench.hull),
+            scale=bench.scale,
+            degree=self.degree,
+            driven=bench.driven,
+            scheduled=(*bench.scheduled, *bench.loaded),
+            given=bench.given,
+            tare=bench.tare,
+            settled=self.settled,
+            mass=vector(of["mass"][:, 0]) if heavy and bench.step and push >= NEVER else (),
+            directions=rows(bench.directions) if bench.directed else (),
+            preload=bench.preload if bench.directed else 0.0,
+        )
+
+    def met(self, values: Array, j: int) -> Array:
+        """Return place and stiffnesses of what a coordinate meets, shape (obstacles, 2 + schedules)."""
+        table = values[self.on("met", j)].reshape(-1, 3 + len(self.bench.scheduled))
+        places = self.shaped(values, "places").reshape(self.m, len(table))[j]
+        return np.column_stack([places, np.maximum(table[:, 2:], 0.0)])
+
+    def coefficients(self, values: Array, sample_time: float) -> Array:
+        """Return the coefficients of the block, whose lines have terms even where they are nothing."""
+        c = self.block(values).coefficients(sample_time)
+        linear = c[c.size - self.n_linear :]
+        for k in range(self.n):
+            linear[self.of("line", k)] = np.maximum(values[self.of("line", k)], 1e-12)
+        return c
+
+    def needed(self, active: Collection[Term]) -> Structure:
+        """Return the structure without stops, lags, obstacles and powers of which none is active."""
+        kept = {(term.kind, term.which) for term in active}
+
+        def chosen(kind: str, items: tuple[object, ...]) -> tuple[object, ...]:
+            return tuple(item for i, item in enumerate(items) if (kind, i) in kept)
+
+        def highest(kind: str, least: int) -> int:
+            return 1 + max((which for name, which in kept if name == kind), default=least - 1)
+
+        squares = any(
+            ("springs", q) in kept for q in range(2, 1 + len(self.bench.scheduled) * 2, 2)
+        )
+        return replace(
+            self,
+            n_elastic=highest("elasticity", 0),
+            n_area=highest("areas", 1),
+            limits=chosen("friction", self.limits),
+            lags=chosen("relaxation", self.lags),
+            obstacles=chosen("obstacle", self.obstacles),
+            degree=self.degree if squares else 1,
+        )
+
+    # -- physics ---------------------------------------------------------------------------------
+
+    @property
+    def least_stiffness(self) -> float:
+        """Least stiffness that has to be left."""
+        return LEAST_STIFF * self.bench.unit * self.bench.highest / self.bench.scale
 
     def conditions(self, values: Array) -> tuple[Array, Array]:
-        """Return what is asked of coefficients, as sides and least.
+        """Return what physics asks of linear coefficients: sides @ coefficients >= least.
 
-        Shapes (m, coefficients) and (m,): sides @ coefficients >= least. What friction
-        at held length takes of an area is taken where the walls are now.
+        Shapes (c, linear) and (c,). What friction takes of an area is taken with the shape as it is.
         """
-        n_all = self.size
         sides: list[Array] = []
         least: list[float] = []
-        unit = float(np.max([values[self.places("areas", k)[0]] for k in range(self.n)]))
-        stiff = LEAST_STIFF * unit * self.highest / self.scale
 
         def ask(entries: dict[int, float], bound: float) -> None:
-            row = np.zeros(n_all)
-            row[list(entries)] = list(entries.values())
-            sides.append(row)
+            sides.append(np.zeros(self.n_linear))
+            sides[-1][list(entries)] = list(entries.values())
             least.append(bound)
 
-        ask({self.grip: 1.0}, 0.0)
-        ask({self.grip: -1.0}, -4.0 * self.highest)
-        shortest, longest = np.log(self.lag_range).tolist()
-        for place in range(self.timing.start, self.timing.stop):
-            now = float(values[place])
-            ask({place: 1.0}, max(shortest, now - MOST_LONGER))
-            ask({place: -1.0}, -min(longest, now + MOST_LONGER))
-            if place > self.timing.start:
-                ask({place: 1.0, place - 1: -1.0}, APART)
-        for place in range(self.n_starts):
-            for k, places in enumerate(self.own.start(place).tolist()):
-                far = float(np.ptp(self.hull[k]))
-                for number, most in zip(places, [1.0, *self.lags.size * [far]], strict=True):
-                    ask({number: 1.0}, -most)
-                    ask({number: -1.0}, -most)
+        for place in np.flatnonzero(self.not_negative).tolist():
+            ask({place: 1.0}, 0.0)
+        ratio, wall = (float(self.shaped(values, name)[0]) for name in ("asymmetry", "walls"))
+        taken = -(np.array(self.limits) * max(1.0, ratio) + wall)
         for k in range(self.n):
-            for name in (
-                *("bladder", "push", "friction", "relaxation", "damping", "line", "wall", "mass"),
-            ):
-                for place in self.places(name, k).tolist():
-                    ask({place: 1.0}, 0.0)
-            for place in self.places("loads", k).tolist():
-                ask({place: 1.0}, self.least_pull * unit if self.in_newtons else 0.0)
-            ask({int(self.places("wall", k)[0]): -1.0}, -0.1 * self.scale / self.highest)
-            areas, friction = self.places("areas", k), self.places("friction", k)
-            ask({int(areas[0]): 1.0}, 0.1 * unit)
-            wall = float(values[self.places("wall", k)[0]])
-            taken = dict(zip(friction.tolist(), (-(self.limits + wall)).tolist(), strict=True))
-            for u in np.linspace(self.hull[k, 0], self.hull[k, 1], GRID) / self.scale:
-                area = dict(
-                    zip(areas.tolist(), (u ** np.arange(self.n_area)).tolist(), strict=True)
-                )
-                area[int(areas[0])] -= LEAST_LEFT
-                ask(area | taken, 0.0)
-                powers = np.arange(2, 2 + self.n_elastic)
-                stiffness = powers * u ** (powers - 1) / self.scale
-                places = self.places("elasticity", k).tolist()
-                elastic = dict(zip(places, stiffness.tolist(), strict=True))
-                order = np.arange(1, self.n_area)
-                softening = order * u ** (order - 1) / self.scale
-                for p in (0.0, self.highest):
-                    lost = dict(zip(areas[1:].tolist(), (-p * softening).tolist(), strict=True))
-                    ask(elastic | lost | {int(self.places("bladder", k)[0]): 1.0}, stiff)
-            for j in range(k):  # a first idea of what makes springs positive
-                for sign in (1.0, -1.0):
-                    direction = np.zeros(self.n)
-                    direction[[k, j]] = 1.0, sign
-                    for x in self.levels():
-                        row, bound = self.spring_condition(x, direction, stiff)
-                        sides.append(row)
-                        least.append(bound)
-            for x in self.levels():
-                row, bound = self.spring_condition(x, np.eye(self.n)[k], stiff)
-                sides.append(row)
-                least.append(bound)
+            areas, friction = self.of("areas", k).tolist(), self.of("friction", k).tolist()
+            elastic, bladder = self.of("elasticity", k).tolist(), int(self.of("bladder", k)[0])
+            ask({areas[0]: 1.0}, 0.1 * self.bench.unit)
+            order, power = np.arange(1, self.n_area), np.arange(2, 2 + self.n_elastic)
+            for u in np.linspace(*self.bench.hull[k], GRID) / self.bench.scale:
+                left = dict(zip(areas, (u ** np.arange(self.n_area)).tolist(), strict=True))
+                left[areas[0]] -= LEAST_LEFT
+                ask(left | dict(zip(friction, taken.tolist(), strict=True)), 0.0)
+                stiff = power * u ** (power - 1) / self.bench.scale
+                narrows = order * u ** (order - 1) / self.bench.scale
+                for p in (0.0, self.bench.highest):
+                    row = dict(zip(elastic, stiff.tolist(), strict=True)) | {bladder: 1.0}
+                    row |= dict(zip(areas[1:], (-p * narrows).tolist(), strict=True))
+                    ask(row, self.least_stiffness)
+        for x, direction in product(self.bench.corners(), np.eye(self.m)):
+            sides.append(self.spring_side(x, direction))
+            least.append(self.least_stiffness)
         return np.array(sides), np.array(least)
 
-    def levels(self) -> list[Array]:
-        """Return what schedules, at all its ends, and between where its powers bend."""
-        share = (0.0, 1.0) if self.degree == 1 else (0.0, 0.25, 0.5, 0.75, 1.0)
-        low, high = self.scheduled_hull.T if len(self.scheduled) else (np.zeros(0), np.zeros(0))
-        return [low + np.array(s) * (high - low) for s in product(share, repeat=len(low))]
-
     def powers(self, x: Array) -> Array:
-        """Return the powers of what schedules, shape (s, ...), as springs are multiplied by."""
+        """Return the powers of what schedules, shape (1 + powers, ...), that springs multiply."""
         powers = [v**d for v in x for d in range(1, self.degree + 1)]
         return np.array([np.ones(x.shape[1:]), *powers])
 
-    def spring_condition(self, x: Array, direction: Array, stiff: float) -> tuple[Array, float]:
-        """Return that springs are stiff along a direction: a side and its least."""
-        row = np.zeros(self.size)
+    def spring_side(self, x: Array, direction: Array) -> Array:
+        """Return the side that asks of springs to be stiff along a direction."""
+        row = np.zeros(self.n_linear)
         for q, power in enumerate(self.powers(x)):
-            for k in range(self.n):
-                for j in range(self.n):
-                    row[self._spring(q, k, j)] += power * direction[k] * direction[j]
-        return row, stiff * float(direction @ direction)
+            for j, i in product(range(self.m), repeat=2):
+                row[self.spring(q, j, i)] += power * direction[j] * direction[i]
+        return row
 
-    def softest(self, values: Array) -> tuple[Array, Array, float]:
-        """Return where springs are softest: level, direction and stiffness."""
+    def softest(self, values: Array) -> tuple[Array, float]:
+        """Return where springs are softest: the side that asks them to be stiff there, and how they are."""
         found: list[tuple[float, Array, Array]] = []
-        for x in self.levels():
-            matrix = np.zeros((self.n, self.n))
+        for x in self.bench.corners():
+            matrix = np.zeros((self.m, self.m))
             for q, power in enumerate(self.powers(x)):
-                for k in range(self.n):
-                    for j in range(self.n):
-                        matrix[k, j] += power * values[self._spring(q, k, j)]
+                for j, i in product(range(self.m), repeat=2):
+                    matrix[j, i] += power * values[self.spring(q, j, i)]
             sizes, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
             found.append((float(sizes[0]), x, directions[:, 0]))
         stiffness, x, direction = min(found, key=lambda one: one[0])
-        return x, direction, stiffness
+        return self.spring_side(x, direction), stiffness
+
+
+LOGARITHMIC = ("lags", "asymmetry", "venting")
+"""Shape that is found by its logarithm."""
+
+OF_MUSCLES = ("damping", "line", "mass", "bladder", "elasticity", "areas", "friction", "relaxation")
+"""Kinds of linear numbers of muscles."""
+
+NOT_NEGATIVE = ("damping", "line", "mass", "bladder", "friction", "relaxation")
+"""Those that are not negative."""
+
+
+def _slices(widths: dict[str, int]) -> dict[str, slice]:
+    ends = np.cumsum([0, *widths.values()]).tolist()
+    return {name: slice(a, b) for name, a, b in zip(widths, ends[:-1], ends[1:], strict=True)}

@@ -1,4 +1,8 @@
-"""What a balance of forces says of muscles, in sentences with units."""
+"""What a balance of forces says of muscles: only what its own response shows, and recordings determine.
+
+Every number is found again without each fifth of the recordings; one that then differs by more than a
+factor of two, or half of itself, is not determined, and not said.
+"""
 
 from __future__ import annotations
 
@@ -6,123 +10,139 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.estimators.coupled.balance_structure import GRID, LEAST_LEFT, LEAST_STIFF, Structure
+from mckibben.blocks.coupled.balance_response import AMPLITUDE, Response, response_of
+from mckibben.errors import ModelError
+from mckibben.estimators.coupled.balance_bench import starts_elsewhere
+from mckibben.estimators.coupled.balance_search import Search
+from mckibben.numerals import numeral
 
 POOR = 0.1
 """Error relative to the range from which a model is said not to explain the recordings."""
 
-NEAR = 1.2
-"""Times a bound up to which it is said to hold something back."""
+WORSE = 3.0
+"""Times its error of the others from which a recording seems to have been under something else."""
+
+DETERMINED, CREEP = 0.5, 0.25
+"""Standard error, relative to a number, up to which it is said; of creep, which friction resembles."""
 
 
-def sentences(block: Balance, structure: Structure) -> list[str]:
-    """Return how much of every muscle is area, spring, friction and relaxation."""
-    unit = "N" if structure.in_newtons else block.given[0].unit
-    driving = block.given[0].unit
-    per = f" N/{driving}" if structure.in_newtons else " of muscle 1's at rest"
-    p, x = 0.5 * structure.highest, structure.scheduled_hull.mean(axis=1)
-    at = "".join(
-        f", {channel.name} {value:.3g} {channel.unit}"
-        for channel, value in zip(structure.scheduled, x, strict=True)
+def sentences(search: Search, z: Array, balance: Balance) -> list[str]:
+    """Return what is said of a fit."""
+    structure, problem = search.structure, search.problem
+    low, high = min(float(problem.data.lowest.min()), 0.0), float(problem.data.highest.max())
+    others = search.without_folds(z)
+    found = [*_of_runs(search, z), *_of_loads(search, z, others, balance)]
+
+    def all_of(numbers: object) -> tuple[Array, Array] | None:
+        """Return numbers of the fit, and their standard errors by what is left out."""
+        assert callable(numbers)
+        try:
+            every = np.array([numbers(one) for one in (z, *others)], dtype=np.float64)
+        except (ModelError, ArithmeticError):
+            return None
+        count = len(every) - 1
+        if count < 2 or not np.isfinite(every).all():
+            return None
+        return every[0], np.sqrt(
+            (count - 1) * ((every[1:] - every[1:].mean(axis=0)) ** 2).mean(axis=0)
+        )
+
+    def response(one: Array) -> Response:
+        block = structure.block(structure.expanded(one[: len(structure.terms)]), final=True)
+        share = balance.areas[0][0] / block.areas[0][0]
+        return _scaled(response_of(block, low, high), share)
+
+    unit, per, n = balance.driven[0].unit, balance.given[0].unit, structure.n
+    newtons = balance.areas[0][0] != 1.0
+    at = f"at {numeral(0.5 * (low + high), 3)} {per}"
+    reach = f"{numeral(AMPLITUDE * (high - low), 3)} {per}"
+    loops = all_of(lambda one: np.concatenate([response(one).width, response(one).stiffness]))
+    for k, channel in enumerate(balance.given if loops is not None else ()):
+        assert loops is not None
+        said = _with_error(loops[0][k], loops[1][k], unit)
+        found += [f"{channel.name}: a slow loop of ± {reach} {at} is {said} wide"] if said else []
+    for j, channel in enumerate(balance.driven if loops is not None and newtons else ()):
+        assert loops is not None
+        said = _with_error(loops[0][n + j], loops[1][n + j], f"N/{unit}")
+        found += (
+            [f"{channel.name}: stiffness {at}, relaxed, without friction: {said}"] if said else []
+        )
+    creep = all_of(lambda one: response(one).creep) if balance.lags else None
+    for k, channel in enumerate(balance.given if creep is not None else ()):
+        assert creep is not None
+        said = _with_error(100.0 * creep[0][k], 100.0 * creep[1][k], "%", CREEP)
+        found += (
+            [f"{channel.name}: of a step {at} {said} comes after the first second"] if said else []
+        )
+    return found
+
+
+def _scaled(response: Response, share: float) -> Response:
+    return Response(
+        response.position,
+        share * response.stiffness,
+        response.width,
+        share * response.friction,
+        response.creep,
     )
-    times = " and ".join(f"{lag:.3g} s" for lag in block.lags)
-    found = []
-    for k, channel in enumerate(block.driven):
-        y, mm = float(np.mean(block.hull[k])), channel.unit
-        rest, middle = (_area(block, k, place) for place in (0.0, y))
-        stiff = _slope(block.elasticity[k], y / block.scale) / block.scale + _spring(
-            block, k, x, structure
-        )
-        rubbing = 0.0
-        for h, limit in zip(block.friction[k], block.limits, strict=True):
-            travel = limit * (p + block.grip)
-            if travel < 0.5 * (block.hull[k][1] - block.hull[k][0]):
-                rubbing += h * travel
-            else:  # never breaks away
-                stiff += h
-        fading = sum(block.relaxation[k])
-        found.append(
-            f"{channel.name} at {y:.3g} {mm} and {p:.3g} {driving}{at}: area {middle:.3g}{per} "
-            f"({rest:.3g} at rest); springs and rubber {stiff:.3g} {unit}/{mm}; friction up to "
-            f"{rubbing:.3g} {unit} either way, {100 * rubbing / max(middle * p, 1e-12):.2g} % of the "
-            "pull"
-            + (f"; {fading:.3g} {unit}/{mm} more that fades within {times}" if block.lags else "")
-            + (f"; {1e3 * block.mass[k]:.3g} kg are moved" if block.mass and unit == "N" else "")
-            + (
-                f"; it pushes up to {block.pushes[k]:.3g} {unit}, then goes slack"
-                if block.pushes
-                else ""
-            )
-        )
-    return found
 
 
-def missed(cost: float) -> list[str]:
-    """Return that a model misses much of the range, if it does."""
-    if cost < POOR:
-        return []
-    return [
-        f"this model misses {100 * cost:.2g} % of what moves: it does not explain these recordings. "
-        "Remedy: check channels, units, signs and zeros, recording by recording"
+def _with_error(value: float, error: float, unit: str, most: float = DETERMINED) -> str:
+    """Return a number with its standard error and unit; empty where it is not determined."""
+    if not 0.0 < error <= most * abs(value):
+        return ""
+    return f"{numeral(value, 3)} ± {numeral(error, 2)} {unit}".rstrip()
+
+
+def _of_runs(search: Search, z: Array) -> list[str]:
+    """Return what is said of recordings that are followed badly, or begin elsewhere."""
+    problem, structure = search.problem, search.structure
+    parts = problem.errors(structure, z)[0][: len(problem.runs)]
+    sizes = np.array([float(np.sqrt(np.mean(part**2))) for part in parts])
+    found = [
+        f"{run.name} is followed {size / np.median(np.delete(sizes, place)):.2g} times worse than others, "
+        "as if something varied that was not measured. Remedy: record it, or leave this one out"
+        for place, (run, size) in enumerate(zip(problem.runs, sizes.tolist(), strict=True))
+        if len(sizes) > 1 and size > WORSE * np.median(np.delete(sizes, place))
     ]
-
-
-def held_back(block: Balance, structure: Structure) -> list[str]:
-    """Return which conditions of physics hold the fit back."""
-    found = []
-    for k, channel in enumerate(block.driven):
-        mm = channel.unit
-        places = np.linspace(block.hull[k][0], block.hull[k][1], GRID)
-        taken = sum(
-            h * (r + block.walls[k]) for h, r in zip(block.friction[k], block.limits, strict=True)
+    whole = float(np.sqrt(np.mean(sizes**2)))
+    if whole > POOR:
+        found.append(
+            f"this model misses {100 * whole:.2g} % of what moves: it does not explain these recordings. "
+            "Remedy: check channels, units, signs and zeros, recording by recording"
         )
-        left = np.array([_area(block, k, y) for y in places]) - taken
-        worst = int(np.argmin(left))
-        if left[worst] < NEAR * LEAST_LEFT * block.areas[k][0]:
-            found.append(
-                f"{channel.name}: friction would outweigh the area at {places[worst]:.3g} {mm}, and "
-                "is kept from it; beware of pressures there"
-            )
-        stiff = [_stiffness(block, k, at, p) for at in places for p in (0.0, structure.highest)]
-        softest = int(np.argmin(stiff))
-        if (
-            stiff[softest]
-            < 2.0 * LEAST_STIFF * block.areas[k][0] * structure.highest / structure.scale
-        ):
-            found.append(
-                f"{channel.name}: it would have no stiffness left at {places[softest // 2]:.3g} {mm}, "
-                "and is kept from it"
-            )
-        if block.walls[k] > 0.099 * structure.scale / structure.highest / NEAR:
-            found.append(f"{channel.name}: its wall's stretch is at its bound")
-    shortest, longest = structure.lag_range
-    for lag in block.lags:
-        if not 1.01 * shortest < lag < 0.99 * longest:
-            found.append(f"a lag is at its bound, {lag:.3g} s")
+    found += [
+        f"{name} does not begin at rest: its first part does not count. Remedy: begin recordings "
+        "without pressure"
+        for name in starts_elsewhere(problem.data)
+    ]
     return found
 
 
-def _stiffness(block: Balance, k: int, y: float, p: float) -> float:
-    """Return a muscle's own stiffness without friction and what schedules."""
-    u = y / block.scale
-    narrows = sum(i * a * u ** (i - 1) for i, a in enumerate(block.areas[k]) if i)
-    own = block.springs[k][1 + k] + (block.bladders[k] if block.bladders else 0.0)
-    return float(own + (_slope(block.elasticity[k], u) - p * narrows) / block.scale)
-
-
-def _spring(block: Balance, k: int, x: Array, structure: Structure) -> float:
-    """Return a muscle's own spring under what schedules it."""
-    springs = np.array(block.springs[k]).reshape(-1, 1 + structure.n)[:, 1 + k]
-    own = block.bladders[k] if block.bladders else 0.0
-    return float(structure.powers(x) @ springs) + own
-
-
-def _area(block: Balance, k: int, y: float) -> float:
-    powers = (y / block.scale) ** np.arange(len(block.areas[k]))
-    return float(np.array(block.areas[k]) @ powers)
-
-
-def _slope(elasticity: tuple[float, ...], u: float) -> float:
-    """Return the slope of the elastic force by u."""
-    orders: Array = np.arange(2, 2 + len(elasticity), dtype=np.float64)
-    return float(np.array(elasticity) @ (orders * u ** (orders - 1)))
+def _of_loads(search: Search, z: Array, others: list[Array], balance: Balance) -> list[str]:
+    """Return what is said of loads: those that were found, and those that seem to push."""
+    found: list[str] = []
+    for j, channel in enumerate(balance.scheduled[balance.n_schedules :]):
+        share = np.array(balance.loads)[:, j]
+        if (share < 0.0).all():
+            found.append(
+                f"{channel.name} acts as if it helped the muscles: the more it is, the further they move "
+                "at equal pressures. If it pulls against them, its sign is wrong. Remedy: give loads that "
+                "pull muscles longer as positive"
+            )
+    listed = {}
+    for run in search.problem.runs:
+        place = search.problem.loads_at(search.structure, run)
+        values, among = z[place], np.array([one[place] for one in others])
+        if values.size and (np.abs(values) > 2.0 * np.sqrt(len(among)) * among.std(axis=0)).any():
+            share = balance.areas[0][0]
+            listed[run.recording] = (
+                f"{' and '.join(numeral(float(share * v), 3) for v in values)} in {run.name}"
+            )
+    if listed:
+        unit = "N" if balance.areas[0][0] != 1.0 else f"{balance.given[0].unit} on the area at rest"
+        found.append(
+            f"constant loads that were not measured [{unit}], beyond those of the others: "
+            f"{', '.join(listed.values())}. Remedy: record the force of all"
+        )
+    return found

@@ -18,11 +18,11 @@ from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
 
-SCHEDULES = ("pressure_extensor", "force")
+SCHEDULES = ("pressure_extensor", "force", "torque")
 """Channels that schedule a model by default, where there are any."""
 
-LOADS = ("N",)
-"""Units of what loads a muscle, instead of scheduling its springs."""
+LOADS = ("N", "N*m")
+"""Units of what loads muscles, or a joint that they move, instead of scheduling springs."""
 
 MOVES = 0.1
 """An input moves in a run where it covers this share of the range it has over all runs."""

@@ -1,0 +1,262 @@
+"""What recordings settle before a balance of forces is identified: channels, directions, ranges, loads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import PerChannel
+from mckibben.blocks.memoryless import Affine
+from mckibben.errors import DataError, ModelError
+from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.coupled.balance_problem import at_rest, held
+from mckibben.estimators.coupled.balance_structure import Bench
+from mckibben.estimators.coupled.base import LOADS
+from mckibben.recording import Recording
+
+ALIKE = 0.02
+"""Share of its largest value by which what schedules or loads has to change to be seen."""
+
+BLOCK, NOISE = 25, 0.4
+"""Samples whose means are compared, and the share of the range over which noise has no means."""
+
+LEAST_MOVED = 0.02
+"""Share of the most that any pressure moves below which one moves nothing, of a coordinate too."""
+
+STILL = 0.005
+"""Share of the most that any output moves, below which one does not."""
+
+LARGEST = 1e12
+"""Number that no muscle has."""
+
+FAR = 0.5
+"""Outputs that all are further from zero than this share of their range count from elsewhere."""
+
+AT_START = 0.02
+"""Displacement at the start of a run that is none, relative to the range."""
+
+ONE_SPEED, SLOW = 2.0, 0.05
+"""Ratio of fast to slow speeds up to which there is one; share of the fastest below which inputs rest."""
+
+
+def with_loads(
+    recordings: Sequence[Recording], scheduling: Sequence[str]
+) -> tuple[list[Recording], list[tuple[str, ...]]]:
+    """Return recordings that all have the loads that any has, and for each which it had not.
+
+    These are what they are in others on average.
+    """
+    means = {}
+    for name in scheduling:
+        found = [recording for recording in recordings if name in recording]
+        if found and all(recording.units[name] in LOADS for recording in found):
+            mean = float(np.mean(np.concatenate([recording[name] for recording in found])))
+            means[name] = mean, found[0].units[name]
+    filled, lacking = [], []
+    for recording in recordings:
+        without = {name: one for name, one in means.items() if name not in recording}
+        levels = {name: np.full(len(recording), mean) for name, (mean, _) in without.items()}
+        units = {name: unit for name, (_, unit) in without.items()}
+        filled.append(recording.with_channels(units, **levels))
+        lacking.append(tuple(without))
+    return filled, lacking
+
+
+def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
+    """Return data without runs in which nothing moves and no force was measured, and their names."""
+    loaded = any(channel.unit in LOADS for channel in data.scheduled)
+    tells = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
+    if all(tells) or not any(tells):
+        return data, []
+    runs = tuple(run for run, told in zip(data.runs, tells, strict=True) if told)
+    return replace(data, runs=runs), list(
+        dict.fromkeys(run.name for run, told in zip(data.runs, tells, strict=True) if not told)
+    )
+
+
+def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
+    """Return data without loads and schedules that never change, the loads last; and what was left out."""
+    kept, constant = [], []
+    for place, channel in enumerate(data.scheduled):
+        columns = [run.scheduled[:, place] for run in data.runs]
+        means = np.concatenate(
+            [
+                np.add.reduceat(column, starts) / np.diff([*starts, column.size])
+                for column in columns
+                for starts in [np.arange(0, column.size, BLOCK)]
+            ]
+        )
+        whole = np.concatenate(columns)
+        least = max(ALIKE * float(np.abs(whole).max()), NOISE * float(np.ptp(whole)))
+        (kept if np.ptp(means) > least else constant).append(place)
+    kept.sort(key=lambda place: data.scheduled[place].unit in LOADS)
+    runs = tuple(replace(run, scheduled=run.scheduled[:, kept]) for run in data.runs)
+    scheduled = tuple(data.scheduled[place] for place in kept)
+    names = [data.scheduled[place].name for place in constant]
+    return replace(data, runs=runs, scheduled=scheduled), names
+
+
+def check_numbers(data: TrainingData) -> None:
+    """Refuse numbers that no muscle has, outputs that stay, and pressures that never act.
+
+    Raises
+    ------
+    DataError
+        Naming the channel and the recording.
+    ModelError
+        If a muscle never moves, or there never is pressure.
+    """
+    span = data.travel
+    if not (span > STILL * span.max()).all():
+        raise ModelError(
+            f"{data.outputs[int(np.argmin(span))].name} never changes, but by {span.min():.3g}. "
+            "Remedy: record muscles that move"
+        )
+    for run in data.runs:
+        for channels, table in ((data.inputs, run.driven), (data.outputs, run.outputs)):
+            for place in np.flatnonzero(np.abs(table).max(axis=0) > LARGEST).tolist():
+                raise DataError(
+                    f"it reaches {np.abs(table[:, place]).max():.3g} {channels[place].unit}",
+                    file=run.name,
+                    channel=channels[place].name,
+                    remedy="check its unit",
+                )
+    if not data.highest.max() > 0:
+        raise ModelError(
+            f"{data.inputs[0].name} never exceeds 0. Remedy: give pressures above the atmosphere's"
+        )
+
+
+def directions(data: TrainingData) -> Array:
+    """Return how much shorter every muscle is by coordinates, shape (muscles, coordinates).
+
+    A muscle shortens along the way in which its pressure moves coordinates, by least squares on all
+    inputs; each by its own coordinate alone where that is the one that its pressure moves most.
+
+    Raises
+    ------
+    DataError
+        If a pressure moves nothing, or the coordinates only move together.
+    """
+    runs = [run for run in data.runs if not held(data, run)] or list(data.runs)
+    driven, scheduled, outputs = (
+        np.concatenate([getattr(run, what) for run in runs])
+        for what in ("driven", "scheduled", "outputs")
+    )
+    span = data.highest - data.lowest
+    columns = np.column_stack([driven, scheduled, np.ones(len(driven))])
+    found = np.linalg.lstsq(columns, outputs, rcond=None)[0][: driven.shape[1]]
+    moved = found * span[:, np.newaxis] / data.travel
+    n, m = moved.shape
+    if n == m and (np.abs(moved).argmax(axis=1) == np.arange(n)).all():
+        return np.diag(np.where(np.diag(moved) < 0, -1.0, 1.0))
+    sizes = np.sqrt((moved**2).sum(axis=1))
+    for k in np.flatnonzero(~(sizes > LEAST_MOVED * sizes.max())).tolist():
+        raise DataError(
+            "it moves nothing",
+            channel=data.inputs[k].name,
+            remedy="leave it out, or record runs in which it moves the muscles",
+        )
+    ways = found / np.sqrt((found**2).sum(axis=1))[:, np.newaxis]
+    if np.linalg.svd(ways, compute_uv=False)[-1] < LEAST_MOVED:
+        raise DataError(
+            "all outputs move together, whatever the pressures",
+            remedy="leave out all but one, or record runs in which pressures move apart",
+        )
+    return ways
+
+
+def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block], Array]:
+    """Return data whose outputs count from about zero, what gives the measured ones, and directions.
+
+    Muscles with a coordinate each shorten by that.
+    """
+    own = bool((np.abs(ways) == np.eye(*ways.shape)).all())
+    gains = np.diag(ways).copy() if own else np.ones(ways.shape[1])
+    shortened = data.stacked("outputs") * gains
+    offsets = []
+    for column, gain, span in zip(shortened.T, gains, data.travel.tolist(), strict=True):
+        far = FAR * (np.ptp(column) if data.spans is None else span)
+        away = column.min() > far or column.max() < 0.0
+        offsets.append(float(gain) * float(column.min()) if away else 0.0)
+    runs = tuple(replace(run, outputs=(run.outputs - offsets) / gains) for run in data.runs)
+    sensors: list[Block] = [
+        Affine(float(gain), offset, channel, channel)
+        for gain, offset, channel in zip(gains, offsets, data.outputs, strict=True)
+    ]
+    if (gains == 1.0).all() and not any(offsets):
+        sensors = []
+    behind = sensors if len(sensors) < 2 else [PerChannel(tuple(sensors))]
+    return replace(data, runs=runs), behind, np.eye(*ways.shape) if own else ways
+
+
+def one_speed(data: TrainingData) -> bool:
+    """Tell whether all inputs always move at about one speed, which tells nothing of rate."""
+    if any(run.sample_time is None for run in data.runs):
+        return True
+    speeds = [
+        (np.abs(np.diff(run.driven, axis=0)) / (run.sample_time or 1.0)).max(axis=1)
+        for run in data.runs
+    ]
+    found = np.concatenate(speeds)
+    rests = found <= SLOW * float(np.quantile(found, 0.99))
+    if rests.mean() > SLOW:
+        return False
+    slow, fast = np.quantile(found[~rests], [0.1, 0.9])
+    return bool(fast <= ONE_SPEED * slow)
+
+
+def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
+    """Return the recordings without a load that others have; or every one but the first with it."""
+    lacking = {run.recording for run in data.runs if run.unmeasured}
+    found = dict.fromkeys(run.recording for run in data.runs)
+    reference = next((one for one in found if one not in lacking), None)
+    return tuple(one for one in found if one in lacking or (every and one != reference))
+
+
+def bench_of(data: TrainingData, ways: Array, *, tare: bool | None) -> Bench:
+    """Return what the recordings settle, of outputs that count from about zero."""
+    loads = [channel.unit in LOADS for channel in data.scheduled]
+    n_x = loads.index(True) if any(loads) else len(loads)
+    x = data.stacked("scheduled")
+    y, span = data.stacked("outputs"), data.travel
+    if tare is None:
+        first = np.array([run.outputs[0] for run in data.runs])
+        tare = n_x > 0 and bool((np.abs(first) <= AT_START * span).all())
+    short = y @ ways.T
+    margin = (0.15 if tare else 0.02) * np.ptp(short, axis=0)
+    if data.spans is not None:
+        short = np.vstack([short, [data.spans]])
+    steps = [run.sample_time for run in data.runs]
+    longest = max(len(run.outputs) * (run.sample_time or 0.0) for run in data.runs)
+    step = min(step or 0.0 for step in steps)
+    heaviest = float(np.abs(x[:, n_x:]).max(initial=0.0)) or 1.0
+    ends = np.column_stack([x[:, :n_x].min(axis=0), x[:, :n_x].max(axis=0)])
+    tenths = (np.round(v / (0.1 * (float(np.ptp(v)) or 1.0))) for v in x[:, :n_x].T)
+    return Bench(
+        driven=data.outputs,
+        scheduled=data.scheduled[:n_x],
+        loaded=data.scheduled[n_x:],
+        given=data.inputs,
+        directions=ways,
+        hull=np.column_stack([short.min(axis=0) - margin, short.max(axis=0) + margin]),
+        lowest=y.min(axis=0),
+        travel=span,
+        levels=ends,
+        highest=float(data.highest.max()),
+        heaviest=heaviest,
+        preload=float(data.stacked("driven").mean()),
+        tare=tare,
+        lag_range=(2.0 * (step or 1.0), max(0.5 * longest, 1.0)),
+        step=step,
+        curved=n_x > 0 and all(np.unique(v).size > 2 for v in tenths),
+    )
+
+
+def starts_elsewhere(data: TrainingData) -> list[str]:
+    """Return the names of runs that do not begin at rest."""
+    return [run.name for run in data.runs if not held(data, run) and not at_rest(data, run)]

@@ -1,0 +1,503 @@
+"""Runs as a balance of forces sees them: what it lacks along them, linear; and how it follows them, free.
+
+Values are those of `mckibben.estimators.coupled.balance_structure`, and behind them what recordings and
+runs have of their own: of every recording under a load that nobody measured, a constant force on every
+coordinate; of every run whose start is found, what every muscle remembers there: one share of what its
+stops hold, between -1 and 1, and what its lags are behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.polynomial import polynomial
+from numpy.typing import NDArray
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Series
+from mckibben.blocks.coupled.balance import Balance, balance_in
+from mckibben.blocks.coupled.balance_law import (
+    AT_REST,
+    coordinate_at,
+    friction_pressure,
+    solve_equilibrium,
+    update_state,
+)
+from mckibben.blocks.dynamics.air import Air
+from mckibben.blocks.fields import Channel, rows
+from mckibben.blocks.memoryless import PiecewiseLinear
+from mckibben.blocks.running import run_many
+from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.coupled.balance_slopes import run as follow
+from mckibben.estimators.coupled.balance_structure import Structure
+from mckibben.estimators.coupled.constrained import constrained_least_squares
+
+WARMING = 0.2
+"""Share of a run that does not begin at rest before which its errors do not count."""
+
+UNLIKELY = 0.03
+"""Error, relative to the range, as bad as a start with all friction loaded, or a range behind."""
+
+STEP, FIRST_STEP = 1e-4, 0.5
+"""Change of shape, relative to what is much of it, by which slopes are found; of shape that is new."""
+
+RESTING = 0.1
+"""Share of the range of pressure up to which a run begins at rest."""
+
+FILLS = 0.02
+"""Share of a pressure that acts within the dead zone: an inverse needs some."""
+
+STRAIGHT = 0.01
+"""What pressures may be off a straight line, relative to the highest."""
+
+RIDGE = 1e-7
+"""Damping of least squares, relative to every coefficient's own effect."""
+
+LEAST_AT_REST, PASSES = 0.1, 3
+
+MOST_CUTS = 8
+"""Least area at rest, relative to that of all samples on average; times that forces are weighed anew."""
+
+HELD = 0.02
+"""A muscle is held where it moves less than this share of what it moves in all runs."""
+
+
+def held(data: TrainingData, run: Run) -> bool:
+    """Tell whether nothing moves in a run, so that its forces are what tells of the muscle."""
+    return bool((np.ptp(run.outputs, axis=0) < HELD * data.travel).all())
+
+
+def at_rest(data: TrainingData, run: Run) -> bool:
+    """Tell whether a run begins about where pressures are lowest, so that nothing came before it."""
+    low, high = data.lowest, data.highest
+    return bool((run.driven[0] - np.minimum(low, 0.0) <= RESTING * (high - low)).all())
+
+
+def front(structure: Structure, values: Array, channel: Channel) -> list[Block]:
+    """Return what acts between a measured pressure and a muscle: air's lag, then the dead zone."""
+    filling, ratio, dead = (
+        float(structure.shaped(values, name)[0]) for name in ("filling", "venting", "dead")
+    )
+    blocks: list[Block] = []
+    if filling > 0.0:
+        times = filling, filling * ratio
+        blocks.append(Air(1.0, 0.0, 0.0, *times, ambient=None, input=channel, output=channel))
+    if dead > 0.0:
+        knots, acting = (0.0, dead, 2.0 * dead), (0.0, FILLS * dead, (1.0 + FILLS) * dead)
+        blocks.append(PiecewiseLinear(knots, acting, channel, channel))
+    return blocks
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Recordings to follow.
+
+    Parameters
+    ----------
+    data : TrainingData
+        Whose last scheduling channels are the loads; outputs are coordinates.
+    every : int
+        One sample of so many is compared; all are run through.
+    starts : bool
+        Whether the starts of runs that do not begin at rest are found.
+    of_force : bool
+        Whether forces count in all runs.
+    """
+
+    data: TrainingData
+    every: int = 1
+    starts: bool = False
+    of_force: bool = False
+    _fronts: dict[tuple[object, ...], Array] = field(default_factory=dict, repr=False)
+
+    @property
+    def runs(self) -> Sequence[Run]:
+        return self.data.runs
+
+    def still(self, run: Run) -> bool:
+        """Tell whether a run's forces count, not its displacements."""
+        if self.of_force:
+            return True
+        return self.data.once(("held", run.place), lambda: np.array(held(self.data, run))).item()
+
+    def counting(self, run: Run, structure: Structure) -> Mask:
+        """Return which of the samples compared count.
+
+        Of a run that begins in an unknown state, that is not found, the first part does not.
+        """
+        places = self.places(run)
+        still = held(self.data, run) or structure.settled or self.starts
+        known = still or at_rest(self.data, run)
+        return run.counts[places] & (
+            np.arange(places.size) >= (0.0 if known else WARMING) * places.size
+        )
+
+    def compared(self, run: Run) -> Array:
+        """Return the outputs that are compared."""
+        return run.outputs[self.places(run)]
+
+    def places(self, run: Run) -> NDArray[np.intp]:
+        """Return the places of the samples that are compared."""
+        n = len(run.outputs)
+        return np.minimum(np.arange(self.every - 1, n + self.every - 1, self.every), n - 1)
+
+    def acting(self, run: Run, structure: Structure, values: Array) -> Array:
+        """Return the pressures that act on muscles, shape (n, muscles)."""
+        shape = tuple(values[structure.shape["filling"].start :].tolist())
+        if not (shape[0] or shape[2]):
+            return run.driven
+        key = (run.place, *shape)
+        if key not in self._fronts:
+            if len(self._fronts) > 4 * len(self.runs):
+                self._fronts.clear()
+            driven = run.driven
+            for block in front(structure, values, Channel("pressure", "bar")):
+                columns = [
+                    run_many(
+                        [block], np.ascontiguousarray(p[:, np.newaxis]), sample_time=run.sample_time
+                    )
+                    for p in driven.T
+                ]
+                driven = np.column_stack([column[0, :, 0] for column in columns])
+            self._fronts[key] = driven
+        return self._fronts[key]
+
+    # -- what recordings and runs have of their own ----------------------------------------------
+
+    def loads_at(self, structure: Structure, run: Run) -> slice:
+        """Return the places of the load that only a recording has, behind the terms."""
+        first, unmeasured = len(structure.terms), structure.bench.unmeasured
+        if run.recording not in unmeasured:
+            return slice(first, first)
+        first += unmeasured.index(run.recording) * structure.m
+        return slice(first, first + structure.m)
+
+    def start_at(self, structure: Structure, run: Run) -> slice:
+        """Return the places of what a run remembers at its start, by muscle its share, then its lags."""
+        first = len(structure.terms) + len(structure.bench.unmeasured) * structure.m
+        if not self.starts:
+            return slice(first, first)
+        width = structure.n * (1 + len(structure.lags))
+        place = [one.place for one in self.runs].index(run.place)
+        return slice(first + place * width, first + (place + 1) * width)
+
+    def size(self, structure: Structure) -> int:
+        """Return how many numbers are found in all."""
+        own = len(self.runs) * structure.n * (1 + len(structure.lags)) * self.starts
+        return len(structure.terms) + len(structure.bench.unmeasured) * structure.m + own
+
+    def begun(self, structure: Structure, z: Array, c: Array, run: Run, p: Array) -> Array | None:
+        """Return stops and lags of a run before its first sample [mm]; None of one from rest."""
+        start = z[self.start_at(structure, run)].reshape(-1, 1 + len(structure.lags))
+        if not start.size:
+            return None
+        limits, ratio = np.array(structure.limits), float(c[12])
+        grown = [friction_pressure(c, float(one), run.scheduled[0]) for one in p]
+        shares = start[:, 0] * np.where(start[:, 0] > 0.0, 1.0, ratio)
+        return np.append(np.outer(shares * grown, limits).ravel(), start[:, 1:].ravel())
+
+    # -- following -------------------------------------------------------------------------------
+
+    def followed(
+        self, structure: Structure, z: Array, run: Run, *, held: bool, sloped: bool = True
+    ) -> tuple[Array, Array]:
+        """Return coordinates of a run, or forces that are lacking, and slopes by linear coefficients."""
+        values = structure.expanded(z[: len(structure.terms)])
+        driven = self.acting(run, structure, values)
+        c = structure.coefficients(values, run.sample_time or 1.0)
+        for j, load in enumerate(z[self.loads_at(structure, run)].tolist()):
+            c[coordinate_at(c, j)] += load
+        begun = None if held else self.begun(structure, z, c, run, driven[0])
+        return follow(
+            c, driven, run.outputs, run.scheduled,
+            held=held, every=self.every, sloped=sloped, begun=begun,
+        )  # fmt: skip
+
+    def errors_of(
+        self, structure: Structure, z: Array, run: Run, *, sloped: bool
+    ) -> tuple[Array, Array]:
+        """Return the errors over a run relative to ranges, (k, m), and slopes by linear coefficients.
+
+        Of a run in which nothing moves, they are the forces that are lacking, over that of the highest
+        pressure at rest.
+        """
+        still = self.still(run)
+        found, slopes = self.followed(structure, z, run, held=still, sloped=sloped)
+        counts = self.counting(run, structure)[:, np.newaxis]
+        bench = structure.bench
+        scale = counts / (bench.highest * bench.unit if still else bench.travel)
+        errors = (found if still else found - self.compared(run)) * scale
+        return errors, slopes * scale[..., np.newaxis]
+
+    def errors(
+        self,
+        structure: Structure,
+        z: Array,
+        wanted: Mask | None = None,
+        new: Mask | None = None,
+    ) -> tuple[list[Array], Array]:
+        """Return the errors of every run, and their slopes by all that is found, shape (errors, found).
+
+        Those by shape, of what is ``wanted`` of it, and by starts are differences, of shape that is
+        ``new`` over as much as is much; none at all are computed unless some are wanted. Starts that are unlikely are errors, too, after those of runs.
+        """
+        own = [self.errors_of(structure, z, run, sloped=wanted is not None) for run in self.runs]
+        errors = [one.ravel() for one, _ in own]
+        size, n = self.size(structure), structure.mix.shape[1]
+        slopes = []
+        far = np.zeros(size, dtype=bool)
+        far[: len(structure.terms)] = False if new is None else new
+        for run, (before, by) in zip(self.runs, own if wanted is not None else (), strict=False):
+            whole = np.zeros((before.size, size))
+            by = by.reshape(before.size, -1)
+            whole[:, :n] = by @ structure.mix
+            loads = self.loads_at(structure, run)
+            constants = [structure.spring(0, j, -1) for j in range(loads.stop - loads.start)]
+            whole[:, loads] = by[:, constants]
+            start = self.start_at(structure, run)
+            assert wanted is not None
+            changed = [*np.flatnonzero(wanted[n : len(structure.terms)]) + n]
+            for place in (*changed, *range(start.start, start.stop)):
+                moved = z.copy()
+                moved[place] += (step := self._step(structure, z, place, far[place]))
+                after = self.errors_of(structure, moved, run, sloped=False)[0]
+                whole[:, place] = ((after - before) / step).ravel()
+            slopes.append(whole)
+        if self.starts:
+            first = len(structure.terms) + len(structure.bench.unmeasured) * structure.m
+            scale = np.full((size - first) // (1 + len(structure.lags)), UNLIKELY)
+            scale = np.repeat(scale[:, np.newaxis], 1 + len(structure.lags), axis=1)
+            scale[:, 1:] /= float(structure.bench.travel.mean())
+            errors.append(scale.ravel() * z[first:])
+            whole = np.zeros((size - first, size))
+            whole[:, first:] = np.diag(scale.ravel())
+            slopes.append(whole)
+        return errors, np.concatenate(slopes) if wanted is not None else np.zeros((0, size))
+
+    def _step(self, structure: Structure, z: Array, place: int, far: bool) -> float:
+        """Return a change of a number by which slopes are found, small or not, away from its end."""
+        n = structure.mix.shape[1]
+        if place >= len(structure.terms):
+            return STEP
+        _, high, much = (end[place - n] for end in structure.ends())
+        step = float(much) * (FIRST_STEP if far else STEP)
+        return step if z[place] + step <= high else -step
+
+    @property
+    def all_at_rest(self) -> bool:
+        """Whether all runs in which something moves begin at rest."""
+        return all(self.still(run) or at_rest(self.data, run) for run in self.runs)
+
+    def most_resisted(self, structure: Structure, z: Array) -> float:
+        """Return the most that any muscle resists shortening with where it was measured."""
+        values, most = structure.expanded(z[: len(structure.terms)]), 0.0
+        balance = structure.block(values)
+        springs = np.array(balance.springs).reshape(structure.m, -1, 1 + structure.m)
+        for run in self.runs:
+            x, loads = np.split(run.scheduled, [len(structure.bench.scheduled)], axis=1)
+            around = np.column_stack([np.ones(len(x)), run.outputs])
+            pulled = np.einsum("qt,jqi,ti->tj", structure.powers(x.T), springs, around)
+            most = max(most, -float((pulled + loads @ np.array(balance.loads).T).min()))
+        return most
+
+    def simulated(
+        self, blocks: Sequence[Block], data: TrainingData, structure: Structure, z: Array
+    ) -> Array:
+        """Return free-running outputs of blocks where samples count, shape (blocks, n).
+
+        Every run is under its own load, and begins with what it was found to remember.
+        """
+        outputs = []
+        for run in data.runs:
+            loads, start = z[self.loads_at(structure, run)], z[self.start_at(structure, run)]
+            given = []
+            for model in blocks:
+                placed = balance_in(model)
+                assert placed is not None
+                balance = placed.balance
+                if loads.any():
+                    springs = np.array(balance.springs)
+                    springs[:, 0] += loads * balance.areas[0][0]
+                    balance = replace(balance, springs=rows(springs))
+                    parts = (*placed.before, balance.inverse(), *placed.behind)
+                    model = Series(parts) if len(parts) > 1 else parts[0]
+                state = model.initial_state(run.inputs[0])
+                if start.size:
+                    first = run.inputs[0].copy()
+                    for part in placed.before:
+                        first[: structure.n] = run_many(
+                            [part], first[np.newaxis, : structure.n], sample_time=run.sample_time
+                        )[0][0]
+                    self._begin(balance, state, first, structure, z, run)
+                found = run_many(
+                    [model], run.inputs, sample_time=run.sample_time, initial=tuple(state)
+                )
+                given.append(found[0][run.counts].ravel())
+            outputs.append(np.array(given))
+        return np.concatenate(outputs, axis=1)
+
+    def _begin(
+        self, balance: Balance, state: Array, first: Array, structure: Structure, z: Array, run: Run
+    ) -> None:
+        """Bring the end of a state at rest to where the first pressures hold muscles, with its start."""
+        n, m = structure.n, structure.m
+        own = state[state.size - balance.n_states :]  # behind it nothing remembers
+        c, q = balance.coefficients(1.0), own[:m].copy()
+        p, x = np.ascontiguousarray(first[:n]), np.ascontiguousarray(first[n:])
+        solve_equilibrium(c, own, AT_REST, q, x, p, np.zeros(balance.n_scratch))
+        update_state(c, own, AT_REST, q, p, x)
+        begun = self.begun(structure, z, c, run, p)
+        assert begun is not None
+        own[m + n : m + n + begun.size] = begun
+
+    # -- the linear stage ------------------------------------------------------------------------
+
+    def balanced(self, structure: Structure, z: Array, active: Mask) -> Array:
+        """Return what is found of linear numbers where the muscles were measured, where forces balance.
+
+        Forces are weighed by stiffness, so that errors are of displacement. They do not tell how large
+        areas at rest are: those of muscles with a coordinate each are 1 where samples are on average.
+        """
+        n, terms = structure.mix.shape[1], structure.terms
+        of_force = structure.bench.of_force
+        fixed = [not active[i] or (terms[i][:2] == ("areas", 0) and not of_force) for i in range(n)]
+        chosen = np.flatnonzero(~np.array(fixed))
+        beyond = np.array([terms[i].kind == "areas" and not of_force for i in chosen])
+        bounded = (structure.not_negative @ structure.mix > 0)[chosen] & np.array(
+            [terms[i].muscle is None for i in chosen]
+        )
+        rows, targets = [], []
+        start = z.copy()
+        start[:n] = 0.0
+        for run in self.runs:
+            lacking, slopes = self.followed(structure, start, run, held=True)
+            loads = self.loads_at(structure, run)
+            own = np.zeros((*lacking.shape, self.size(structure) - len(terms)))
+            for j in range(loads.stop - loads.start):
+                own[:, j, loads.start - len(terms) + j] = 1.0
+            counts = self.counting(run, structure)[:, np.newaxis]
+            targets.append(-lacking * counts)
+            found = np.concatenate([slopes @ structure.mix[:, chosen], own], axis=2)
+            rows.append(found * counts[..., np.newaxis])
+        whole, target = np.concatenate(rows), np.concatenate(targets)
+        bounded = np.append(bounded, np.zeros(whole.shape[2] - bounded.size, dtype=bool))
+        narrowing = np.flatnonzero(beyond)
+        means = np.einsum("tjc,tj->c", whole[..., narrowing], target) / float((target**2).sum())
+        whole[..., narrowing] -= means * target[..., np.newaxis]
+        weight = np.ones_like(target)
+        for _ in range(PASSES):
+            table = (
+                np.concatenate([whole, target[..., np.newaxis]], axis=2) * weight[..., np.newaxis]
+            )
+            flat = table.reshape(-1, table.shape[2])
+            least = bounded_least_squares(flat.T @ flat, bounded)
+            at_rest = max(1.0 + float(means @ least[narrowing]), LEAST_AT_REST)
+            start[chosen] = least[: chosen.size] / at_rest
+            start[len(terms) : len(terms) + least.size - chosen.size] = (
+                least[chosen.size :] / at_rest
+            )
+            if not of_force:
+                weight = 1.0 / (self.stiffness(structure, start) * structure.bench.travel)
+        # the same within physics, in the unit in which the area is 1 on average
+        scaling = np.zeros(chosen.size)
+        scaling[narrowing] = means
+        table = np.concatenate([whole, target[..., np.newaxis]], axis=2) * weight[..., np.newaxis]
+        triangle = np.linalg.qr(table.reshape(-1, table.shape[2]), mode="r")
+        size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
+        system = np.vstack([triangle[:, :-1], np.sqrt(RIDGE) * np.diag(np.maximum(size, 1e-300))])
+        right = np.append(triangle[:, -1], np.zeros(size.size))
+        sides, bounds = structure.conditions(structure.expanded(start[: len(terms)]))
+        mix = structure.mix[:, chosen] + np.outer(structure.base, scaling)
+
+        def asked(side: Array, bound: Array) -> tuple[Array, Array]:
+            on = side @ mix - np.outer(bound, scaling)
+            return np.hstack(
+                [on, np.zeros((len(on), size.size - chosen.size))]
+            ), bound - side @ structure.base
+
+        sides, bounds = asked(sides, bounds)
+        for _ in range(MOST_CUTS):
+            asks = (sides != 0).any(axis=1)
+            least = constrained_least_squares(system, right, sides[asks], bounds[asks])[0]
+            at_rest = max(1.0 + float(scaling @ least[: chosen.size]), LEAST_AT_REST)
+            start[chosen] = least[: chosen.size] / at_rest
+            start[len(terms) : len(terms) + size.size - chosen.size] = (
+                least[chosen.size :] / at_rest
+            )
+            side, softest = structure.softest(structure.base + structure.mix @ start[:n])
+            if softest >= 0.5 * structure.least_stiffness:
+                break
+            more = asked(side[np.newaxis], np.array([structure.least_stiffness]))
+            sides, bounds = np.vstack([sides, more[0]]), np.append(bounds, more[1])
+        return start
+
+    def stiffness(self, structure: Structure, z: Array) -> Array:
+        """Return how stiff every coordinate is where stops slide but for a third, shape (k, m)."""
+        values, found = structure.expanded(z[: len(structure.terms)]), []
+        for run in self.runs:
+            places = self.places(run)
+            q, x = run.outputs[places], run.scheduled[places]
+            p = self.acting(run, structure, values)[places]
+            powers = structure.powers(x[:, : len(structure.bench.scheduled)].T)
+            own = np.empty_like(q)
+            for j in range(structure.m):
+                springs = values[structure.on("springs", j)].reshape(-1, 1 + structure.m)
+                own[:, j] = springs[:, 1 + j] @ powers
+            scale = structure.bench.scale
+            for k, way in enumerate(structure.bench.directions):
+                u = q @ way / scale
+                elastic = polynomial.polyder([0.0, 0.0, *values[structure.of("elasticity", k)]])
+                narrowing = polynomial.polyder(values[structure.of("areas", k)])
+                stiff = polynomial.polyval(u, elastic) / scale
+                stiff -= p[:, k] * polynomial.polyval(u, narrowing) / scale
+                stiff += float(values[structure.of("bladder", k)].sum())
+                stiff += 0.3 * float(values[structure.of("friction", k)].sum())
+                own += np.outer(stiff, way**2)
+            found.append(own)
+        whole = np.concatenate(found)
+        return np.maximum(whole, 0.1 * np.median(np.abs(whole), axis=0))
+
+
+def bounded_least_squares(gram: Array, bounded: Mask) -> Array:
+    """Return the least squares of products of columns and, last, a target; some are not negative."""
+    from scipy.optimize import nnls
+
+    size = np.sqrt(np.maximum(np.diag(gram)[:-1], 1e-300))
+    a = gram[:-1, :-1] / np.outer(size, size) + RIDGE * np.eye(size.size)
+    b, free, found = gram[:-1, -1] / size, ~bounded, np.zeros(size.size)
+    both = np.column_stack([a[np.ix_(free, bounded)], b[free]])
+    across = np.linalg.solve(a[np.ix_(free, free)], both)
+    if bounded.any():
+        inner = a[np.ix_(bounded, bounded)] - a[np.ix_(bounded, free)] @ across[:, :-1]
+        right = b[bounded] - a[np.ix_(bounded, free)] @ across[:, -1]
+        sizes, ways = np.linalg.eigh(inner)
+        root = np.sqrt(np.maximum(sizes, RIDGE))
+        found[bounded] = nnls((ways * root).T, ways.T @ right / root, maxiter=100 * len(right))[0]
+    found[free] = across[:, -1] - across[:, :-1] @ found[bounded]
+    return found / size
+
+
+def compared(data: TrainingData, most: int, *, of_force: bool = False) -> Problem:
+    """Return the problem of following runs, of which about so many numbers are compared."""
+    total = sum(len(run.outputs) for run in data.runs) * len(data.outputs)
+    return Problem(data, max(1, total // most), of_force=of_force)
+
+
+def coarser(data: TrainingData, most: int) -> TrainingData:
+    """Return data of about so many samples at most: thinned where inputs go straight between them."""
+    total = sum(len(run.outputs) for run in data.runs)
+    every = max(1, -(-total // most))
+    while every > 1 and not _straight(data, every):
+        every -= 1
+    return replace(data, runs=tuple(run.thinned(every) for run in data.runs))
+
+
+def _straight(data: TrainingData, every: int) -> bool:
+    missed = []
+    for run in data.runs:
+        t = np.arange(len(run.driven))
+        missed += [np.interp(t, t[::every], p[::every]) - p for p in run.driven.T]
+    return float(np.std(np.concatenate(missed))) <= STRAIGHT * float(data.highest.max())

@@ -1116,6 +1116,15 @@ def load_estimate(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return out
 
 
+def prompt(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    late = max(round(block.late / sample_time) - 1, 0)
+    asked = [row[0] for row in inputs]
+    return [
+        [row[1] + asked[max(t - 1, 0)] - asked[max(t - 1 - late, 0)]]
+        for t, row in enumerate(inputs)
+    ]
+
+
 def pid(block: Any, inputs: Rows, sample_time: float) -> Rows:
     n = len(block.driven)
     lowest, highest = block.limits
@@ -1265,6 +1274,7 @@ TWINS: dict[str, Twin] = {
     "preisach": stepping(_Relays),
     "preisach-inverse": solved(_Relays),
     "process-model": process_model,
+    "prompt": prompt,
     "rate-dependent-pi": stepping(_RateDependentPI),
     "rate-dependent-pi-inverse": solved(_RateDependentPI),
     "state-network": state_network,

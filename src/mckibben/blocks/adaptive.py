@@ -37,7 +37,15 @@ from mckibben.blocks.base import (
 )
 from mckibben.blocks.compose import Layout, Series
 from mckibben.blocks.feedback import MEASURED
-from mckibben.blocks.fields import LONGEST_DELAY, STRICT, Channel, Initial, Vector, vector
+from mckibben.blocks.fields import (
+    LONGEST_DELAY,
+    STRICT,
+    Channel,
+    ChannelField,
+    Initial,
+    Vector,
+    vector,
+)
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.learning import (
@@ -52,6 +60,7 @@ from mckibben.blocks.learning import (
     covariance_of,
     start_root,
 )
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
@@ -207,10 +216,14 @@ class Prompt(Block):
     rate_dependent: ClassVar[bool] = True
     n_missable: ClassVar[int] = 1  # the measurement
     n_states: ClassVar[int] = LONGEST_DELAY + 1
+    parameters: ClassVar[tuple[str, ...]] = ("late",)
+    notation: ClassVar[Notation] = Notation(
+        r"y_t = y_{m,t} + r_{t-1} - r_{t-T_d/T}", late="T_d [s]"
+    )
 
     late: Annotated[FiniteFloat, Gt(0)]
-    reference: Channel
-    measured: Channel
+    reference: ChannelField
+    measured: ChannelField
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the dead time in samples, but the one for which a command was held."""

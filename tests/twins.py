@@ -921,12 +921,12 @@ class _Parallel:
         for power, x_q in enumerate([1.0] + [v**d for v in scheduling for d in _degrees(block)]):
             row = block.springs[j][power * (1 + m) : (power + 1) * (1 + m)]
             force += x_q * (row[0] + sum(s * v for s, v in zip(row[1:], q, strict=True)))
-        met = list(block.obstacles[j]) if block.obstacles else []
-        while met:
-            side, place, stiff, *by = met[: 3 + len(scheduling)]
-            met = met[3 + len(scheduling) :]
-            beyond = q[j] - place if side * (q[j] - place) > 0.0 else 0.0
-            force += (stiff + _sum(tuple(by), scheduling)) * beyond
+        if block.obstacles:
+            width = 3 + len(scheduling)
+            for first in range(0, len(block.obstacles[j]), width):
+                side, place, stiff, *by = block.obstacles[j][first : first + width]
+                stiffness = stiff + _sum(tuple(by), scheduling)
+                force += stiffness * side * max(side * (q[j] - place), 0.0)
         return force
 
     def area(self, k: int, y: float) -> float:
@@ -1116,6 +1116,15 @@ def load_estimate(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return out
 
 
+def prompt(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    late = max(round(block.late / sample_time) - 1, 0)
+    asked = [row[0] for row in inputs]
+    return [
+        [row[1] + asked[max(t - 1, 0)] - asked[max(t - 1 - late, 0)]]
+        for t, row in enumerate(inputs)
+    ]
+
+
 def pid(block: Any, inputs: Rows, sample_time: float) -> Rows:
     n = len(block.driven)
     lowest, highest = block.limits
@@ -1265,6 +1274,7 @@ TWINS: dict[str, Twin] = {
     "preisach": stepping(_Relays),
     "preisach-inverse": solved(_Relays),
     "process-model": process_model,
+    "prompt": prompt,
     "rate-dependent-pi": stepping(_RateDependentPI),
     "rate-dependent-pi-inverse": solved(_RateDependentPI),
     "state-network": state_network,

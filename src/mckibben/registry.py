@@ -61,6 +61,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "predictive": "mckibben.blocks.predictive:Predictive",
         "preisach": "mckibben.blocks.hysteresis.preisach:Preisach",
         "process-model": "mckibben.blocks.dynamics.process_model:ProcessModel",
+        "prompt": "mckibben.blocks.adaptive:Prompt",
         "rate-dependent-pi": "mckibben.blocks.hysteresis.pi:RateDependentPI",
         "recurrent-fuzzy-network": (
             "mckibben.blocks.coupled.recurrent_fuzzy_network:RecurrentFuzzyNetwork"

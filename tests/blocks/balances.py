@@ -64,11 +64,13 @@ def balances(
     turned = 2.0 * np.pi * (np.arange(muscles) + rng.uniform(-0.1, 0.1, muscles)) / muscles
     directions = rng.uniform(0.5, 1.0) * np.stack([np.cos(turned), np.sin(turned)], axis=1)
     walls = rng.uniform(0.0, 0.1, muscles)
-
-    def obstacles(side: int, low: float, high: float) -> Array:
-        most = (side, high, 9.0, *n_x * (2.0,))
-        return rng.uniform((side, low, 0.0, *n_x * (0.0,)), most, (n, 3 + n_x))
-
+    ends = (
+        np.array([(1.0, 5.0, 0.0), (-1.0, -5.0, 0.0)]),
+        np.array([(1.0, 25.0, 9.0), (-1.0, 5.0, 9.0)]),
+    )
+    obstacles = np.concatenate(
+        [rng.uniform(*ends, (n, 2, 3)), rng.uniform(0.0, 2.0, (n, 2, n_x))], axis=2
+    )
     return Balance(
         springs=rows(springs.reshape(n, -1)),
         elasticity=rows(rng.uniform(0.0, 6.0, (muscles, 2))),
@@ -93,9 +95,7 @@ def balances(
         mass=vector(rng.uniform(0.0, 0.03, muscles)) if heavy else (),
         asymmetry=draw(st.none() | numbers(0.3, 2.0)),
         grips=vector(rng.uniform(0.0, 0.5, n_x)) if draw(st.booleans()) else (),
-        obstacles=rows(np.hstack([obstacles(1, 5.0, 25.0), obstacles(-1, -4.0, 2.0)]))
-        if draw(st.booleans())
-        else (),
+        obstacles=rows(obstacles.reshape(n, -1)) if draw(st.booleans()) else (),
         directions=rows(directions[:, :n]) if crowded else (),
         preload=draw(numbers(0.0, 2.0)) if crowded else 0.0,
     )

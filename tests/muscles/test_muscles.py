@@ -40,7 +40,7 @@ def test_virtual_muscles_are_those_of_the_rigs_and_marked() -> None:
 
 
 def test_traits_do_not_know_size() -> None:
-    balance = replace(RAIL.balance, asymmetry=0.8, obstacles=((1.0, 30.0, 5.0),))
+    balance = replace(RAIL.balance, asymmetry=0.8, obstacles=((1.0, 30.0, 5.0, -1.0, 2.0, 4.0),))
     larger = muscles.scaled(balance, RAIL.sheet, OTHER)
     np.testing.assert_allclose(
         traits(larger, OTHER), traits(RAIL.balance, RAIL.sheet), rtol=0, atol=1e-9

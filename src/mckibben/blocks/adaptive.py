@@ -6,8 +6,9 @@ inverse runs with them as they are, so that model and inverse match at every ste
 
 A measurement answers the reference of the step before, as behind a compensator: since the model gives
 exactly what was asked for, what it predicts is known from the inverse's own memory. One part of a series
-learns (mpi, cpi and their kin): parts behind it are undone on what is measured as on the reference, each
-with a memory of its own, and parts before it on what the inverse gives.
+learns (mpi, cpi, a balance behind its valves): parts behind it are undone on what is measured as on the
+reference, each with a memory of its own, and parts before it on what the inverse gives. What comes late
+by a dead time is moved on first by as much as the reference has gone on since (`Prompt`).
 """
 
 from __future__ import annotations
@@ -36,7 +37,15 @@ from mckibben.blocks.base import (
 )
 from mckibben.blocks.compose import Layout, Series
 from mckibben.blocks.feedback import MEASURED
-from mckibben.blocks.fields import LONGEST_DELAY, STRICT, Channel, Initial, Vector, vector
+from mckibben.blocks.fields import (
+    LONGEST_DELAY,
+    STRICT,
+    Channel,
+    ChannelField,
+    Initial,
+    Vector,
+    vector,
+)
 from mckibben.blocks.inverse import Inverse, Invertible
 from mckibben.blocks.kernels import Step, kernel, remember, step
 from mckibben.blocks.learning import (
@@ -51,6 +60,7 @@ from mckibben.blocks.learning import (
     covariance_of,
     start_root,
 )
+from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
@@ -206,10 +216,14 @@ class Prompt(Block):
     rate_dependent: ClassVar[bool] = True
     n_missable: ClassVar[int] = 1  # the measurement
     n_states: ClassVar[int] = LONGEST_DELAY + 1
+    parameters: ClassVar[tuple[str, ...]] = ("late",)
+    notation: ClassVar[Notation] = Notation(
+        r"y_t = y_{m,t} + r_{t-1} - r_{t-T_d/T}", late="T_d [s]"
+    )
 
     late: Annotated[FiniteFloat, Gt(0)]
-    reference: Channel
-    measured: Channel
+    reference: ChannelField
+    measured: ChannelField
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return the dead time in samples, but the one for which a command was held."""
@@ -351,11 +365,9 @@ class Adaptive(Block):
     @cached_property
     def _prompt(self) -> tuple[Prompt, ...]:
         """What makes up for a dead time, of every measurement."""
-        late, channels = (
-            self.forward.dead_time,
-            zip(self.forward.outputs, self.measured, strict=True),
-        )
-        return tuple(Prompt(late, *pair) for pair in channels) if late > 0 else ()
+        late = self.forward.dead_time
+        pairs = zip(self.forward.outputs, self.measured, strict=True)
+        return tuple(Prompt(late, *pair) for pair in pairs) if late > 0 else ()
 
     @cached_property
     def learnable(self) -> Learnable:

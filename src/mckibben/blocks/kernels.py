@@ -42,6 +42,11 @@ def kernel(function: Function) -> Function:
     return deferred(function, _nrt=False)
 
 
+def short_kernel(function: Function) -> Function:
+    """Compile a `kernel` into all that call it: one that takes no longer than to pass it its arrays."""
+    return deferred(function, _nrt=False, forceinline=True)
+
+
 def summing_kernel(function: Function) -> Function:
     """Compile with the terms of weighted sums free to be reordered, which lets them vectorise.
 

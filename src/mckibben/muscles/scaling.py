@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.fields import rows, vector
 from mckibben.muscles.sheet import Sheet
@@ -33,7 +34,7 @@ def scaled(balance: Balance, of: Sheet, to: Sheet) -> Balance:
     force = area * pressure
     per_length = force / length
 
-    def times(table: object, by: float) -> tuple[tuple[float, ...], ...]:
+    def times(table: object, by: float | Array) -> tuple[tuple[float, ...], ...]:
         made: tuple[tuple[float, ...], ...] = rows(by * np.array(table))
         return made
 
@@ -41,8 +42,6 @@ def scaled(balance: Balance, of: Sheet, to: Sheet) -> Balance:
     springs[:, 0] *= force
     springs[:, 1:] *= per_length
     span = balance.pressure_range
-    obstacles = np.array(balance.obstacles).reshape(-1, 3 + balance.n_schedules)
-    obstacles *= (1.0, length, *(1 + balance.n_schedules) * (per_length,))
     return replace(
         balance,
         springs=rows(springs),
@@ -56,7 +55,7 @@ def scaled(balance: Balance, of: Sheet, to: Sheet) -> Balance:
         limits=vector(length / pressure * np.array(balance.limits)),
         grip=balance.grip * pressure,
         grips=vector(pressure * np.array(balance.grips)),
-        obstacles=rows(obstacles.reshape(np.shape(balance.obstacles))),
+        obstacles=times(balance.obstacles, np.tile((1.0, length, per_length), balance.n_obstacles)),
         preload=balance.preload * pressure,
         hull=times(balance.hull, length),
         scale=balance.scale * length,

@@ -381,11 +381,6 @@ class Balance(Invertible):
         return len(self.scheduled) - self.n_loads
 
     @property
-    def n_obstacles(self) -> int:
-        """How many obstacles every coordinate may meet."""
-        return len(self.obstacles[0]) // (3 + self.n_schedules) if self.obstacles else 0
-
-    @property
     def moves(self) -> Array:
         """How much every muscle shortens by every coordinate, shape (n, m)."""
         return np.array(self.directions) if self.directions else np.eye(len(self.given))
@@ -395,6 +390,11 @@ class Balance(Invertible):
         """Lowest and highest coordinates that the shortenings known come to, shape (m, 2)."""
         ends = np.linalg.pinv(self.moves)[:, :, np.newaxis] * np.array(self.hull)
         return np.stack([ends.min(axis=2).sum(axis=1), ends.max(axis=2).sum(axis=1)], axis=1)
+
+    @property
+    def n_obstacles(self) -> int:
+        """How many obstacles every coordinate may meet."""
+        return len(self.obstacles[0]) // (3 + self.n_schedules) if self.obstacles else 0
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]

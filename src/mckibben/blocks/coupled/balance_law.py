@@ -7,21 +7,22 @@ where every coordinate has a muscle of its own), virtual work asks at every coor
 
     R = E(y) + sum_m h_m s_m + sum_l kappa_l v_l + (d + l (A / A_0)^2) y' + m y'' - p A(y),
 
-the obstacle where q is beyond it alone, and R what a muscle resists shortening with, up to b, at which it goes slack. R is linear in its
-coefficients, and `resistance` fills the terms that they multiply. Stops s follow the stretch y + w p of
-the wall, up to r (p + p_0 + g x) and down to that times a ratio; v, what a lag is behind, relaxes with
-its time constant; the line, which resists a flow of A y', has the area of the last sample; accelerations
-are Houbolt's differences of four samples: of second order, stable, and without echo in pressures.
+the obstacle where q is beyond it alone, and R what a muscle resists shortening with, up to b, at which
+it goes slack. R is linear in its coefficients, and `resistance` fills the terms that they multiply.
+Stops s follow the stretch y + w p of the wall, up to r (p + p_0 + g x) and down to that times a ratio;
+v, what a lag is behind, relaxes with its time constant; the line, which resists a flow of A y', has the
+area of the last sample; accelerations are Houbolt's differences of four samples: of second order,
+stable, and without echo in pressures.
 
 Pressures follow from coordinates muscle by muscle; coordinates from pressures as the minimum of a convex
 energy, by Newton's method with a search along every step.
 
 Coefficients: the head, r (m), decays and gains of the lags (l each), g (schedules); of every coordinate
-its springs (powers of what schedules by 1 + coordinates), loads, and of obstacles the side (1 or -1),
-place and stiffness; of every muscle lowest and highest shortening known, w, b, W, then the coefficients
-of its terms: d, l, m, own spring, elasticity, area, friction, relaxation. State: coordinates, stretches, stops (muscle by
-muscle), lags (the same), with mass the last two moves of each muscle, the tare of coordinates, whether
-nothing came before, samples amiss.
+its springs (powers of what schedules by 1 + coordinates), loads, and of every obstacle its side (1 or
+-1), place and stiffness; of every muscle lowest and highest shortening known, w, b, W, then the
+coefficients of its terms: d, l, m, own spring, elasticity, area, friction, relaxation. State:
+coordinates, stretches, stops (muscle by muscle), lags (the same), with mass the last two moves of each
+muscle, the tare of coordinates, whether nothing came before, samples amiss.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.kernels import DERIVED, kernel
+from mckibben.blocks.kernels import DERIVED, kernel, short_kernel
 from mckibben.blocks.solving import eliminate
 
 HEAD = 21
@@ -105,7 +106,7 @@ def work_size(c: Array) -> int:
 # -- forces --------------------------------------------------------------------------------------
 
 
-@kernel
+@short_kernel
 def shortening(c: Array, k: int, q: Array) -> float:
     """Return how much shorter muscle k is at coordinates."""
     if c[20] == 0.0:
@@ -159,7 +160,7 @@ def coupling_force(c: Array, j: int, q: Array, x: Array, gradient: Array) -> flo
     return force
 
 
-@kernel
+@short_kernel
 def area(c: Array, k: int, y: float) -> tuple[float, float]:
     """Return a muscle's effective area, and its slope; beyond what is known it goes on straight."""
     own, place = muscle_at(c, k), terms_at(c, k) + DYNAMIC + int(c[7])
@@ -177,7 +178,7 @@ def area(c: Array, k: int, y: float) -> tuple[float, float]:
     return least, 0.0
 
 
-@kernel
+@short_kernel
 def friction_pressure(c: Array, p: float, x: Array) -> float:
     """Return the pressure that the limits of friction are proportional to."""
     total = p + c[11]
@@ -187,7 +188,7 @@ def friction_pressure(c: Array, p: float, x: Array) -> float:
     return max(total, 0.0)
 
 
-@kernel
+@short_kernel
 def friction(
     c: Array,
     k: int,

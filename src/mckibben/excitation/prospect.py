@@ -49,8 +49,8 @@ EXACT = 1e-5
 """Error over the range below which recordings are the model's own."""
 
 EARLY, LARGER = 5, 2.0
-"""Share of a recording that is its first part, one in so many, and how much larger errors are there where
-it did not begin at rest."""
+"""Share of a recording that is its first part, one in so many, and how much larger errors are there
+where it did not begin at rest."""
 
 MOST_SAMPLES = 20_000
 """Of recordings, to know what they tell."""

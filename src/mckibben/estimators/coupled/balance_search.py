@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
-from mckibben.estimators.coupled.balance_prior import Belief
+from mckibben.estimators.coupled.balance_prior import FIRST_NOISE, Belief
 from mckibben.estimators.coupled.balance_problem import Problem, bounded_least_squares
 from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
@@ -45,7 +45,7 @@ UNKNOWN = 1e-10
 FAR, APART = 0.5, 0.7
 """Change of shape in one step, relative to what is much; least difference of the logarithms of lags."""
 
-NOISES = tuple(np.geomspace(1e-4, 0.1, 10).tolist())
+NOISES = tuple(np.geomspace(1e-4, FIRST_NOISE, 7).tolist())
 """Noise of recordings, relative to the range, by which a belief may be weighed."""
 
 SLOW, SLOWEST = 1e-3, 2
@@ -94,7 +94,10 @@ class Search:
         """Return the search in which the belief has the weight by which what is left out is found best."""
         if self.belief is None:
             return self
-        free, bounded = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool)), self._bounded(z.size)
+        free, bounded = (
+            np.append(self.active, np.ones(z.size - self.active.size, dtype=bool)),
+            self._bounded(z.size),
+        )
         grams = self._grams(z, self.active)
         likely = self._likely(z, self.active) / self.belief.noise**2
         missed = [_left_out(grams, free, z, bounded, noise**2 * likely).sum() for noise in NOISES]
@@ -233,7 +236,7 @@ class Search:
             ]
             errors = [missed(option) for option in options]
             first = int(np.argmin([one.sum() for one in errors])) if errors else 0
-            gain = best - errors[first] if errors else np.zeros(1)
+            gain = (best - errors[first]) / best.sum() if errors else np.zeros(1)
             if not gain.sum() > np.sqrt(gain.size) * gain.std():
                 break
             active, best = options[first], errors[first]

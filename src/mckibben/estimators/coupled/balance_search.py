@@ -91,7 +91,7 @@ class Search:
         return np.append(errors, far), np.concatenate([slopes, whole])
 
     def weighed(self, z: Array) -> Search:
-        """Return the search in which the belief has the weight by which what is left out is found best."""
+        """Return the search in which the belief has the weight that finds what is left out best."""
         if self.belief is None:
             return self
         free, bounded = (
@@ -297,7 +297,7 @@ class Search:
         return bounded
 
     def without_folds(self, z: Array) -> list[Array]:
-        """Return what a step finds without each part of the runs in turn; nothing if physics allows none."""
+        """Return what a step finds without each part of the runs; nothing if physics allows none."""
         free = np.zeros(z.size, dtype=bool)
         free[self.free] = True
         parts = _reduced(self._grams(z, self.active), free, z)
@@ -375,8 +375,8 @@ def _blocks(parts: list[Array]) -> list[list[Array]]:
 def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask, likely: Array) -> Array:
     """Return the squared errors of every block by what least squares of the others find.
 
-    ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what is
-    not free is as it is.
+    ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what
+    is not free is as it is.
     """
     parts, likely = _reduced(grams, free, z), _reduced(likely[np.newaxis], free, z)[0]
     folds = np.arange(len(grams)) * FOLDS // len(grams)

@@ -1,7 +1,7 @@
 """What priors from the library are worth: python docs/measured/priors.py [FOLDER].
 
-The muscles of virtual rigs, 10 s with a data sheet and a library that lacks the muscle beside 90 s without;
-and, from FOLDER (measured recordings, festo_isometric_20mm in it), a muscle of 300 mm from one of 150 mm.
+Muscles of virtual rigs, 10 s with a data sheet and a library that lacks the muscle beside 90 s without;
+and, from FOLDER (measured recordings, festo_isometric_20mm in it), one of 300 mm from one of 150 mm.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from mckibben.signals.broadband import random_wave
 
 LITTLE, MUCH, TEST = 10.0, 90.0, 60.0
 LOW, HIGH, FASTEST, PULL = 0.17, 0.92, 0.3, 0.05
-"""Of random pressures, as shares of the highest, and their highest frequency [Hz]; share of the force that
-hangs at the muscle."""
+"""Of random pressures, as shares of the highest, and their highest frequency [Hz]; share of the force
+that hangs at the muscle."""
 
 SEEDS, TESTS = range(5), range(100, 103)
 

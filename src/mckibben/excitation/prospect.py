@@ -10,7 +10,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.equations import quantities
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.coupled.balance_prior import noise_of
 from mckibben.excitation.believed import Belief, telling
 from mckibben.excitation.candidates import random_plan
 from mckibben.excitation.information import Criterion, Known, Noise, Slopes, crossed
@@ -306,3 +305,20 @@ def _likely(
         else:
             found.append(block)
     return found
+
+
+def noise_of(errors: list[Array]) -> float:
+    """Return the noise of runs' errors as if of independent samples: that of their sums.
+
+    Errors that stay alike over many samples tell no more than as many fewer.
+    """
+    power = sum(float(e @ e) for e in errors)
+    count = sum(e.size for e in errors)
+    alike = 1.0
+    longest = max(e.size for e in errors) // 2
+    for lag in range(1, longest):
+        shared = sum(float(e[lag:] @ e[:-lag]) for e in errors if e.size > lag) / power
+        if shared <= 0.0:
+            break
+        alike += 2.0 * shared
+    return float(np.sqrt(power / count * alike))

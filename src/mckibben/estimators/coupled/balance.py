@@ -34,7 +34,7 @@ from mckibben.estimators.coupled.balance_bench import (
     without_held,
     without_load,
 )
-from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, told_by
+from mckibben.estimators.coupled.balance_prior import Belief, Told, believed, check_alone, told_by
 from mckibben.estimators.coupled.balance_problem import coarser, compared, front, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Bench, Structure, Term
@@ -219,6 +219,8 @@ class BalanceEstimator(CoupledEstimator):
             for name in names
         ]
         check_numbers(data)
+        if self.prior is not None:
+            check_alone(data)
         data, behind, ways = from_zero(data, np.eye(1) if self.of_force else directions(data))
         bench = replace(bench_of(data, ways, tare=self.tare), of_force=self.of_force)
         if not bench.tare:
@@ -447,8 +449,8 @@ class BalanceEstimator(CoupledEstimator):
 
 
 FIRST_GRIP, TOWARDS, REFINED = 0.1, 60, 3
-"""Where what is likely begins, relative to the highest pressure; most steps from there to it; times that
-the noise of recordings is found anew."""
+"""Where what is likely begins, relative to the highest pressure; most steps from there to it; times that a
+belief is weighed anew."""
 
 OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
 """Kinds of terms of which a prior is."""

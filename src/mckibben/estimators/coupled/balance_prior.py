@@ -13,8 +13,9 @@ from pydantic import InstanceOf
 
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import Mask
+from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.coupled.balance_structure import Bench, Structure
+from mckibben.estimators.coupled.base import LOADS
 from mckibben.muscles.prior import Prior, prior_of
 from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import TIMES, traits
@@ -95,19 +96,22 @@ def told_by(given: Any) -> Prior:
     return prior_of(Sheet(**given) if isinstance(given, Mapping) else given)
 
 
-def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
-    """Return a bench that covers all that the muscle can do, recorded or not, and what is likely.
+def check_alone(data: TrainingData) -> None:
+    """Refuse a prior of several muscles, or one that something else than a load schedules.
 
     Raises
     ------
     ModelError
-        Of several muscles, or one that something else than a load schedules.
     """
-    if len(bench.given) != 1 or bench.scheduled:
+    if len(data.inputs) != 1 or any(channel.unit not in LOADS for channel in data.scheduled):
         raise ModelError(
             "a prior is of one muscle under its load alone. Remedy: leave prior out for several "
             "muscles, or where something schedules them"
         )
+
+
+def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
+    """Return a bench that covers all that the muscle can do, recorded or not, and what is likely."""
     prior = told_by(given)
     shortest, longest = bench.lag_range
     return replace(
@@ -116,20 +120,3 @@ def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
         highest=max(bench.highest, prior.sheet.max_pressure_bar),
         lag_range=(min(shortest, LAGS[0]), max(longest, TIMES[-1])),
     ), Belief(prior)
-
-
-def noise_of(errors: list[Array]) -> float:
-    """Return the noise of runs' errors as if of independent samples: that of their sums.
-
-    Errors that stay alike over many samples tell no more than as many fewer.
-    """
-    power = sum(float(e @ e) for e in errors)
-    count = sum(e.size for e in errors)
-    alike = 1.0
-    longest = max(e.size for e in errors) // 2
-    for lag in range(1, longest):
-        shared = sum(float(e[lag:] @ e[:-lag]) for e in errors if e.size > lag) / power
-        if shared <= 0.0:
-            break
-        alike += 2.0 * shared
-    return float(np.sqrt(power / count * alike))

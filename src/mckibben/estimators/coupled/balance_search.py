@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
-from mckibben.estimators.coupled.balance_prior import Belief
+from mckibben.estimators.coupled.balance_prior import FIRST_NOISE, Belief
 from mckibben.estimators.coupled.balance_problem import Problem, bounded_least_squares
 from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
@@ -52,7 +52,7 @@ FAR, APART = 0.5, 0.7
 NO_GAIN = 1e-6
 """Gain by a term, relative to the squared errors, that is rounding."""
 
-NOISES = tuple(np.geomspace(1e-4, 0.1, 10).tolist())
+NOISES = tuple(np.geomspace(1e-4, FIRST_NOISE, 7).tolist())
 """Noise of recordings, relative to the range, by which a belief may be weighed."""
 
 SLOW, SLOWEST = 1e-3, 2
@@ -98,7 +98,7 @@ class Search:
         return np.append(errors, far), np.concatenate([slopes, whole])
 
     def weighed(self, z: Array) -> Search:
-        """Return the search in which the belief has the weight by which what is left out is found best."""
+        """Return the search in which the belief has the weight that finds what is left out best."""
         if self.belief is None:
             return self
         free, bounded = (
@@ -322,7 +322,7 @@ class Search:
         return bounded
 
     def without_folds(self, z: Array) -> list[Array]:
-        """Return what a step finds without each part of the runs in turn; nothing if physics allows none."""
+        """Return what a step finds without each part of the runs; nothing if physics allows none."""
         free = np.zeros(z.size, dtype=bool)
         free[self.free] = True
         parts = _reduced(self._grams(z, self.active), free, z)
@@ -419,8 +419,8 @@ def _blocks(parts: list[Array]) -> list[list[Array]]:
 def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask, likely: Array) -> Array:
     """Return the squared errors of every block by what least squares of the others find.
 
-    ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what is
-    not free is as it is.
+    ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what
+    is not free is as it is.
     """
     parts, likely = _reduced(grams, free, z), _reduced(likely[np.newaxis], free, z)[0]
     folds = np.arange(len(grams)) * FOLDS // len(grams)

@@ -16,7 +16,6 @@ from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
     DYNAMIC,
-    HEAD,
     OWN,
     coordinate_at,
     muscle_at,

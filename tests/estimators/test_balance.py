@@ -12,7 +12,6 @@ from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance, Placed, balance_in
-from mckibben.blocks.coupled.balance_response import response_of
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE, Channel
 from mckibben.blocks.memoryless import PiecewiseLinear
@@ -327,8 +326,8 @@ def test_muscles_that_are_alike_come_out_alike_at_a_joint() -> None:
     assert error(estimator, joint(3)) < 1.5 * NOISE
     balance = balance_of(estimator)
     np.testing.assert_allclose(balance.directions, [[1.0], [-1.0]])
-    alike = response_of(balance, 0.0, 4.0)
-    for first, second in (alike.width, alike.friction, alike.creep, np.array(balance.areas)[:, 0]):
+    widths = [one.value for one in estimator.measured_ if one.kind == "width"]
+    for first, second in (widths, np.array(balance.areas)[:, 0]):
         assert first == pytest.approx(second, rel=0.2)
     np.testing.assert_allclose(balance.areas[0][0], 60.0, rtol=0.1)
     turned = BalanceEstimator().fit([joint(1, -1.0), joint(2, -1.0)])

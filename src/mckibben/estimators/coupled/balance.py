@@ -66,7 +66,7 @@ FINEST, LONGEST = 0.003, 0.5
 """Shortest and longest travels at which stops break away, relative to the stroke."""
 
 PLACES = (0.6, 0.8, 0.9, 0.97)
-"""Of obstacles on the way up, along the range of what is moved; of those on the way down from its end."""
+"""Of obstacles on the way up, along the range of what is moved; on the way down, from its end."""
 
 TERMS = (
     *("elasticity", "areas", "friction", "relaxation", "line", "mass", "obstacle", "springs"),
@@ -82,13 +82,14 @@ class BalanceEstimator(CoupledEstimator):
     Parameters
     ----------
     terms : sequence of str, optional
-        Kinds of terms that may be added to springs, area, friction, relaxation and damping: more degrees
-        of ``elasticity`` and ``areas``, more stops (``friction``) and lags (``relaxation``), the ``line``,
-        ``mass``, an ``obstacle`` either way, springs by squares of what schedules (``springs``), friction
-        that grows with what schedules (``grips``) or differs by direction (``asymmetry``), stretch of the
-        wall (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, or one that fades
-        (``contact``), ``muscles`` that differ, and that go ``slack``. Each is added if the error of what is left out falls by more than
-        its standard error. Default all.
+        Kinds of terms that may be added to springs, area, friction, relaxation and damping: more
+        degrees of ``elasticity`` and ``areas``, more stops (``friction``) and lags (``relaxation``), the
+        ``line``, ``mass``, an ``obstacle`` either way, springs by squares of what schedules
+        (``springs``), friction that grows with what schedules (``grips``) or differs by direction
+        (``asymmetry``), stretch of the wall (``walls``), air's lag in front (``filling``, ``venting``),
+        a ``dead`` zone, or one that fades (``contact``), ``muscles`` that differ, and that go ``slack``.
+        Each is added if the error of what is left out falls by more than its standard error. Default
+        all.
     n_stops : int
         Stops that may be, from which it begins with every other.
     n_lags : int
@@ -201,7 +202,8 @@ class BalanceEstimator(CoupledEstimator):
         """Return the block found, and the data without what tells nothing."""
         data, names = without_held(data)
         tracker.notes += [
-            f"in {name} nothing moves and no force was measured: it is left out. Remedy: record the force"
+            f"in {name} nothing moves and no force was measured: it is left out. Remedy: record the "
+            "force"
             for name in names
         ]
         return super().find(data, tracker)
@@ -285,8 +287,8 @@ class BalanceEstimator(CoupledEstimator):
             lags = np.array(self.lags)
             if lags[0] < shortest or lags[-1] > longest or (np.diff(np.log(lags)) < 0.69).any():
                 raise ModelError(
-                    f"lags of {np.array2string(lags, precision=3)} s are not what these recordings tell. "
-                    "Remedy: give fewer lags, in order, each twice the last or more, from "
+                    f"lags of {np.array2string(lags, precision=3)} s cannot be identified from these "
+                    "recordings. Remedy: give fewer lags, in order, each twice the last or more, from "
                     f"{shortest:.3g} to {longest:.3g} s"
                 )
         sides = [(1, place) for place in PLACES] + [(-1, 1.0 - place) for place in PLACES]
@@ -449,8 +451,8 @@ class BalanceEstimator(CoupledEstimator):
 
 
 FIRST_GRIP, TOWARDS, REFINED = 0.1, 60, 3
-"""Where what is likely begins, relative to the highest pressure; most steps from there to it; times that a
-belief is weighed anew."""
+"""Where what is likely begins, relative to the highest pressure; most steps from there to it; times
+that a belief is weighed anew."""
 
 OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
 """Kinds of terms of which a prior is."""

@@ -1,4 +1,4 @@
-"""What recordings settle before a balance of forces is identified: channels, directions, ranges, loads."""
+"""What recordings settle before a balance is identified: channels, directions, ranges, loads."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ AT_START = 0.02
 """Displacement at the start of a run that is none, relative to the range."""
 
 ONE_SPEED, SLOW = 2.0, 0.05
-"""Ratio of fast to slow speeds up to which there is one; share of the fastest below which inputs rest."""
+"""Ratio of fast to slow speeds up to which there is one; share of the fastest below which they rest."""
 
 
 def with_loads(
@@ -79,7 +79,7 @@ def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
 
 
 def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
-    """Return data without loads and schedules that never change, the loads last; and what was left out."""
+    """Return data without loads and schedules that never change, loads last; and what was left out."""
     kept, constant = list[int](), list[int]()
     for place in range(len(data.scheduled)):
         columns = [run.scheduled[:, place] for run in data.runs]

@@ -1,4 +1,4 @@
-"""Runs as a balance of forces sees them: what it lacks along them, linear; and how it follows them, free.
+"""Runs as a balance of forces sees them: what it lacks along them; and how it follows them, free.
 
 Values are those of `mckibben.estimators.coupled.balance_structure`, and behind them what recordings and
 runs have of their own: of every recording under a load that nobody measured, a constant force on every
@@ -274,7 +274,7 @@ class Problem:
 
         None are computed unless some are ``wanted``. Those by what acts on pressures are differences
         before the muscles, by what is ``new`` of it over as much as is much; those by walls, pushes and
-        starts are differences behind them. Starts that are unlikely are errors, too, after those of runs.
+        starts are differences behind them. Unlikely starts are errors, too, after those of runs.
         """
         if wanted is None:
             errors = [

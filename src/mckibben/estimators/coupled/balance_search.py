@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import compress
+from itertools import compress, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,10 +220,9 @@ class Search:
         lags = [
             i for i, term in enumerate(structure.terms) if term.kind == "lags" and self.active[i]
         ]
-        apart = np.array(
-            [np.eye(z.size)[j] - np.eye(z.size)[i] for i, j in zip(lags, lags[1:], strict=False)]
-        )
-        starts = np.eye(z.size)[z.size - self._n_starts :: 1 + len(structure.lags)]
+        one = np.eye(z.size)
+        apart = np.array([one[j] - one[i] for i, j in pairwise(lags)])
+        starts = one[z.size - self._n_starts :: 1 + len(structure.lags)]
         every = [on_all, box, -box, apart.reshape(-1, z.size), starts, -starts]
         asked = [least - sides @ structure.base, bounds, np.full(len(apart), APART)]
         asked.append(np.full(2 * len(starts), -1.0))

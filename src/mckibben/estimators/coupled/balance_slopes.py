@@ -2,7 +2,7 @@
 
 Either free, where its coordinates are what matters, or held where they were measured, where the forces
 that it then lacks are: those are linear, and memory does not depend on coefficients. The direct slopes
-are the terms of `mckibben.blocks.coupled.balance_law`; what moves them through the past is carried along.
+are the terms of `mckibben.blocks.coupled.balance_law`; what moves them through the past is carried.
 
 Columns of slopes are the coefficients from those of the first coordinate on, then the shape: the grip,
 what schedules friction, the logarithms of the ratio of limits and of lags, places of obstacles, and what

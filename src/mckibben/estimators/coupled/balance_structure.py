@@ -221,9 +221,9 @@ class Structure:
         """Where the shape is, behind the linear coefficients.
 
         The grip [bar]; what friction grows with by schedules; the logarithms of the ratio of limits and
-        of the lags; stretch of walls [mm/bar], the force at which muscles go slack, places of obstacles;
-        time constants of air in front, while filling [s], the logarithm of the ratio of venting, the dead
-        zone [bar], and the pressure over which one fades [bar].
+        of the lags; stretch of walls [mm/bar], forces at which muscles go slack, places of obstacles;
+        time constants of air in front, while filling [s], the logarithm of the ratio of venting, the
+        dead zone [bar], and the pressure over which one fades [bar].
         """
         widths = {
             "grip": 1,
@@ -341,7 +341,7 @@ class Structure:
 
     @cached_property
     def keys(self) -> list[tuple[object, ...]]:
-        """Names of what may be free by which structures share it: limits, lags and obstacles by theirs."""
+        """Names by which structures share what may be free: limits, lags and obstacles by theirs."""
         by: dict[str, Sequence[object]] = {"friction": self.limits, "relaxation": self.lags}
         by |= {"lags": self.lags, "obstacle": self.obstacles, "places": self.m * self.obstacles}
         return [
@@ -541,7 +541,7 @@ class Structure:
         return row
 
     def softest(self, values: Array) -> tuple[Array, float]:
-        """Return where springs are softest: the side that asks them to be stiff there, and how they are."""
+        """Return where springs are softest: what asks them to be stiff there, and how stiff they are."""
         found: list[tuple[float, Array, Array]] = []
         for x in self.bench.corners():
             matrix = np.zeros((self.m, self.m))

@@ -1,7 +1,7 @@
 """What a balance of forces says of muscles: only what its own response shows, and recordings determine.
 
-A number varies as a step without each fifth of recordings finds it (jackknife), and as two displacements do
-that the model misses. One that is not known within a factor of two is not said.
+A number varies as a step without each fifth of recordings finds it (jackknife), and as two displacements
+do that the model misses. One that is not known within a factor of two is not said.
 """
 
 from __future__ import annotations
@@ -143,8 +143,8 @@ def _of_runs(search: Search, z: Array) -> list[str]:
     whole = float(np.sqrt(np.mean(sizes**2)))
     if whole > POOR:
         found.append(
-            f"this model misses {100 * whole:.2g} % of what moves: it does not explain these recordings. "
-            "Remedy: check channels, units, signs and zeros, recording by recording"
+            f"this model misses {100 * whole:.2g} % of what moves: it does not explain these "
+            "recordings. Remedy: check channels, units, signs and zeros, recording by recording"
         )
     found += [
         f"{name} does not begin at rest: its first part does not count. Remedy: begin recordings "
@@ -161,9 +161,9 @@ def _of_loads(search: Search, z: Array, others: list[Array], balance: Balance) -
         share = np.array(balance.loads)[:, j]
         if (share < 0.0).all():
             found.append(
-                f"{channel.name} acts as if it helped the muscles: the more it is, the further they move "
-                "at equal pressures. If it pulls against them, its sign is wrong. Remedy: give loads that "
-                "pull muscles longer as positive"
+                f"{channel.name} acts as if it helped the muscles: the more it is, the further they "
+                "move at equal pressures. If it pulls against them, its sign is wrong. Remedy: give "
+                "loads that pull muscles longer as positive"
             )
     listed = {}
     for run in search.problem.runs:
@@ -171,10 +171,8 @@ def _of_loads(search: Search, z: Array, others: list[Array], balance: Balance) -
         found_load, among = z[place], np.array([one[place] for one in others])
         unsure = 2.0 * np.sqrt(len(among)) * among.std(axis=0) if others else np.abs(found_load)
         if (np.abs(found_load) > unsure).any():
-            share = balance.areas[0][0]
-            listed[run.recording] = (
-                f"{' and '.join(numeral(float(share * v), 3) for v in found_load)} in {run.name}"
-            )
+            each = (numeral(float(balance.areas[0][0] * one), 3) for one in found_load)
+            listed[run.recording] = f"{' and '.join(each)} in {run.name}"
     if listed:
         unit = "N" if balance.areas[0][0] != 1.0 else f"{balance.given[0].unit} on the area at rest"
         found.append(

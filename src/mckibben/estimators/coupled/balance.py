@@ -57,7 +57,7 @@ GRIPS = (0.05, 0.3, 1.0, 4.0)
 ROUNDS, STEPS_BETWEEN = 5, 4
 """Times that terms are added, and steps before each."""
 
-AS_GOOD = 1.25
+AS_GOOD = 1.0
 """Times the error of all but first parts up to which that of all, settled before, is as good."""
 
 FILLINGS = (1.0, 4.0, 16.0)

@@ -252,6 +252,7 @@ def test_a_balance_begun_in_motion_is_its_simulation_from_that_state() -> None:
     solve_equilibrium(c, state, AT_REST, q, inputs[0, 2:], inputs[0, :2], scratch)
     update_state(c, state, AT_REST, q, inputs[0, :2], inputs[0, 2:])
     state[4 : 4 + begun.size] = begun
+    state[-2] = 1.0
     expected = block.inverse().simulate(inputs, sample_time=0.1, initial=tuple(state))
     np.testing.assert_array_equal(found, expected)
 

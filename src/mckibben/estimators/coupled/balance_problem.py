@@ -350,7 +350,9 @@ class Problem:
         """Return a change of a number by which slopes are found, away from where it ends."""
         n = structure.mix.shape[1]
         if place >= len(structure.terms):
-            return STEP
+            width = 1 + len(structure.lags)
+            far = float(structure.bench.travel.mean())
+            return STEP * (far if (z.size - place) % width else 1.0)
         _, high, much = (end[place - n] for end in structure.ends())
         step = share * float(much)
         return step if z[place] + step <= high else -step
@@ -421,6 +423,7 @@ class Problem:
         begun = self.begun(structure, z, c, run, p)
         assert begun is not None
         own[m + n : m + n + begun.size] = begun
+        own[-2] = 1.0  # the first sample comes next
 
     # -- the linear stage ------------------------------------------------------------------------
 

@@ -67,7 +67,7 @@ def test_a_prior_without_doubt_returns_itself() -> None:
     placed = balance_in(fitted(moved(1, 5.0), sure))
     assert placed is not None
     away = traits(placed.balance, SHEET) - prior.mean
-    assert np.sqrt(np.nanmean(away**2)) < 0.1  # eight stops do not make every friction
+    assert np.sqrt(np.nanmean(away**2)) < 0.12  # eight stops do not make every friction
 
 
 def test_a_prior_is_of_one_muscle() -> None:

@@ -69,7 +69,7 @@ PLACES = (0.6, 0.8, 0.9, 0.97)
 """Of obstacles on the way up, along the range of what is moved; on the way down, from its end."""
 
 TERMS = (
-    *("elasticity", "areas", "friction", "relaxation", "line", "mass", "obstacle", "springs"),
+    *("elasticity", "areas", "relaxation", "line", "mass", "obstacle", "springs"),
     *("grips", "asymmetry", "walls", "filling", "venting", "dead", "contact", "muscles", "slack"),
 )
 """Kinds of terms that may be added."""
@@ -83,15 +83,14 @@ class BalanceEstimator(CoupledEstimator):
     ----------
     terms : sequence of str, optional
         Kinds of terms that may be added to springs, area, friction, relaxation and damping: more
-        degrees of ``elasticity`` and ``areas``, more stops (``friction``) and lags (``relaxation``), the
-        ``line``, ``mass``, an ``obstacle`` either way, springs by squares of what schedules
-        (``springs``), friction that grows with what schedules (``grips``) or differs by direction
-        (``asymmetry``), stretch of the wall (``walls``), air's lag in front (``filling``, ``venting``),
-        a ``dead`` zone, or one that fades (``contact``), ``muscles`` that differ, and that go ``slack``.
-        Each is added if the error of what is left out falls by more than its standard error. Default
-        all.
+        degrees of ``elasticity`` and ``areas``, more lags (``relaxation``), the ``line``, ``mass``, an
+        ``obstacle`` either way, springs by squares of what schedules (``springs``), friction that grows
+        with what schedules (``grips``) or differs by direction (``asymmetry``), stretch of the wall
+        (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, or one that fades
+        (``contact``), ``muscles`` that differ, and that go ``slack``. Each is added if the error of what
+        is left out falls by more than its standard error. Default all.
     n_stops : int
-        Stops that may be, from which it begins with every other.
+        Stops, which break away after travels from 0.3 to 50 % of the stroke at the highest pressure.
     n_lags : int
         Time constants that may be, from which it begins with two; 0 for muscles without time.
     lags : sequence of float, optional
@@ -107,6 +106,8 @@ class BalanceEstimator(CoupledEstimator):
         Whether every recording but the first hung under a constant load of its own, which is found.
         Default: recordings without the force that others have did; of a muscle alone, where none has
         any, if this makes the model much better.
+    of_force : bool
+        Whether errors of the one load are made least, not those of displacements.
     steps : int
         Most Gauss-Newton steps.
     prior : str, Path, Sheet or Prior, optional
@@ -146,9 +147,6 @@ class BalanceEstimator(CoupledEstimator):
     alone: ClassVar[bool] = True
     unmeasured: ClassVar[bool] = True
     fewer_outputs: ClassVar[bool] = True
-    of_force: ClassVar[bool] = False
-    """Whether errors of the load count, instead of those of displacements."""
-
     through: ClassVar[bool] = True
 
     terms: tuple[str, ...] | None = None
@@ -160,6 +158,7 @@ class BalanceEstimator(CoupledEstimator):
     degree: Annotated[int, Interval(ge=1, le=2)] = 2
     tare: bool | None = None
     unknown_load: bool | None = None
+    of_force: bool = False
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
     prior: Told = None
 
@@ -315,14 +314,12 @@ class BalanceEstimator(CoupledEstimator):
                 return True
             if kind == "springs":
                 return which == 0 or (which - 1) % structure.degree == 0
-            if kind == "friction":
-                return which % 2 == 1 or structure.n_stops == 1
             if kind in ("relaxation", "lags"):
                 few = structure.n_lags < 3 or self.lags is not None
                 return few or which in (structure.n_lags // 3, 2 * structure.n_lags // 3)
             if kind in ("elasticity", "areas"):
                 return which < 2
-            return kind in ("loads", "damping", "bladder") or (
+            return kind in ("loads", "damping", "bladder", "friction") or (
                 kind == "grip" and structure.n_stops > 0
             )
 

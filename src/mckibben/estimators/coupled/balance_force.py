@@ -26,10 +26,6 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
 
-class _OfForce(BalanceEstimator):
-    of_force = True
-
-
 @dataclass(kw_only=True, repr=False, eq=False)
 class BalanceForceEstimator(SearchEstimator):
     """Force by length or displacement and pressure, from a balance of forces.
@@ -93,7 +89,8 @@ class BalanceForceEstimator(SearchEstimator):
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         place, (pressure,) = data.inputs[0], data.scheduled
-        balance = _OfForce(
+        balance = BalanceEstimator(
+            of_force=True,
             n_stops=self.n_stops,
             n_lags=self.n_lags,
             elasticity=self.elasticity,

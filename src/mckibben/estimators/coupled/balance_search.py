@@ -354,7 +354,7 @@ class Search:
                 whole = range(following, following + more)
                 yield group(*self._with_own(kind, whole, own))
         for kind, which, muscle in terms:
-            if kind not in ("friction", "relaxation", "line", "mass") or muscle is not None:
+            if kind not in ("relaxation", "line", "mass") or muscle is not None:
                 continue
             if (kind, which) in on or (kind == "relaxation" and not self._apart(which, active, z)):
                 continue

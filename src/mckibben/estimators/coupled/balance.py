@@ -19,6 +19,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import rows, vector
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
@@ -249,10 +250,11 @@ class BalanceEstimator(CoupledEstimator):
             place = search.problem.loads_at(structure, run)
             if place.stop > place.start:
                 self.loads_[run.recording] = z[place] * balance.areas[0][0]
-        acting = front(structure, values, data.inputs[0])
+        given_range = None
         if data.inputs[0].unit in LIMITED:
-            ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
-            for block in acting:
+            given_range = min(float(data.lowest.min()), 0.0), float(data.highest.max())
+            ends = np.array(given_range)
+            for block in front(structure, values, data.inputs[0]):
                 if not block.rate_dependent:
                     ends = block.simulate(ends)
             balance = replace(balance, pressure_range=(float(ends[0]), float(ends[1])))
@@ -261,7 +263,10 @@ class BalanceEstimator(CoupledEstimator):
 
         def model(values: Array, balance: Balance) -> Block:
             acting = zip(*(front(structure, values, one) for one in data.inputs), strict=True)
-            before = [one[0] if len(one) == 1 else PerChannel(one) for one in acting]
+            before = [
+                one[0] if len(one) == 1 else PerChannel(one)
+                for one in ([_within(given_range, block) for block in some] for some in acting)
+            ]
             parts = [*before, balance.inverse(), *behind]
             return parts[0] if len(parts) == 1 else Series(tuple(parts))
 
@@ -433,14 +438,19 @@ class BalanceEstimator(CoupledEstimator):
         return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
 
     def _started(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search in which runs that do not begin at rest have starts, found by themselves."""
+        """Return the search in which runs that do not begin at rest have starts, found by themselves.
+
+        Where these follow runs no better than the model's own start, that is left.
+        """
         problem = search.problem
         if problem.all_at_rest or search.structure.bench.tare:
             return search, z
         none = np.zeros(search.active.size, dtype=bool)
+        whole = replace(search, problem=replace(problem, whole=True))
         started = replace(search, problem=replace(problem, starts=True), active=none)
-        z = np.append(z, np.zeros(started.problem.size(search.structure) - z.size))
-        return started, started.descend(z, STEPS_BETWEEN, Tracker())
+        found = np.append(z, np.zeros(started.problem.size(search.structure) - z.size))
+        found = started.descend(found, STEPS_BETWEEN, Tracker())
+        return (started, found) if started.cost(found) < whole.cost(z) else (search, z)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the free-running outputs of blocks, each run under its own load from its own start."""
@@ -459,6 +469,11 @@ OWN_HELPS = 0.1
 
 EXPLAINED = 1.5
 """Times the error of all but first parts up to which that of all explains how runs begin."""
+
+
+def _within(given_range: tuple[float, float] | None, block: Block) -> Block:
+    """Return a block in front, of which the inverse gives pressures within a range."""
+    return replace(block, input_range=given_range) if isinstance(block, Air) else block
 
 
 def in_newtons(balance: Balance) -> Balance:

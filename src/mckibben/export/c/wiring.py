@@ -77,6 +77,7 @@ class Wiring:
             if part is None:
                 self.steps.append(Sum(taken, first))
                 continue
+            numbers = part.coefficients(sample_time)
             if not part.c_kernels:
                 raise ModelError(
                     f"{part.title!r} has no C. Remedy: declare a start_kernel beside its kernel, as "
@@ -85,7 +86,6 @@ class Wiring:
             state = step.state
             if state is None and not isinstance(part.start, str):
                 state = part.initial_state(np.zeros(len(part.inputs)))
-            numbers = part.coefficients(sample_time)
             self.steps.append(Call(part, numbers, state, taken, first, self.n_numbers))
             self.n_numbers += part.n_states + part.n_scratch
             self.cost += part.cost(sample_time)

@@ -60,6 +60,9 @@ GRIPS = (0.05, 0.3, 1.0, 4.0)
 ROUNDS, STEPS_BETWEEN, LAST_STEPS = 6, 8, 8
 """Times that terms are added, and steps before each; those on all samples in the end."""
 
+LAST = ("asymmetry",)
+"""Terms that are added after all others: friction by direction resembles much that is not friction."""
+
 FIRM = 0.7
 """Of the most that muscles resist with, share at which they go slack at first."""
 
@@ -341,6 +344,7 @@ class BalanceEstimator(CoupledEstimator):
             starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
             z = min(starts, key=search.cost)
         tried = np.array([self._tried(term) for term in structure.terms])
+        last = np.array([term.kind in LAST for term in structure.terms])
         pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
         for number in range(ROUNDS):
             self._search, self._z = search, z
@@ -352,7 +356,9 @@ class BalanceEstimator(CoupledEstimator):
                 search, z = self._slack(search, z)
             search = search.weighed(z)
             self._search, self._z = search, z
-            active, z = search.chosen(z, tried)
+            active, z = search.chosen(z, tried & ~last)
+            if (active == search.active).all():
+                active, z = search.chosen(z, tried)
             if (active == search.active).all() or number == ROUNDS - 1:
                 break
             search = replace(search, active=active)

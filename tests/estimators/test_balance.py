@@ -15,7 +15,7 @@ from mckibben.blocks.coupled.balance import Balance, Placed, balance_in
 from mckibben.blocks.dynamics.air import Air
 from mckibben.blocks.fields import DISPLACEMENT, FORCE, PRESSURE, Channel
 from mckibben.blocks.memoryless import PiecewiseLinear
-from mckibben.estimators.coupled.balance import BalanceEstimator
+from mckibben.estimators.coupled.balance import TERMS, BalanceEstimator
 from mckibben.estimators.coupled.balance_slopes import run
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.signals.broadband import random_wave
@@ -135,6 +135,18 @@ def test_times_of_filling_and_venting_are_found() -> None:
     assert isinstance(first, Air)
     assert first.filling_time == pytest.approx(0.3, rel=0.1)
     assert first.venting_time == pytest.approx(0.6, rel=0.1)
+    # commands make up for it within the pressures recorded
+    compensator = estimator.fitted.inverse()
+    low, high = compensator.reachable()
+    wanted = np.repeat([5.0, 25.0, 5.0], 200)
+    given = compensator.simulate(np.column_stack([wanted, 0.0 * wanted]), sample_time=STEP)
+    assert low[0] <= given.min() < given.max() <= high[0] < 4.1
+
+
+def test_of_moments_nothing_is_said() -> None:
+    estimator = BalanceEstimator().fit([recording(seed).slice(300, 360) for seed in (1, 2)])
+    assert estimator.trial_.seconds == pytest.approx(1.5)
+    assert not estimator.measured_
 
 
 @pytest.mark.parametrize(
@@ -149,6 +161,7 @@ def test_terms_are_added_that_a_muscle_has(kind: str, change: dict[str, Any]) ->
     *train, other = (recording(seed, muscle=muscle, highest=1.0) for seed in (1, 2, 3))
     estimator, without = BalanceEstimator().fit(train), BalanceEstimator(terms=()).fit(train)
     assert kind in estimator.terms_
+    assert {*estimator.terms_} <= {*TERMS}
     assert error(estimator, other) < 1.5 * NOISE
     assert error(without, other) > 1.2 * error(estimator, other)
 

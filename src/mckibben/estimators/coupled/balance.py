@@ -78,6 +78,9 @@ TERMS = (
 )
 """Kinds of terms that may be added."""
 
+PARTS = {"lags": "relaxation", "places": "obstacle", "pushes": "slack"}
+"""Terms that are parts of others."""
+
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class BalanceEstimator(CoupledEstimator):
@@ -266,10 +269,8 @@ class BalanceEstimator(CoupledEstimator):
 
         def model(values: Array, balance: Balance) -> Block:
             acting = zip(*(front(structure, values, one) for one in data.inputs), strict=True)
-            before = [
-                one[0] if len(one) == 1 else PerChannel(one)
-                for one in ([_within(given_range, block) for block in some] for some in acting)
-            ]
+            limited = (tuple(_within(given_range, block) for block in one) for one in acting)
+            before = [one[0] if len(one) == 1 else PerChannel(one) for one in limited]
             parts = [*before, balance.inverse(), *behind]
             return parts[0] if len(parts) == 1 else Series(tuple(parts))
 
@@ -364,7 +365,8 @@ class BalanceEstimator(CoupledEstimator):
             search = replace(search, active=active)
         added = search.active & ~self._first(structure, belief)
         names = (
-            t.kind if t.muscle is None else "muscles" for t in compress(structure.terms, added)
+            PARTS.get(t.kind, t.kind) if t.muscle is None else "muscles"
+            for t in compress(structure.terms, added)
         )
         self.terms_ = tuple(dict.fromkeys(names))
         search, z = search.narrowed(z)
@@ -417,8 +419,7 @@ class BalanceEstimator(CoupledEstimator):
         """Tell whether a term may be added."""
         if term.muscle is not None:
             return self.may("muscles")
-        shape = {"lags": "relaxation", "places": "obstacle", "pushes": "none"}
-        return self.may(shape.get(term.kind, term.kind)) and term.kind != "pushes"
+        return self.may(PARTS.get(term.kind, term.kind)) and term.kind != "pushes"
 
     def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
         """Return the search in which muscles go slack, if that lessens errors; else the same."""

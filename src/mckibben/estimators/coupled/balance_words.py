@@ -156,7 +156,7 @@ def _of_runs(search: Search, z: Array) -> list[str]:
     whole = float(np.sqrt(np.mean(sizes**2)))
     if whole > POOR:
         found.append(
-            f"this model misses {100 * whole:.2g} % of what moves: it does not explain these "
+            f"errors are {100 * whole:.2g} % of the range: this model does not explain these "
             "recordings. Remedy: check channels, units, signs and zeros, recording by recording"
         )
     found += [

@@ -293,12 +293,17 @@ def in_any(
 
 
 def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the channels of any recording that schedule a model by default, others excepted."""
-    return tuple(
+    """Return the channels of any recording that schedule a model by default, others excepted.
+
+    Of forces and torques there may be several, with numbers.
+    """
+    found = dict.fromkeys(
         name
-        for name in SCHEDULES
-        if name not in others and any(name in recording for recording in recordings)
+        for quantity in SCHEDULES
+        for recording in recordings
+        for name in (*one(recording, quantity), *numbered(recording, quantity))
     )
+    return tuple(name for name in found if name not in others)
 
 
 def loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:

@@ -409,8 +409,8 @@ class BalanceEstimator(CoupledEstimator):
         """Tell whether a term may be added."""
         if term.muscle is not None:
             return self.may("muscles")
-        shape = {"lags": "relaxation", "places": "obstacle", "pushes": "none"}
-        return self.may(shape.get(term.kind, term.kind)) and term.kind != "pushes"
+        shape = {"lags": "relaxation", "places": "obstacle"}
+        return term.kind != "pushes" and self.may(shape.get(term.kind, term.kind))
 
     def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
         """Return the search in which muscles go slack, if that lessens errors; else the same."""

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, ClassVar, NamedTuple, Self
 
@@ -302,11 +301,8 @@ class Balance(Invertible):
                 f"pressure_range of {self.kind!r} is {self.pressure_range}. Remedy: the lower end first."
             )
         at_rest = [row[0] for row in self.areas]
-        for name, values in {
-            "limits": self.limits,
-            "lags": self.lags,
-            "areas at rest": at_rest,
-        }.items():
+        positive = {"limits": self.limits, "lags": self.lags, "areas at rest": at_rest}
+        for name, values in positive.items():
             rises = name != "limits" or all(a < b for a, b in pairwise(values))
             if any(not value > 0 for value in values) or not rises:
                 raise ModelError(
@@ -440,12 +436,7 @@ class Balance(Invertible):
         columns = (self.walls, self.pushes or n * (NEVER,))
         dynamic = (self.damping, self.lines or none, self.mass or none, self.bladders or none)
         own = (
-            *(
-                self.hull,
-                np.transpose(columns),
-                self.moves,
-                np.transpose(dynamic),
-            ),
+            *(self.hull, np.transpose(columns), self.moves, np.transpose(dynamic)),
             *(self.elasticity, self.areas, self.friction, self.relaxation),
         )
         flat = np.hstack([np.reshape(table, (n, -1)) for table in own])
@@ -460,8 +451,20 @@ class Balance(Invertible):
 
     def report(self, state: Array) -> None:
         """Warn of references that would need pressures out of range, or muscles that push."""
+        if not state[-1] > 0:
+            return
+        low, high = self.pressure_range or (-np.inf, np.inf)
+        # what a sensor is off at rest is no end
+        low = 0.0 if abs(low) < 1e-3 * (high - low) else low
+        names = " or ".join(channel.name for channel in self.given)
         pushing = " or muscles to push harder than they can," if self.pushes else ""
-        tell_clipped(state[-1], self.given, self.pressure_range, pushing)
+        warnings.warn(
+            f"{int(state[-1])} samples need {names} beyond {low:.4g} to {high:.4g} "
+            f"{self.given[0].unit} (behind a dead zone, if there is one){pushing} and were clipped "
+            "there by the compensator",
+            ModelWarning,
+            stacklevel=4,
+        )
 
     def n_clipped(self, state: Array) -> int:
         """Return how many samples needed pressures out of range."""
@@ -597,27 +600,6 @@ ONE_EACH = {
     "mass": "mass",
 }
 """Fields that have one number for every muscle, in words."""
-
-
-def tell_clipped(
-    n_samples: float,
-    given: Sequence[Channel],
-    reach: tuple[float, float] | None,
-    pushing: str = "",
-) -> None:
-    """Warn of samples that a balance's range of pressures did not reach, if there are any."""
-    if not n_samples > 0:
-        return
-    low, high = reach or (-np.inf, np.inf)
-    # what a sensor is off at rest is no end
-    low = 0.0 if abs(low) < 1e-3 * (high - low) else low
-    names = " or ".join(channel.name for channel in given)
-    warnings.warn(
-        f"{int(n_samples)} samples need {names} beyond {low:.4g} to {high:.4g} {given[0].unit} "
-        f"(behind a dead zone, if there is one){pushing} and were clipped there by the compensator",
-        ModelWarning,
-        stacklevel=5,
-    )
 
 
 class Placed(NamedTuple):

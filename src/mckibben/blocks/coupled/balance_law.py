@@ -414,12 +414,8 @@ def solve_equilibrium(
     the first four vectors begin with the slopes of the residual.
     """
     m = int(c[1])
-    residual, step, start, sizes = (
-        work[:m],
-        work[m : 2 * m],
-        work[2 * m : 3 * m],
-        work[3 * m : 4 * m],
-    )
+    residual, step = work[:m], work[m : 2 * m]
+    start, sizes = work[2 * m : 3 * m], work[3 * m : 4 * m]
     matrix, terms = work[4 * m : 4 * m + m * m].reshape((m, m)), work[4 * m + m * m :]
     left = unbalanced(c, state, way, q, x, p, residual, matrix, sizes, terms)
     before = 2.0 * left + 1.0

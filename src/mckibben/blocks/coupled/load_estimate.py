@@ -62,11 +62,8 @@ def estimate(
 ) -> None:
     """Fill the loads that hold muscles at coordinates, the last of what schedules and loads them."""
     n, m, n_x, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[4])
-    residual, sizes, x = (
-        scratch[m : 2 * m],
-        scratch[2 * m : 3 * m],
-        scratch[scratch.size - n_x - n_loads :],
-    )
+    residual, sizes = scratch[m : 2 * m], scratch[2 * m : 3 * m]
+    x = scratch[scratch.size - n_x - n_loads :]
     matrix, terms = scratch[3 * m : 3 * m + m * m].reshape((m, m)), scratch[3 * m + m * m :]
     for i in range(n_x):
         x[i] = inputs[m + n + i]

@@ -29,8 +29,8 @@ FIRST_NOISE = 0.01
 ZERO_STEPS = 6
 """To where displacements are likely to count from."""
 
-LAGS = 1.0, 30.0
-"""First and last time constant that may be [s], whatever the recordings' length."""
+SHORTEST_LAG = 1.0
+"""First time constant that may be [s], whatever the recordings."""
 
 Told = str | Path | Sheet | InstanceOf[Prior] | None
 """What a prior may be given as: a muscle's name, a file, a data sheet (as a mapping, too), or itself."""
@@ -118,5 +118,5 @@ def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
         bench,
         hull=np.array([[bench.hull[0, 0], max(bench.hull[0, 1], prior.sheet.stroke)]]),
         highest=max(bench.highest, prior.sheet.max_pressure_bar),
-        lag_range=(min(shortest, LAGS[0]), max(longest, TIMES[-1])),
+        lag_range=(min(shortest, SHORTEST_LAG), max(longest, TIMES[-1])),
     ), Belief(prior)

@@ -63,9 +63,10 @@ RIDGE = 1e-7
 """Damping of least squares, relative to every coefficient's own effect."""
 
 LEAST_AT_REST, PASSES = 0.1, 3
+"""Least area at rest, relative to that of all samples on average; times that forces are weighed anew."""
 
 MOST_CUTS = 8
-"""Least area at rest, relative to that of all samples on average; times that forces are weighed anew."""
+"""Times that springs are made stiff where they were found soft."""
 
 HELD = 0.02
 """A muscle is held where it moves less than this share of what it moves in all runs."""
@@ -148,10 +149,6 @@ class Problem:
         return run.counts[places] & (
             np.arange(places.size) >= (0.0 if known else WARMING) * places.size
         )
-
-    def compared(self, run: Run) -> Array:
-        """Return the outputs that are compared."""
-        return run.outputs[self.places(run)]
 
     def places(self, run: Run) -> NDArray[np.intp]:
         """Return the places of the samples that are compared."""
@@ -260,7 +257,7 @@ class Problem:
         found, slopes = self.followed(structure, z, run, held=still, sloped=sloped, by_air=by_air)
         counts, bench = self.counting(run, structure)[:, np.newaxis], structure.bench
         scale = counts / (bench.highest * bench.unit if still else bench.travel)
-        errors = (found if still else found - self.compared(run)) * scale
+        errors = (found if still else found - run.outputs[self.places(run)]) * scale
         return errors, slopes * scale[..., np.newaxis]
 
     def errors(
@@ -460,25 +457,23 @@ class Problem:
         narrowing = np.flatnonzero(beyond)
         means = np.einsum("tjc,tj->c", whole[..., narrowing], target) / float((target**2).sum())
         whole[..., narrowing] -= means * target[..., np.newaxis]
+        table = np.concatenate([whole, target[..., np.newaxis]], axis=2)
         weight = np.ones_like(target)
-        for _ in range(PASSES):
-            table = (
-                np.concatenate([whole, target[..., np.newaxis]], axis=2) * weight[..., np.newaxis]
-            )
-            flat = table.reshape(-1, table.shape[2])
-            least = bounded_least_squares(flat.T @ flat, bounded)
+
+        def put(least: Array) -> None:
             at_rest = max(1.0 + float(means @ least[narrowing]), LEAST_AT_REST)
             start[chosen] = least[: chosen.size] / at_rest
-            start[len(terms) : len(terms) + least.size - chosen.size] = (
-                least[chosen.size :] / at_rest
-            )
+            start[len(terms) :] = least[chosen.size :] / at_rest
+
+        for _ in range(PASSES):
+            flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
+            put(bounded_least_squares(flat.T @ flat, bounded))
             if not of_force:
                 weight = 1.0 / (self.stiffness(structure, start) * structure.bench.travel)
         # the same within physics, in the unit in which the area is 1 on average
         scaling = np.zeros(chosen.size)
         scaling[narrowing] = means
-        table = np.concatenate([whole, target[..., np.newaxis]], axis=2) * weight[..., np.newaxis]
-        flat = table.reshape(-1, table.shape[2])
+        flat = (table * weight[..., np.newaxis]).reshape(-1, table.shape[2])
         triangle: Array = np.linalg.qr(flat, mode="r")  # type: ignore[assignment]
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
         system = np.vstack(
@@ -497,12 +492,7 @@ class Problem:
         sides, bounds = asked(sides, bounds)
         for _ in range(MOST_CUTS):
             asks = (sides != 0).any(axis=1)
-            least = constrained_least_squares(system, right, sides[asks], bounds[asks])[0]
-            at_rest = max(1.0 + float(scaling @ least[: chosen.size]), LEAST_AT_REST)
-            start[chosen] = least[: chosen.size] / at_rest
-            start[len(terms) : len(terms) + size.size - chosen.size] = (
-                least[chosen.size :] / at_rest
-            )
+            put(constrained_least_squares(system, right, sides[asks], bounds[asks])[0])
             side, softest = structure.softest(structure.base + structure.mix @ start[:n])
             if softest >= 0.5 * structure.least_stiffness:
                 break

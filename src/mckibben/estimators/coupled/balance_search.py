@@ -20,7 +20,7 @@ from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
 from mckibben.estimators.coupled.balance_prior import FIRST_NOISE, Belief
-from mckibben.estimators.coupled.balance_problem import Problem, bounded_least_squares
+from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
 from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -36,9 +36,6 @@ AHEAD = 4
 
 MOST_TRIES = 7
 """Dampings tried for a step, each ten times the last."""
-
-MOST_CUTS = 8
-"""Times that springs are made stiff where they were found soft."""
 
 FIRST_DAMPING, LIGHTEST = 1e-3, 1e-7
 """Damping of a first step; its root of one that is hardly damped."""
@@ -101,10 +98,8 @@ class Search:
         """Return the search in which the belief has the weight that finds what is left out best."""
         if self.belief is None:
             return self
-        free, bounded = (
-            np.append(self.active, np.ones(z.size - self.active.size, dtype=bool)),
-            self._bounded(z.size),
-        )
+        free = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool))
+        bounded = self._bounded(z.size)
         grams = self._grams(z, self.active)
         likely = self._likely(z, self.active) / self.belief.noise**2
         missed = [_left_out(grams, free, z, bounded, noise**2 * likely).sum() for noise in NOISES]
@@ -213,17 +208,20 @@ class Search:
         on_all = np.zeros((len(sides), z.size))
         on_all[:, :n] = sides @ structure.mix
         low, high, much = structure.ends()
-        box, shape = np.eye(z.size)[n:n_terms], z[n:n_terms]
-        bounds = np.append(
-            np.maximum(low, shape - FAR * much), -np.minimum(high, shape + FAR * much)
-        )
-        lags = [
-            i for i, term in enumerate(structure.terms) if term.kind == "lags" and self.active[i]
-        ]
+        shape, far = z[n:n_terms], FAR * much
+        bounds = np.append(np.maximum(low, shape - far), -np.minimum(high, shape + far))
+        lags = [i for i in np.flatnonzero(self.active) if structure.terms[i].kind == "lags"]
         one = np.eye(z.size)
         apart = np.array([one[j] - one[i] for i, j in pairwise(lags)])
         starts = one[z.size - self._n_starts :: 1 + len(structure.lags)]
-        every = [on_all, box, -box, apart.reshape(-1, z.size), starts, -starts]
+        every = [
+            on_all,
+            one[n:n_terms],
+            -one[n:n_terms],
+            apart.reshape(-1, z.size),
+            starts,
+            -starts,
+        ]
         asked = [least - sides @ structure.base, bounds, np.full(len(apart), APART)]
         asked.append(np.full(2 * len(starts), -1.0))
         return np.concatenate(every), np.concatenate(asked)
@@ -322,8 +320,7 @@ class Search:
 
     def without_folds(self, z: Array) -> list[Array]:
         """Return what a step finds without each part of the runs; nothing if physics allows none."""
-        free = np.zeros(z.size, dtype=bool)
-        free[self.free] = True
+        free = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool))
         parts = _reduced(self._grams(z, self.active), free, z)
         likely = _reduced(self._likely(z, self.active)[np.newaxis], free, z)[0]
         folds, found = np.arange(len(parts)) * FOLDS // len(parts), []
@@ -387,21 +384,12 @@ class Search:
 
     def _apart(self, which: int, active: Mask, z: Array) -> bool:
         """Tell whether a time constant is apart from those that are free, and in order with them."""
-        known = {
-            term.which: z[place]
-            for place, term in enumerate(self.structure.terms)
-            if term.kind == "lags"
-        }
-        free = (
-            t.which
-            for t, on in zip(self.structure.terms, active, strict=True)
-            if on and t.kind == "lags"
+        terms = self.structure.terms
+        places = [place for place, term in enumerate(terms) if term.kind == "lags"]
+        apart = (
+            (z[i] - z[places[which]]) * np.sign(terms[i].which - which) for i in places if active[i]
         )
-        return all(
-            (known[other] - known[which]) * (other - which) > 0.0
-            and abs(known[other] - known[which]) > APART
-            for other in free
-        )
+        return all(one > APART for one in apart)
 
     def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
         """Return terms of a kind, and those by which muscles differ if they do."""

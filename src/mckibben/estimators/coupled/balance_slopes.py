@@ -18,7 +18,6 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
-    DYNAMIC,
     FROM_REST,
     HEAD,
     IN_TIME,
@@ -35,7 +34,7 @@ from mckibben.blocks.coupled.balance_law import (
     unbalanced,
     update_state,
 )
-from mckibben.blocks.kernels import kernel
+from mckibben.blocks.kernels import fill, kernel
 from mckibben.blocks.solving import eliminate
 
 
@@ -84,9 +83,9 @@ def by_coupling(c: Array, j: int, q: Array, x: Array, places: int, slopes: Array
 
 @kernel
 def by_limit(
-    c: Array, k: int, i: int, s: float, p: float, x: Array, dp: Array, share: float, to: Array
+    c: Array, i: int, s: float, p: float, x: Array, dp: Array, share: float, to: Array
 ) -> None:
-    """Add a share of how stop i of muscle k moves with shape where it slides, from column 0 of it on."""
+    """Add a share of how a stop i moves with shape where it slides, from column 0 of it on."""
     n_x = int(c[2])
     upper = c[HEAD + i]
     if s < 0.0:
@@ -140,16 +139,14 @@ def by_shape(
     for i in range(n_s if way != AT_REST else 0):
         h = c[place + first + i]
         if slopes[first + i] == 0.0:
-            by_limit(c, k, i, terms[first + i], p, x, dp, h, to)
+            by_limit(c, i, terms[first + i], p, x, dp, h, to)
         else:
             for f in range(dp.size):
                 to[to.size - dp.size + f] += h * wall * dp[f]
 
 
 @kernel
-def through_past(
-    c: Array, k: int, state: Array, slopes: Array, past: Array, moved: Array, to: Array
-) -> None:
+def through_past(c: Array, k: int, slopes: Array, past: Array, moved: Array, to: Array) -> None:
     """Add how the force of muscle k moves through its past, of which ``past`` has the slopes.
 
     ``slopes`` are those of its terms by its shortening, and ``moved`` those of its last shortening.
@@ -198,7 +195,7 @@ def carry(
             for f in range(dp.size):
                 past[row, now.size - dp.size + f] -= c[muscle_at(c, k) + 2] * dp[f]
             if way != AT_REST:
-                by_limit(c, k, i, s, p, x, dp, 1.0, past[row, now.size - n_shape(c) - dp.size :])
+                by_limit(c, i, s, p, x, dp, 1.0, past[row, now.size - n_shape(c) - dp.size :])
     for i in range(n_l):
         row = m + n * n_s + k * n_l + i
         gain = c[HEAD + n_s + n_l + i] if way == IN_TIME else c[17]
@@ -249,44 +246,27 @@ def move(
         return
     shape = slopes.shape[1] - n_shape(c) - dp.shape[1]
     places = shape + 2 + int(c[2]) + int(c[6])
-    late = rows[2 * n + 2 * m]
+    late, values, by_y = rows[2 * n + 2 * m], terms[:width], terms[width : 2 * width]
     for j in range(m):
         by_coupling(c, j, q, x, places, slopes[j])
     for k in range(n):
-        own, moved = muscle_at(c, k) + OWN, rows[k]
-        muscle_force(
-            c, k, state, way, shortening(c, k, q), p[k], x, terms[:width], terms[width : 2 * width]
-        )
-        by_force = rows[n + k]
+        own, y, moved, by_force = muscle_at(c, k) + OWN, shortening(c, k, q), rows[k], rows[n + k]
+        muscle_force(c, k, state, way, y, p[k], x, values, by_y)
         mix(moved, 0.0, 0.0, moved)
         mix(by_force, 0.0, 0.0, by_force)
         for j in range(m):
-            share = c[own + j] if c[20] != 0.0 else 1.0 * (j == k)
-            if share != 0.0:
-                mix(moved, 1.0, share, past[j])
+            if c[own + j] != 0.0:
+                mix(moved, 1.0, c[own + j], past[j])
         place = own + m - coordinate_at(c, 0)
         for i in range(width):
-            by_force[place + i] = terms[i]
-        by_shape(
-            c,
-            k,
-            state,
-            way,
-            shortening(c, k, q),
-            p[k],
-            x,
-            dp[k],
-            terms[:width],
-            terms[width : 2 * width],
-            late[k * int(c[6]) : (k + 1) * int(c[6])],
-            by_force[shape:],
-        )
+            by_force[place + i] = values[i]
+        own_late, to = late[k * int(c[6]) : (k + 1) * int(c[6])], by_force[shape:]
+        by_shape(c, k, state, way, y, p[k], x, dp[k], values, by_y, own_late, to)
         if not held and way != AT_REST:
-            through_past(c, k, state, terms[width : 2 * width], past, moved, by_force)
+            through_past(c, k, by_y, past, moved, by_force)
         for j in range(m):
-            share = c[own + j] if c[20] != 0.0 else 1.0 * (j == k)
-            if share != 0.0:
-                mix(slopes[j], 1.0, share, by_force)
+            if c[own + j] != 0.0:
+                mix(slopes[j], 1.0, c[own + j], by_force)
     update_state(c, state, way, q, p, x)
     if held:
         return
@@ -308,9 +288,8 @@ def move(
         own, now = muscle_at(c, k) + OWN, rows[n + k]
         mix(now, 0.0, 0.0, now)
         for j in range(m):
-            share = c[own + j] if c[20] != 0.0 else 1.0 * (j == k)
-            if share != 0.0:
-                mix(now, 1.0, share, past[j])
+            if c[own + j] != 0.0:
+                mix(now, 1.0, c[own + j], past[j])
         own_late = late[k * int(c[6]) : (k + 1) * int(c[6])]
         carry(c, k, state, way, p[k], x, dp[k], own_late, past, rows[k], now)
 
@@ -351,7 +330,7 @@ def follow(
         Stops and lags before the first sample [mm], of muscles that are where its pressures hold them
         without; none of those that come from rest.
     past, rows, scratch : arrays
-        To compute in.
+        To compute in, all 0.
     found : array, shape (t / every, m)
         Coordinates [mm], or forces that are lacking [N].
     slopes : array, shape (t / every, m, columns)
@@ -360,24 +339,12 @@ def follow(
     n, m = int(c[0]), int(c[1])
     n_states = scratch.size - 3 * m - 2 * n - 5 * m - m * m - 2 * n_terms(c)
     state, rest = scratch[:n_states], scratch[n_states:]
-    q, p, tare, now, work = (
-        rest[:m],
-        rest[m : m + n],
-        rest[m + n : 2 * m + n],
-        rest[2 * m + n : 3 * m + n],
-        rest[3 * m + n :],
-    )
-    for i in range(past.shape[0]):
-        for j in range(past.shape[1]):
-            past[i, j] = 0.0
+    q, tare, now = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m]
+    p, work = rest[3 * m : 3 * m + n], rest[3 * m + n :]
     tared = past[past.shape[0] - m :]
-    for i in range(n_states):
-        state[i] = 0.0
-    for j in range(m):
-        q[j] = measured[0, j] if held else 0.0
-        tare[j] = 0.0
-    for k in range(n):
-        p[k] = driven[0, k] if held else 0.0
+    if held:
+        fill(q, measured[0])
+        fill(p, driven[0])
     if held and rested:
         start_at_rest(c, state, x[0], q, p, work)
     elif held:
@@ -389,16 +356,13 @@ def follow(
                 tare[j] = q[j]
                 mix(tared[j], 0.0, 1.0, past[j])
         if begun.size > 0:
-            for k in range(n):
-                p[k] = driven[0, k]
+            fill(p, driven[0])
             move(c, state, AT_REST, False, q, x[0], p, dp[0], past, rows, now, slopes[0], work)
-            for i in range(begun.size):
-                state[m + n + i] = begun[i]
+            fill(state[m + n : m + n + begun.size], begun)
     for t in range(driven.shape[0]):
-        for k in range(n):
-            p[k] = driven[t, k]
-        for j in range(m if held else 0):
-            q[j] = measured[t, j]
+        fill(p, driven[t])
+        if held:
+            fill(q, measured[t])
         way = FROM_REST if t == 0 else IN_TIME
         place = t // every
         move(c, state, way, held, q, x[t], p, dp[t], past, rows, now, slopes[place], work)
@@ -425,16 +389,13 @@ def run(
     n, m, n_s, n_l = (int(c[i]) for i in (0, 1, 5, 6))
     moves = 2 if c[18] else 0
     n_states = n * (1 + n_s + n_l + moves) + 2 * m + 2
-    terms = DYNAMIC + int(c[7] + c[8]) + n_s + n_l
-    first = HEAD + n_s + 2 * n_l + int(c[2])
     dp = np.zeros((len(driven), n, 0)) if dp is None else dp
-    shape = 2 + int(c[2]) + n_l + m * int(c[9]) + dp.shape[2]
-    n_c = (c.size - first + shape) * sloped
+    n_c = (c.size - coordinate_at(c, 0) + n_shape(c) + dp.shape[2]) * sloped
     kept = -(-len(driven) // every)
     found, slopes = np.empty((kept, m)), np.zeros((kept, m, n_c))
     past = np.zeros((2 * m + n * (n_s + n_l + moves), n_c))
     rows = np.zeros((2 * n + 2 * m + 1, max(n_c, m, n * n_l)))
-    scratch = np.zeros(n_states + 3 * m + 2 * n + 5 * m + m * m + 2 * terms)
+    scratch = np.zeros(n_states + 3 * m + 2 * n + 5 * m + m * m + 2 * n_terms(c))
     start = np.zeros(0) if begun is None else begun
     p, y, x, dp = (np.ascontiguousarray(one) for one in (driven, measured, x, dp))
     follow(c, p, y, x, dp, held, rested, every, start, past, rows, scratch, found, slopes)

@@ -20,17 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_adaptive import GRID, LEAST_LEFT
 from mckibben.blocks.coupled.balance_law import NEVER, OWN
 from mckibben.blocks.fields import Channel, rows, vector
 
 Places = NDArray[np.intp]
 Item = TypeVar("Item")
-
-GRID = 21
-"""Places along what is known of every muscle's shortening where conditions are asked for."""
-
-LEAST_LEFT = 0.05
-"""Area that friction has to leave, relative to that at rest."""
 
 LEAST_AREA = 1e-9
 """Area at rest that is next to none, relative to what is about that of a muscle."""
@@ -120,9 +115,15 @@ class Bench:
         """Largest range of a shortening known [mm]."""
         return float(np.ptp(self.hull, axis=1).max())
 
+    @property
+    def largest(self) -> Array:
+        """Largest of what schedules, 1 where that is 0."""
+        most = np.abs(self.levels).max(axis=1)
+        return np.where(most > 0, most, 1.0)
+
     def corners(self) -> list[Array]:
         """Return what schedules, at all its ends and between."""
-        low, high = self.levels.T if len(self.levels) else (np.zeros(0), np.zeros(0))
+        low, high = self.levels.T
         return [low + np.array(s) * (high - low) for s in product((0.0, 0.5, 1.0), repeat=len(low))]
 
 
@@ -225,18 +226,11 @@ class Structure:
         time constants of air in front, while filling [s], the logarithm of the ratio of venting, the
         dead zone [bar], and the pressure over which one fades [bar].
         """
-        widths = {
-            "grip": 1,
-            "grips": len(self.bench.scheduled),
-            "asymmetry": 1,
-            "lags": len(self.lags),
-        }
+        n_x = len(self.bench.scheduled)
+        widths = {"grip": 1, "grips": n_x, "asymmetry": 1, "lags": self.n_lags}
         widths |= {"walls": 1, "pushes": self.n, "places": self.m * len(self.obstacles)}
         widths |= {"filling": 1, "venting": 1, "dead": 1, "contact": 1}
-        return {
-            k: slice(p.start + self.n_linear, p.stop + self.n_linear)
-            for k, p in _slices(widths).items()
-        }
+        return _slices(widths, self.n_linear)
 
     @property
     def size(self) -> int:
@@ -355,8 +349,7 @@ class Structure:
         force = bench.highest * bench.unit
         stiff = force / bench.scale
         linear = np.full(self.n_linear, stiff)
-        x = np.abs(bench.levels).max(axis=1) if len(bench.levels) else np.zeros(0)
-        powers = 1.0 / self.powers(np.where(x > 0, x, 1.0))
+        powers = 1.0 / self.powers(bench.largest)
         for j in range(self.m):
             linear[self.on("springs", j)] = np.outer(powers, [force, *self.m * [stiff]]).ravel()
             linear[self.on("loads", j)] = force / bench.heaviest
@@ -369,8 +362,7 @@ class Structure:
         """Return lowest and highest values of the shape, and how much of it is much."""
         bench = self.bench
         much = bench.scale / bench.highest
-        most_x = np.abs(bench.levels).max(axis=1) if len(bench.levels) else np.zeros(0)
-        per_x = bench.highest / np.where(most_x > 0, most_x, 1.0)
+        per_x = bench.highest / bench.largest
         ratio, (shortest, longest) = np.log(MOST_ASYMMETRIC), np.log(bench.lag_range)
         ends: dict[str, tuple[ArrayLike, ArrayLike, ArrayLike]] = {
             "grip": (0.0, MOST_GRIP * bench.highest, bench.highest),
@@ -469,9 +461,7 @@ class Structure:
         def highest(kind: str, least: int) -> int:
             return 1 + max((which for name, which in kept if name == kind), default=least - 1)
 
-        squares = any(
-            ("springs", q) in kept for q in range(2, 1 + len(self.bench.scheduled) * 2, 2)
-        )
+        squares = any(kind == "springs" and q > 0 and q % 2 == 0 for kind, q in kept)
         return replace(
             self,
             n_elastic=highest("elasticity", 0),
@@ -543,11 +533,10 @@ class Structure:
     def softest(self, values: Array) -> tuple[Array, float]:
         """Return where springs are softest: what asks them to be stiff there, and how stiff they are."""
         found: list[tuple[float, Array, Array]] = []
+        springs = np.array([values[self.on("springs", j)] for j in range(self.m)])
+        springs = springs.reshape(self.m, -1, 1 + self.m)[:, :, 1:]
         for x in self.bench.corners():
-            matrix = np.zeros((self.m, self.m))
-            for q, power in enumerate(self.powers(x)):
-                for j, i in product(range(self.m), repeat=2):
-                    matrix[j, i] += power * values[self.spring(q, j, i)]
+            matrix = np.tensordot(self.powers(x), springs, (0, 1))
             sizes, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
             found.append((float(sizes[0]), x, directions[:, 0]))
         stiffness, x, direction = min(found, key=lambda one: one[0])
@@ -564,6 +553,6 @@ NOT_NEGATIVE = ("damping", "line", "mass", "bladder", "friction", "relaxation")
 """Those that are not negative."""
 
 
-def _slices(widths: dict[str, int]) -> dict[str, slice]:
-    ends = np.cumsum([0, *widths.values()]).tolist()
+def _slices(widths: dict[str, int], first: int = 0) -> dict[str, slice]:
+    ends = np.cumsum([first, *widths.values()]).tolist()
     return {name: slice(a, b) for name, a, b in zip(widths, ends[:-1], ends[1:], strict=True)}

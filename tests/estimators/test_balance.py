@@ -185,6 +185,16 @@ def test_terms_that_may_not_be_added_are_none(found: BalanceEstimator) -> None:
     assert not placed(plain).before
 
 
+def test_what_is_found_has_a_standard_error(found: BalanceEstimator) -> None:
+    values, errors = found.fitted.pack(), np.array(found.diagnostics_.standard_errors)
+    names = list(found.fitted.parameter_names)
+    place = names.index("area at rest")
+    assert 0.0 < errors[place] < 0.05 * values[place]
+    assert abs(values[place] - 60.0) < 4.0 * errors[place]
+    assert np.isnan(errors[names.index("share of force")])  # it sets the unit of forces
+    assert names.index("share of force") not in found.undetermined()
+
+
 def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
     b = balance_of(found)
     assert min(*b.friction[0], *b.relaxation[0], b.damping[0], *b.lines, b.walls[0], b.grip) >= 0

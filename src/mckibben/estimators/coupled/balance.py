@@ -7,6 +7,7 @@ of what was left out (`mckibben.estimators.coupled.balance_search`).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
@@ -24,6 +25,7 @@ from mckibben.blocks.fields import rows, vector
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.estimator import Grid
+from mckibben.estimators.core.uncertainty import covariance_of
 from mckibben.estimators.coupled.balance_bench import (
     bench_of,
     check_numbers,
@@ -151,6 +153,7 @@ class BalanceEstimator(CoupledEstimator):
         "piecewise-linear balance-inverse",
     )
     effort: ClassVar[float] = 1.0
+    errors_known: ClassVar[bool] = True
     alone: ClassVar[bool] = True
     unmeasured: ClassVar[bool] = True
     fewer_outputs: ClassVar[bool] = True
@@ -459,6 +462,17 @@ class BalanceEstimator(CoupledEstimator):
         found = started.descend(found, STEPS_BETWEEN, Tracker())
         return (started, found) if started.cost(found) < whole.cost(z) else (search, z)
 
+    def undetermined(self) -> tuple[int, ...]:
+        given = _given(self.fitted)
+        return tuple(place for place in super().undetermined() if place not in given)
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return condition and covariance of what is free, in the unit of forces that was set."""
+        fixed = sorted({*at_bounds, *_given(block)})
+        return covariance_of(block, data, residual, fixed, self.free_runs)
+
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the free-running outputs of blocks, each run under its own load from its own start."""
         return self._search.problem.simulated(blocks, data, self._search.structure, self._z)
@@ -476,6 +490,15 @@ OWN_HELPS = 0.1
 
 EXPLAINED = 1.5
 """Times the error of all but first parts up to which that of all explains how runs begin."""
+
+
+def _given(block: Block) -> set[int]:
+    """Return the places of what is not found: sides, a front's gain, and what sets the unit of force."""
+    names = block.parameter_names
+    shares = [name for name in names if name.startswith("share of ")]
+    unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
+    given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
+    return {place for place, name in enumerate(names) if given.fullmatch(name)}
 
 
 def _within(given_range: tuple[float, float] | None, block: Block) -> Block:

@@ -198,7 +198,7 @@ def friction(
     p: float,
     x: Array,
     terms: Array,
-    slopes: Array,
+    by_y: Array,
 ) -> tuple[float, float]:
     """Fill the stops of muscle k, and their slopes by y; return their force, and its slope by p."""
     n, m, n_s = int(c[0]), int(c[1]), int(c[5])
@@ -209,7 +209,7 @@ def friction(
     force, by_p = 0.0, 0.0
     for i in range(n_s):
         terms[first + i] = 0.0
-        slopes[first + i] = 0.0
+        by_y[first + i] = 0.0
         if way == AT_REST:
             continue
         upper = c[HEAD + i] * grown
@@ -222,7 +222,7 @@ def friction(
             s = -c[12] * upper
             by_p -= h * c[12] * c[HEAD + i]
         else:
-            slopes[first + i] = 1.0
+            by_y[first + i] = 1.0
             by_p += h * wall
         terms[first + i] = s
         force += h * s
@@ -239,7 +239,7 @@ def resistance(
     p: float,
     x: Array,
     terms: Array,
-    slopes: Array,
+    by_y: Array,
 ) -> tuple[float, float, float]:
     """Fill the terms of muscle k and their slopes by y; return their force, its slope, and its size."""
     n, m, n_s, n_l, n_e, n_a = int(c[0]), int(c[1]), int(c[5]), int(c[6]), int(c[7]), int(c[8])
@@ -249,56 +249,56 @@ def resistance(
     moved = y - before
     for i in range(first):
         terms[i] = 0.0
-        slopes[i] = 0.0
+        by_y[i] = 0.0
     if way == IN_TIME and rate > 0.0:
         terms[0] = rate * moved
-        slopes[0] = rate
+        by_y[0] = rate
         if c[place + 1] > 0.0:
             flow = area(c, k, min(max(before, c[own]), c[own + 1]))[0] / c[place + first]
             terms[1] = flow * flow * rate * moved
-            slopes[1] = flow * flow * rate
+            by_y[1] = flow * flow * rate
         if c[18] != 0.0:
             past = m + n + n * (n_s + n_l) + 2 * k
             terms[2] = rate * rate * (2.0 * moved - 3.0 * state[past] + state[past + 1])
-            slopes[2] = 2.0 * rate * rate
+            by_y[2] = 2.0 * rate * rate
     terms[3] = y
-    slopes[3] = 1.0
+    by_y[3] = 1.0
     inside = min(max(y, c[own]), c[own + 1])
     u, beyond = inside / c[10], y - inside
     power = u
     for i in range(DYNAMIC, first):
-        slopes[i] = (i - DYNAMIC + 2) * power / c[10]
+        by_y[i] = (i - DYNAMIC + 2) * power / c[10]
         power *= u
-        terms[i] = power + slopes[i] * beyond
+        terms[i] = power + by_y[i] * beyond
     power = 1.0
     terms[first] = -p
-    slopes[first] = 0.0
+    by_y[first] = 0.0
     for i in range(first + 1, first + n_a):
-        slopes[i] = -p * (i - first) * power / c[10]
+        by_y[i] = -p * (i - first) * power / c[10]
         power *= u
-        terms[i] = -p * power + slopes[i] * beyond
-    rubbed = friction(c, k, state, way, y, p, x, terms, slopes)[0]
+        terms[i] = -p * power + by_y[i] * beyond
+    rubbed = friction(c, k, state, way, y, p, x, terms, by_y)[0]
     for i in range(n_l):
         gain = c[HEAD + n_s + n_l + i] if way == IN_TIME else c[17]
         terms[width - n_l + i] = 0.0
-        slopes[width - n_l + i] = 0.0
+        by_y[width - n_l + i] = 0.0
         if way != AT_REST:
             behind = state[m + n + n * n_s + k * n_l + i]
             terms[width - n_l + i] = c[HEAD + n_s + i] * behind + gain * moved
-            slopes[width - n_l + i] = gain
+            by_y[width - n_l + i] = gain
     a, narrowing = area(c, k, y)
     force, slope, size = rubbed - p * a, -p * narrowing, abs(rubbed) + abs(p * a)
     for i in range(first):
         part = c[place + i] * terms[i]
         force += part
         size += abs(part)
-        slope += c[place + i] * slopes[i]
+        slope += c[place + i] * by_y[i]
     for i in range(width - n_l, width):
         part = c[place + i] * terms[i]
         force += part
         size += abs(part)
     for i in range(first + n_a, width):
-        slope += c[place + i] * slopes[i]
+        slope += c[place + i] * by_y[i]
     return force, slope, size
 
 
@@ -312,16 +312,16 @@ def muscle_force(
     p: float,
     x: Array,
     terms: Array,
-    slopes: Array,
+    by_y: Array,
 ) -> tuple[float, float, float]:
     """Do as `resistance`; of a slack muscle terms are 0, and the force is the most it resists with."""
-    force, slope, size = resistance(c, k, state, way, y, p, x, terms, slopes)
+    force, slope, size = resistance(c, k, state, way, y, p, x, terms, by_y)
     most = c[muscle_at(c, k) + 3]
     if not force > most:
         return force, slope, size
     for i in range(n_terms(c)):
         terms[i] = 0.0
-        slopes[i] = 0.0
+        by_y[i] = 0.0
     return most, 0.0, size
 
 

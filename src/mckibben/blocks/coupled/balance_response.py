@@ -55,10 +55,8 @@ class Trial:
         quarter : int
             Samples of a quarter of a loop.
         """
-        n, found = (
-            len(self.pressures),
-            np.full((len(KINDS), self.middle.size, len(self.outputs)), np.nan),
-        )
+        n, shape = len(self.pressures), (len(KINDS), self.middle.size, len(self.outputs))
+        found = np.full(shape, np.nan)
 
         def moved(place: int, quarters: list[float], levels: list[float]) -> Array:
             time = np.arange(round(quarters[-1] * quarter) + 1) / quarter

@@ -122,7 +122,7 @@ class LoadEstimate(Block):
     typical = (Balance.example(),)
     notation = Notation(
         r"F = C^{+} \left(p A(y) - \text{springs} - \text{elasticity} - \text{friction} - "
-        r"\text{relaxation} - \text{damping} - \text{inertia}\right)",
+        r"\text{relaxation} - \text{damping} - \text{inertia}\right)"
     )
 
     forward: Annotated[InstanceOf[Balance], BeforeValidator(nested)]

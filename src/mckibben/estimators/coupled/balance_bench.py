@@ -13,7 +13,7 @@ from mckibben.blocks.compose import PerChannel
 from mckibben.blocks.memoryless import Affine
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.coupled.balance_problem import at_rest, held
+from mckibben.estimators.coupled.balance_problem import held
 from mckibben.estimators.coupled.balance_structure import Bench
 from mckibben.estimators.coupled.base import LOADS
 from mckibben.recording import Recording
@@ -255,8 +255,3 @@ def bench_of(data: TrainingData, ways: Array, *, tare: bool | None) -> Bench:
         step=step,
         curved=n_x > 0 and all(np.unique(v).size > 2 for v in tenths),
     )
-
-
-def starts_elsewhere(data: TrainingData) -> list[str]:
-    """Return the names of runs that do not begin at rest."""
-    return [run.name for run in data.runs if not held(data, run) and not at_rest(data, run)]

@@ -240,13 +240,7 @@ class Problem:
         )  # fmt: skip
 
     def errors_of(
-        self,
-        structure: Structure,
-        z: Array,
-        run: Run,
-        *,
-        sloped: bool,
-        by_air: Array | None = None,
+        self, structure: Structure, z: Array, run: Run, *, sloped: bool, by_air: Array | None = None
     ) -> tuple[Array, Array]:
         """Return the errors over a run relative to ranges, (k, m), and their slopes.
 
@@ -261,11 +255,7 @@ class Problem:
         return errors, slopes * scale[..., np.newaxis]
 
     def errors(
-        self,
-        structure: Structure,
-        z: Array,
-        wanted: Mask | None = None,
-        new: Mask | None = None,
+        self, structure: Structure, z: Array, wanted: Mask | None = None, new: Mask | None = None
     ) -> tuple[list[Array], Array]:
         """Return the errors of every run, and their slopes by all that is found, shape (errors, found).
 
@@ -280,12 +270,7 @@ class Problem:
             return [*errors, *self._unlikely(structure, z)[:1]], np.zeros((0, z.size))
         errors, slopes = [], []
         n, terms = structure.mix.shape[1], structure.terms
-        asked = {
-            kind: wanted[n + p.start - structure.n_linear]
-            for kind, p in structure.shape.items()
-            if p.stop > p.start
-        }
-        air = [kind for kind in OF_AIR if asked[kind]]
+        air = [kind for kind in OF_AIR if wanted[structure.free(kind)].any()]
         exact = [place for place in range(n, len(terms)) if terms[place].kind in EXACT]
         for run in self.runs:
             by_air = self._by_air(structure, z, run, air, new)
@@ -295,9 +280,7 @@ class Problem:
             whole[:, :n] = by[:, : structure.n_linear] @ structure.mix
             whole[:, exact] = by[:, structure.n_linear : structure.n_linear + len(exact)]
             for number, kind in enumerate(air):
-                whole[:, n + structure.shape[kind].start - structure.n_linear] = by[
-                    :, number - len(air)
-                ]
+                whole[:, structure.free(kind).start] = by[:, number - len(air)]
             loads = self.loads_at(structure, run)
             whole[:, loads] = by[
                 :, [structure.spring(0, j, -1) for j in range(loads.stop - loads.start)]
@@ -311,10 +294,8 @@ class Problem:
                 whole[:, place] = ((after - before) / step).ravel()
             errors.append(before.ravel())
             slopes.append(whole)
-        if self.starts:
-            far, by = self._unlikely(structure, z)
-            errors, slopes = [*errors, far], [*slopes, by]
-        return errors, np.concatenate([np.zeros((0, z.size)), *slopes])
+        far, by = self._unlikely(structure, z)
+        return [*errors, far], np.concatenate([*slopes, by])
 
     def _by_air(
         self, structure: Structure, z: Array, run: Run, kinds: list[str], new: Mask | None
@@ -322,7 +303,7 @@ class Problem:
         """Return how acting pressures move with what acts on them, shape (t, muscles, kinds)."""
         n, found = len(structure.terms), []
         for kind in kinds:
-            place = structure.mix.shape[1] + structure.shape[kind].start - structure.n_linear
+            place = structure.free(kind).start
             far = FIRST_STEP if new is not None and new[place] else STEP
             moved = z.copy()
             moved[place] += (step := self._step(structure, z, place, far))

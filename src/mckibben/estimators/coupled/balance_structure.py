@@ -295,6 +295,11 @@ class Structure:
             values[self.of("areas", k)[0]] = 1.0
         return values
 
+    def free(self, name: str) -> slice:
+        """Return where a kind of shape is among what is free."""
+        part, shift = self.shape[name], self.mix.shape[1] - self.n_linear
+        return slice(part.start + shift, part.stop + shift)
+
     @cached_property
     def not_negative(self) -> NDArray[np.bool_]:
         """Which linear coefficients are not negative."""
@@ -313,13 +318,11 @@ class Structure:
     def begin(self, grip: float) -> Array:
         """Return what is free where nothing was found yet: the shape that does nothing, but the grip."""
         free = np.zeros(len(self.terms))
-        shift = self.mix.shape[1] - self.n_linear
         put: dict[str, ArrayLike] = {"grip": grip, "lags": np.log(self.lags), "pushes": NEVER}
         low = self.bench.lowest[:, np.newaxis]
         put["places"] = (low + np.outer(self.bench.travel, [p for _, p in self.obstacles])).ravel()
         for name, numbers in put.items():
-            place = slice(self.shape[name].start + shift, self.shape[name].stop + shift)
-            free[place] = np.asarray(numbers)
+            free[self.free(name)] = np.asarray(numbers)
         return free
 
     def moved_to(self, other: Structure, free: Array, behind: Array | None = None) -> Array:

@@ -17,7 +17,7 @@ from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_response import KINDS, Trial
 from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.coupled.balance_bench import starts_elsewhere
+from mckibben.estimators.coupled.balance_problem import at_rest, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.base import LOADS
 from mckibben.numerals import numeral
@@ -160,9 +160,10 @@ def _of_runs(search: Search, z: Array) -> list[str]:
             "recordings. Remedy: check channels, units, signs and zeros, recording by recording"
         )
     found += [
-        f"{name} does not begin at rest: its first part does not count. Remedy: begin recordings "
+        f"{run.name} does not begin at rest: its first part does not count. Remedy: begin recordings "
         "without pressure"
-        for name in (() if structure.settled else starts_elsewhere(problem.data))
+        for run in problem.runs
+        if not (structure.settled or held(problem.data, run) or at_rest(problem.data, run))
     ]
     return found
 

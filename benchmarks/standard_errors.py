@@ -19,8 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from tests.validation.runs import noise
 from tests.validation.test_parameters import MODELS, STEP, fitted
 
-from mckibben import Recording
-from mckibben.estimators.core import uncertainty
+from mckibben import Recording, statistics
 from mckibben.validation import parameters as told
 
 
@@ -35,14 +34,14 @@ def measure(name: str, memory: float, seeds: int) -> tuple[float, float]:
         model = fitted(block, u, y)
         recording = Recording({"pressure": u, "displacement": y}, STEP)
         left = told.residuals(model, [recording])
-        most = uncertainty.MOST_TERMS
+        most = statistics.MOST_TERMS
         for place, terms in enumerate((most, 0)):
-            uncertainty.MOST_TERMS = terms
+            statistics.MOST_TERMS = terms
             sure = told.sureness(model, [recording], left)
             for one, true in zip(told.parameters(model, sure), truth.tolist(), strict=True):
                 if one.interval is not None:
                     hits[place].append(one.interval[0] <= true <= one.interval[1])
-        uncertainty.MOST_TERMS = most
+        statistics.MOST_TERMS = most
     return float(np.mean(hits[0])), float(np.mean(hits[1]))
 
 

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.bands.held import BLOCK, Held, memory_of, off_as_a_whole
+from mckibben.bands.held import BLOCK, Held, off_as_a_whole
 from mckibben.bands.scale import SHAPES, Scale, Shape, Terms, scale_of
 from mckibben.blocks.bands import Band, look_along
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import rows, vector
 from mckibben.errors import DataError
 from mckibben.numerals import numeral
+from mckibben.statistics import correlation_length
 from mckibben.system.threads import one_blas_thread
 
 Unit = Literal["auto", "run", "block"]
@@ -107,7 +108,7 @@ def find_band(
         [e[run.counts, k] for e, run in zip(missed, runs, strict=True)]
         for k in range(missed[0].shape[1])
     ]
-    memory = max(map(memory_of, by_output))
+    memory = max(map(correlation_length, by_output))
     which, units, note = _units(runs, by_output, memory, unit)
     ends = _ends(
         np.concatenate([np.hstack([run.inputs, run.modelled]) for run in runs]),

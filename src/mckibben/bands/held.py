@@ -13,9 +13,6 @@ from mckibben.arrays import Array
 BLOCK = 2.0
 """Integral memories that a block lasts: four time constants of an exponential one."""
 
-DOWN_TO = 0.05
-"""Autocorrelation that counts as none."""
-
 CHANCE = 0.01
 """Of taking blocks of a run for alike that are not."""
 
@@ -44,30 +41,6 @@ class Held:
     counts: NDArray[np.bool_]
     sample_time: float | None
     by: int = 0
-
-
-def memory_of(errors: list[Array]) -> float:
-    """Return for how many samples errors (n,) of runs stay alike: 1 for white noise.
-
-    The integral of their autocorrelation round the mean of each run, up to where that is none, or to the
-    longest run. What a whole run is off by is not memory: it lasts as long as the run, however long.
-    """
-    errors = [e - e.mean() for e in errors if e.size]
-    total = sum(float(e @ e) for e in errors)
-    count = sum(e.size for e in errors)
-    longest = max(e.size for e in errors)
-    if total <= 0:
-        return 1.0
-    size = 1 << (2 * longest - 1).bit_length()
-    sums, pairs = np.zeros(longest), np.zeros(longest)
-    for e in errors:
-        spectrum = np.fft.rfft(e, size)
-        sums[: e.size] += np.fft.irfft(spectrum * spectrum.conj(), size)[: e.size]
-        pairs[: e.size] += np.arange(e.size, 0, -1)
-    alike = sums / np.maximum(pairs, 1.0) / (total / count)
-    low = np.flatnonzero(alike < DOWN_TO)
-    until = int(low[0]) if low.size else longest
-    return float(1.0 + 2.0 * alike[1:until].clip(max=1.0).sum())
 
 
 def off_as_a_whole(errors: list[Array], pieces: list[int]) -> bool:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.comparison.bootstrap import RESAMPLES
 from mckibben.numerals import numeral
 from mckibben.signals.checking import generator
+from mckibben.statistics import RESAMPLES
 
 FEWEST = 4
 """Pieces of a cross-validation that can be resampled."""

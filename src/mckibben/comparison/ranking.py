@@ -13,7 +13,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.comparison.banding import tested_band
-from mckibben.comparison.bootstrap import differences, interval, skill_of
+from mckibben.comparison.bootstrap import skill_of
 from mckibben.comparison.channels import Names
 from mckibben.comparison.choosing import Choice, choice_of
 from mckibben.comparison.coverage import OffTraining
@@ -39,6 +39,7 @@ from mckibben.comparison.trying import (
 )
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
+from mckibben.statistics import differences, interval
 from mckibben.system.progress import telling
 from mckibben.system.workers import checked
 

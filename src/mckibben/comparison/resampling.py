@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.bands.held import memory_of
-from mckibben.comparison.bootstrap import BlockBootstrap, doublings
+from mckibben.statistics import BlockBootstrap, block_length, correlation_length
 
 
 class Resampling:
@@ -46,7 +45,7 @@ class Resampling:
             if model not in self._memory:
                 self._memory[model] = self._remembered(missed)
         memory = float(np.median([self._memory[model] for model in errors] or [1.0]))
-        length = tuple(doublings(n, memory) for n in self._lengths)
+        length = tuple(block_length(n, memory) for n in self._lengths)
         bootstrap: BlockBootstrap | None = None
         found = {}
         for model, missed in (*errors.items(), (other, others)):
@@ -59,4 +58,4 @@ class Resampling:
     def _remembered(self, errors: Array) -> float:
         squares = errors**2 / np.maximum((errors**2).mean(axis=0), np.finfo(float).tiny)
         ends = np.cumsum(self._lengths)[:-1]
-        return memory_of(np.split(squares.mean(axis=1), ends))
+        return correlation_length(np.split(squares.mean(axis=1), ends))

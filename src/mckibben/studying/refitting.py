@@ -11,16 +11,15 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
-from mckibben.bands.held import memory_of
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.inverse import Inverse
-from mckibben.comparison.bootstrap import BlockBootstrap, interval
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.offered import declared
 from mckibben.comparison.splits import Fold, folds
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.recording import Recording
+from mckibben.statistics import BlockBootstrap, correlation_length, interval
 
 N_FOLDS = 4
 """Parts of a log held back in turn."""
@@ -125,7 +124,7 @@ def refitted(
     lengths = [len(log) for log in whole]
     squares = np.split((scaled[1] ** 2).mean(axis=1), np.cumsum(lengths)[:-1])
     mean = max(float(np.mean(np.concatenate(squares))), np.finfo(float).tiny)
-    memory = memory_of([part / mean for part in squares])
+    memory = correlation_length([part / mean for part in squares])
     bootstrap = BlockBootstrap(lengths, seed, memory)
     before, after = (bootstrap.rmse(each) for each in scaled)
     rms = [float(np.sqrt((each**2).mean(axis=0)).mean()) for each in scaled]

@@ -12,7 +12,6 @@ practitioner's guide to robust covariance matrix estimation", 1997.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.starts import fitted_places, fitted_run
 from mckibben.blocks.running import run_many
 from mckibben.estimators.core.data import Run, TrainingData, stretches
+from mckibben.statistics import Autoregression, autoregression
 
 Simulated = Callable[[Sequence[Block], TrainingData], Array]
 """Gives the free-running outputs of blocks where samples count, shape (blocks, n)."""
@@ -38,9 +38,6 @@ direction that must be told."""
 
 NOTHING = 1e-9
 """Share of its size below which a parameter is 0."""
-
-MOST_TERMS = 40
-"""Of an autoregression of residuals."""
 
 
 def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
@@ -155,17 +152,17 @@ def sandwich(
     scale = np.array([np.sqrt(model.variance) or 1.0 for model in models])
     weighed = [slopes / scale[:, np.newaxis] for slopes in moves]
     condition, own, told = pseudo_inverse(np.concatenate([w.reshape(-1, k) for w in weighed]))
-    shocks = [
-        np.concatenate([m.shocks(np.nan_to_num(e[:, j])) for e in left])
+    innovations = [
+        np.concatenate([m.whitened(np.nan_to_num(e[:, j])) for e in left])
         for j, m in enumerate(models)
     ]
-    together = np.nan_to_num(np.corrcoef(shocks)) if n_outputs > 1 else np.ones((1, 1))
+    together = np.nan_to_num(np.corrcoef(innovations)) if n_outputs > 1 else np.ones((1, 1))
     middle = np.zeros((k, k))
     for slopes in weighed:
-        tinted = [models[j].tinted(slopes[:, j]) / scale[j] for j in range(n_outputs)]
+        coloured = [models[j].coloured(slopes[:, j]) / scale[j] for j in range(n_outputs)]
         for i in range(n_outputs):
             for j in range(n_outputs):
-                middle += together[i, j] * (tinted[i].T @ tinted[j])
+                middle += together[i, j] * (coloured[i].T @ coloured[j])
     # what the fit has taken out of the residuals, of all that was in them
     taken = float(np.sum(own * middle)) / sum(int(np.isfinite(e).sum()) for e in left)
     return condition, own @ middle @ own / max(1.0 - taken, 0.1), told
@@ -226,69 +223,3 @@ def blanked(covariance: Array, told: NDArray[np.bool_]) -> Array:
     covariance = covariance.copy()
     covariance[~told] = covariance[:, ~told] = np.nan
     return covariance
-
-
-@dataclass(frozen=True, eq=False)
-class Autoregression:
-    """Residuals as an autoregression: e_t = a_1 e_{t-1} + ... + shock."""
-
-    coefficients: Array
-    shock: float
-    """Standard deviation of what is new in every sample."""
-
-    variance: float
-    """Of the residuals."""
-
-    @property
-    def _whitener(self) -> Array:
-        return np.concatenate([[1.0], -self.coefficients])
-
-    def shocks(self, series: Array) -> Array:
-        """Return what is new in every sample of a series."""
-        from scipy.signal import lfilter
-
-        return np.asarray(lfilter(self._whitener, [1.0], series))
-
-    def tinted(self, slopes: Array) -> Array:
-        """Return L' J, shape (n, k), of which the product with itself is J' R J."""
-        from scipy.signal import lfilter
-
-        back = lfilter([1.0], self._whitener, slopes[::-1], axis=0)[::-1]
-        return np.asarray(self.shock * back)
-
-    def effective_sample_size(self, n: int) -> float:
-        """Return how many independent samples determine the mean as well as n of these."""
-        if self.variance <= 0:
-            return float(n)
-        memory = (self.shock / float(self._whitener.sum())) ** 2 / self.variance
-        return float(np.clip(n / max(memory, 1e-12), 1.0, n))
-
-
-def autoregression(series: Sequence[Array]) -> Autoregression:
-    """Return the autoregression of pieces of one series, each of shape (n,), by Burg's method.
-
-    Its number of terms is chosen by BIC; it is always stable.
-    """
-    n = sum(map(len, series))
-    variance = float(np.mean(np.concatenate(series) ** 2)) if n else 0.0
-    forward: list[NDArray[np.float64]] = [np.asarray(e, dtype=np.float64) for e in series]
-    backward = list(forward)
-    best, chosen, shock = n * np.log(max(variance, 1e-300)), np.zeros(0), variance
-    a, power = np.zeros(0), variance
-    for order in range(1, min(MOST_TERMS, n // 10) + 1):
-        ahead = [f[1:] for f in forward]
-        behind = [b[:-1] for b in backward]
-        below = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
-        if not below > 1e-300:
-            break
-        k = 2 * sum(float(f @ b) for f, b in zip(ahead, behind, strict=True)) / below
-        forward = [f - k * b for f, b in zip(ahead, behind, strict=True)]
-        backward = [b - k * f for f, b in zip(ahead, behind, strict=True)]
-        a = np.append(a - k * a[::-1], k)
-        power *= 1 - k * k
-        if not power > 1e-300:
-            break
-        cost = n * np.log(power) + order * np.log(n)
-        if cost < best:
-            best, chosen, shock = cost, a, power
-    return Autoregression(chosen, float(np.sqrt(max(shock, 0.0))), variance)

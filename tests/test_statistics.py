@@ -1,7 +1,7 @@
 import numpy as np
 from scipy.stats import t as student
 
-from mckibben.comparison.bootstrap import BlockBootstrap, differences, interval
+from mckibben.statistics import BlockBootstrap, differences, interval
 
 
 def naive_rmse(errors: np.ndarray, n: int, seed: int) -> np.ndarray:

@@ -8,7 +8,6 @@ from itertools import combinations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.comparison.coverage import COVERED, coverage_of
 from mckibben.excitation.gap import Gap, between, lasting, listing, value
 from mckibben.excitation.seen import Seen
 
@@ -20,6 +19,12 @@ OFF = 0.1
 
 TOGETHER = 0.02
 """Share of the samples in which inputs must be off their rest together, to have been seen so."""
+
+COVERED = 0.5
+"""Share of the joint range from which recordings are said to cover it."""
+
+NEAR = 0.1
+"""Distance from a sample up to which the joint range is covered, over the range of every input."""
 
 MOST = 20_000
 """Samples looked at."""
@@ -46,7 +51,7 @@ def coupling(seen: Seen) -> Iterator[Gap]:
         yield apart
         return
     covered = _covered(seen)
-    if covered is not None and covered < COVERED:
+    if covered < COVERED:
         yield Gap(
             "joint range",
             f"What {listing(seen.moving)} do together is seen in {value(100 * covered)} % of their "
@@ -116,9 +121,16 @@ def _rests(shares: Array) -> Array:
     return np.array(rests)
 
 
-def _covered(seen: Seen) -> float | None:
-    found = coverage_of(seen.recordings, (), seen.moving)
-    return None if found is None else found.covered
+def _covered(seen: Seen) -> float:
+    """Return the share of the moving inputs' joint range that is near to a sample."""
+    from scipy.spatial import cKDTree
+    from scipy.stats.qmc import Halton
+
+    samples = np.concatenate([recording.matrix(seen.moving) for recording in seen.recordings])
+    low, span = samples.min(axis=0), np.ptp(samples, axis=0)
+    known = ((samples - low) / np.where(span > 0, span, 1.0))[:: -(-len(samples) // MOST)]
+    drawn = Halton(len(seen.moving), scramble=False).random(4096)
+    return float(np.mean(cKDTree(known).query(drawn)[0] <= NEAR))
 
 
 def _resting(seen: Seen, resting: list[str]) -> Gap:

@@ -1,0 +1,94 @@
+"""Holds: stretches in which several signals, such as all inputs and all loads, stand still."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.signals.reversals import NOISE_SHARE, noise_level, swing_threshold
+
+STILL = 0.01
+"""Share of its range within which a signal stands still, unless noise or resolution is wider."""
+
+ALTERNATING = 0.1
+"""Share of the smallest steps that turn straight back, from which on they are a sensor's resolution."""
+
+
+def holds(columns: Array, spans: Sequence[float] | None = None, shortest: int = 10) -> list[slice]:
+    """Return the stretches in which every column stands still, in order of time.
+
+    A column stands still while it stays within 1 % of its range, what its noise reaches or one step
+    of its resolution to either side, whichever is widest. Stretches are as long as they can be and do
+    not overlap. A slow ramp is none: a stretch of windows that stand still must not be longer than
+    twice the longest of them.
+
+    Parameters
+    ----------
+    columns : array, shape (n, k)
+        Signals with one row a sample, such as pressures and loads.
+    spans : sequence of float, length k, optional
+        Range by which each column is judged; default its own. Give the range over all recordings.
+    shortest : int
+        Samples of a hold, at least.
+
+    Examples
+    --------
+    >>> steps = np.repeat([0.0, 3.0, 1.0], 20)
+    >>> holds(steps[:, np.newaxis])
+    [slice(0, 20, None), slice(20, 40, None), slice(40, 60, None)]
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    columns = np.asarray(columns, dtype=np.float64)
+    n = len(columns)
+    if n < shortest:
+        return []
+    ranges = np.ptp(columns, axis=0).tolist() if spans is None else spans
+    bands = [_band(x, span) for x, span in zip(columns.T, ranges, strict=True)]
+    stretches: list[tuple[int, slice]] = []
+    length = shortest
+    while length <= n:
+        quiet = np.ones(n - length + 1, dtype=np.int8)
+        window = slice(length // 2, length // 2 + quiet.size)
+        for x, band in zip(columns.T, bands, strict=True):
+            swing = maximum_filter1d(x, length) - minimum_filter1d(x, length)
+            quiet &= swing[window] <= band
+        if not quiet.any():
+            break
+        edges = np.flatnonzero(np.diff(quiet, prepend=0, append=0))
+        stretches += [
+            (length, slice(int(start), int(stop) - 1 + length))
+            for start, stop in zip(edges[::2], edges[1::2], strict=True)
+        ]
+        length *= 2
+    found: list[slice] = []
+    taken = np.zeros(n, dtype=bool)
+    for length, stretch in reversed(stretches):
+        lasts = stretch.stop - stretch.start
+        if lasts < 2 * length + shortest and not taken[stretch].any():
+            found.append(stretch)
+            taken[stretch] = True
+    return sorted(found, key=lambda stretch: int(stretch.start))
+
+
+def _band(x: Array, span: float) -> float:
+    """Return how far a signal moves that stands still."""
+    noise = noise_level(x, span) if x.size > 1 else float("nan")
+    return max(STILL * span, swing_threshold(noise, 0.0, x.size), 2.5 * _resolution(x, span))
+
+
+def _resolution(x: Array, span: float) -> float:
+    """Return the step between readings of a coarse sensor, 0 for one that is fine.
+
+    Two readings side by side alternate under noise; the levels of a staircase do only where it turns.
+    """
+    steps = np.diff(x)
+    steps = steps[steps != 0]
+    step = float(np.abs(steps).min()) if steps.size > 1 else 0.0
+    if not 0 < step <= NOISE_SHARE * span:
+        return 0.0
+    single = np.abs(steps) < 1.5 * step
+    back = single[:-1] & single[1:] & (steps[:-1] * steps[1:] < 0)
+    return step if np.sum(back) > ALTERNATING * np.sum(single) else 0.0

@@ -154,12 +154,7 @@ def data_gaps(
     ['rate', 'minor loops', 'creep']
     """
     known = excitation(recordings, inputs, outputs, tests)
-    found = [
-        gap
-        for rule in RULES
-        if known.timed or not rule.timed
-        for gap in _gaps(rule, known)
-    ]
+    found = [gap for rule in RULES if known.timed or not rule.timed for gap in _gaps(rule, known)]
     return tuple(sorted(found, key=lambda gap: -gap.severity))
 
 
@@ -345,7 +340,10 @@ def _clipped(known: Excitation) -> Found:
         steps = np.abs(np.diff(known.pooled([name])[:MOST_SAMPLES, 0]))
         if known.moves(name) and known.noise[name] > steps[steps > 0].min(initial=np.inf):
             ends = known.ranges[name]
-            yield max(_longest(one[name] == end) for one in known.recordings for end in ends), (name,)
+            yield (
+                max(_longest(one[name] == end) for one in known.recordings for end in ends),
+                (name,),
+            )
 
 
 def _longest(true: Any) -> int:

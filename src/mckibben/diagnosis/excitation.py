@@ -123,7 +123,9 @@ class Excitation:
     @cached_property
     def turns(self) -> Mapping[str, tuple[NDArray[np.int64], ...]]:
         """Turning points of everything that moves, with both ends, of every recording."""
-        return {name: tuple(self._turns(one, name) for one in self.recordings) for name in self.moving}
+        return {
+            name: tuple(self._turns(one, name) for one in self.recordings) for name in self.moving
+        }
 
     def _turns(self, recording: Recording, name: str) -> NDArray[np.int64]:
         noise = swing_threshold(self.noise[name], 0.0, len(recording))

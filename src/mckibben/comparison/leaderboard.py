@@ -13,7 +13,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
 from mckibben.comparison.banding import TestedBand
-from mckibben.comparison.choosing import CONSTANT, Against, Choice, order, recommended
+from mckibben.comparison.choosing import CONSTANT, Against, order, recommended
 from mckibben.comparison.memory_test import Memory
 from mckibben.comparison.offered import caution
 from mckibben.errors import MckibbenError
@@ -57,9 +57,6 @@ class Row:
         in the cross-validation: 1 is perfect, 0 no better.
     skill_least : float or None
         What 99 % of resamples of its blocks exceed; a model is recommended only where that is above 0.
-    squares : tuple of tuple of float
-        Sums of squared errors of the cross-validation by piece and output; none where models are not
-        validated on the same.
     memory : Memory or None
         The memory test, on the test set.
     band : TestedBand or None
@@ -92,7 +89,6 @@ class Row:
     validation_failed: str | None = None
     skill: float | None = None
     skill_least: float | None = None
-    squares: tuple[tuple[float, ...], ...] = field(default=(), repr=False)
     memory: Memory | None = None
     band: TestedBand | None = None
     block: Block | None = field(default=None, repr=False)
@@ -244,8 +240,6 @@ class Leaderboard(DrawsItself):
         The mean of the training output as a model: what every model has to beat.
     shared : tuple of str
         Where recordings to fit to and to test on are the same data, which the user insisted on.
-    choice : Choice or None
-        What choosing among so many costs; None without a cross-validation to resample.
     loads : tuple of str
         Channels given to models beside the inputs, and never commanded.
     ignored : tuple of str
@@ -271,7 +265,6 @@ class Leaderboard(DrawsItself):
     stopped: bool = False
     constant: Row | None = None
     shared: tuple[str, ...] = ()
-    choice: Choice | None = None
     loads: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     outside: Mapping[str, float] = field(default_factory=dict)
@@ -352,7 +345,6 @@ class Leaderboard(DrawsItself):
             "chosen_by": self.chosen_by,
             "chosen": None if best is None else best.model,
             "not_recommended": self.not_recommended,
-            "choice": None if self.choice is None else self.choice.to_dict(),
             "lowest_on_test": None if lowest is None else lowest.model,
             "left_out": dict(self.left_out),
             "pending": list(self.pending),

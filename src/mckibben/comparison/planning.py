@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
-from mckibben.arrays import Array
 from mckibben.comparison.channels import Channels, Names, channels_of
 from mckibben.comparison.checkpoints import Checkpoints
-from mckibben.comparison.fitting import Data, Item, constant_of
+from mckibben.comparison.fitting import Constant, Data, Item, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.offered import declared, default_model, objections
 from mckibben.comparison.shared_rows import check_shared
@@ -66,8 +65,8 @@ class Plan:
         return self.empty.notes
 
     @cached_property
-    def constant(self) -> tuple[Row, tuple[Array, ...]]:
-        """The row of the mean of the training output, and its outputs on all recordings."""
+    def constant(self) -> Constant:
+        """The mean of the training output as a model."""
         return constant_of(self.data)
 
     def kept(self, folder: str | Path | None) -> Checkpoints:
@@ -78,7 +77,7 @@ class Plan:
         """Return the leaderboard of the models that are finished."""
         done = {row.model for row in rows}
         pending = tuple(name for name in self.items if name not in done)
-        return replace(self.empty, rows=tuple(rows), pending=pending, constant=self.constant[0])
+        return replace(self.empty, rows=tuple(rows), pending=pending, constant=self.constant.row)
 
 
 def plan_of(

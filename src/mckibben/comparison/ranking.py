@@ -14,10 +14,9 @@ from mckibben.arrays import Array
 from mckibben.comparison.banding import tested_band
 from mckibben.comparison.channels import Names
 from mckibben.comparison.checkpoints import Checkpoints, source
-from mckibben.comparison.choosing import CONSTANT, Choice, choice_of
+from mckibben.comparison.choosing import CONSTANT
 from mckibben.comparison.fitting import (
     FitResult,
-    counts_of,
     effort_of,
     joined,
     outputs_of,
@@ -299,7 +298,7 @@ def ranked(
 def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
     """Return the row of a model, with its band where it is the best until now, as it may be chosen."""
     try:
-        row = row_of(plan.data, name, found, plan.constant[0], plan.seed)
+        row = row_of(plan.data, name, found, plan.constant.squares, plan.seed)
     except MckibbenError as error:  # its outputs overflow
         return Row(name, reason=str(error))
     better = any(other.sound and other.order < row.order for other in table.rows.values())
@@ -318,7 +317,7 @@ class _Table:
         self._plan = plan
         self._outputs: dict[str, tuple[Array, ...]] = {}
         self._lengths = [int(rows.sum()) for rows in plan.data.split.test_rows if rows.any()]
-        self._errors = {CONSTANT: plan.data.test_errors(plan.constant[1])}
+        self._errors = {CONSTANT: plan.data.test_errors(plan.constant.outputs)}
         self._correlation: dict[str, float] = {}
         self._resamples: dict[tuple[str, tuple[int, ...]], Array] = {}
 
@@ -344,7 +343,7 @@ class _Table:
         failed.sort(key=lambda row: row.model)
         if not rows:
             return Ranking(plan.board(failed), {})
-        every = [*rows, plan.constant[0]]
+        every = [*rows, plan.constant.row]
         errors = np.array([row.test_error for row in every])
         samples = np.array(self._resampled([row.model for row in every]))
         best = plan.board(rows).best or rows[0]
@@ -363,8 +362,8 @@ class _Table:
             for row, own, between in zip(every, samples, ends, strict=True)
         ]
         board = plan.board([*placed[:-1], *failed])
-        board = replace(board, constant=placed[-1], choice=_choice(rows, plan))
-        return Ranking(board, {row.model: self._outputs[row.model] for row in rows})
+        outputs = {row.model: self._outputs[row.model] for row in rows}
+        return Ranking(replace(board, constant=placed[-1]), outputs)
 
     def _resampled(self, models: Sequence[str]) -> list[Array]:
         """Return resampled test RMSE of models; blocks suit the median of their correlation lengths."""
@@ -376,16 +375,3 @@ class _Table:
             for model in missing:
                 self._resamples[model, blocks] = bootstrap.rmse(self._errors[model])
         return [self._resamples[model, blocks] for model in models]
-
-
-def _choice(rows: Sequence[Row], plan: Plan) -> Choice | None:
-    """Return the choice among the models that could have been chosen beside the first."""
-    rivals = [
-        row
-        for row in rows
-        if row.order[:2] == rows[0].order[:2]
-        and bool(row.caution) == bool(rows[0].caution)
-        and (row.skill_least is None or row.skill_least > 0)
-    ]
-    squares = {row.model: row.squares for row in rivals if row.squares}
-    return choice_of(squares, counts_of(plan.data.folds), plan.seed)

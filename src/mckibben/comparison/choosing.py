@@ -8,7 +8,7 @@ from typing import Literal, Protocol, TypeVar
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.comparison.offered import caution
+from mckibben.estimators.catalogue import caution
 from mckibben.statistics import RESAMPLES
 
 CONSTANT = "constant"

@@ -15,8 +15,8 @@ from mckibben.blocks.inverse import Inverse
 from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.choosing import CONSTANT, Against, order, recommended
 from mckibben.comparison.memory_test import Memory
-from mckibben.comparison.offered import caution
 from mckibben.errors import MckibbenError
+from mckibben.estimators.catalogue import caution
 from mckibben.metrics import Scores
 from mckibben.system.showing import DrawsItself
 
@@ -41,22 +41,20 @@ class Row:
     step_ns : float
         Time of one sample in a long simulation [ns].
     train, test : Scores or None
-        Free-running scores, in the unit of the output; test is on data not used to fit or choose. Of
-        several outputs, the means of theirs, and the largest of their largest errors.
+        Free-running scores, in the unit of the output. Of several outputs, the means of theirs, and the
+        largest of their largest errors.
     outputs : mapping of str to Scores
-        The same on the test data, of every output.
+        Those on the test data, of every output.
     validation_rmse : float or None
-        Cross-validated RMSE within the training set, by which models are chosen; None where that
-        failed or was not asked for. Of several outputs, the mean of theirs.
+        Cross-validated RMSE, by which models are chosen, of several outputs their mean; None where that
+        failed or was not asked for.
     validation_by_output : mapping of str to float
         The same of every output.
     validation_failed : str or None
         Why a part of the cross-validation failed, or None.
-    skill : float or None
-        Share of the squared error of the constant, the mean of what is fitted to, that the model removes
-        in the cross-validation: 1 is perfect, 0 no better.
-    skill_least : float or None
-        What 99 % of resamples of its blocks exceed; a model is recommended only where that is above 0.
+    skill, skill_least : float or None
+        Share of the constant's squared error that the model removes in the cross-validation, and what
+        99 % of resamples of its pieces exceed.
     memory : Memory or None
         The memory test, on the test set.
     band : TestedBand or None
@@ -218,7 +216,7 @@ class Leaderboard(DrawsItself):
     unit : str
         Unit of the outputs and of every RMSE.
     rows : tuple of Row
-        Sorted by what they are chosen by; those for which it failed behind, models that failed last.
+        In the order of the choice; models that failed last.
     split : str
         What was used to fit, to choose, and to test.
     seed : int

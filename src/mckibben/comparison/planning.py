@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
+from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.channels import Channels, Names, channels_of
-from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.comparison.fitting import Constant, Data, Item, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.offered import declared, default_model, objections
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.comparison.splits import Split, split_of, validation_folds
 from mckibben.errors import DataError, ModelError
+from mckibben.estimators.catalogue import declared, default_model
+from mckibben.estimators.core.estimator import Estimator
 from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
 
@@ -245,3 +246,29 @@ def _chosen(
             f"Remedy: name some of {', '.join(registry.names('estimators'))}, or all."
         )
     return tuple(names), left_out
+
+
+def objections(
+    models: Iterable[str], recordings: Sequence[Recording], channels: Channels
+) -> dict[str, str]:
+    """Return which of some models have no place on channels of recordings, and why."""
+    asked = recordings, channels.inputs, channels.outputs, channels.scheduling
+    found: dict[str, str] = {}
+    for name in models:
+        try:
+            estimator = registry.load("estimators", name)
+            reason = estimator.objection(*asked) or _timeless(estimator, recordings)
+        except ModelError as error:  # a plug-in that is broken is not the end of all others
+            reason = str(error)
+        if reason is not None:
+            found[name] = reason
+    return found
+
+
+def _timeless(estimator: type[Estimator], recordings: Sequence[Recording]) -> str | None:
+    """Return which recordings lack the time that a model needs, or None."""
+    missing = [each.name for each in recordings if each.sample_time is None]
+    if not (missing and estimator.needs_time):
+        return None
+    more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+    return f"it needs time, and {missing[0]}{more} has none: give a rate, or a column of times"

@@ -11,9 +11,9 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
+from mckibben.checkpoints import Checkpoints, source
 from mckibben.comparison.banding import tested_band
 from mckibben.comparison.channels import Names
-from mckibben.comparison.checkpoints import Checkpoints, source
 from mckibben.comparison.choosing import CONSTANT
 from mckibben.comparison.fitting import (
     FitResult,
@@ -105,50 +105,48 @@ def compare(
 ) -> Leaderboard:
     """Fit models on the same data with the same seeds, choose one, and test all.
 
-    Every figure is free-running. Models are fitted on the training recordings, and chosen by
-    cross-validation within them (over recordings, or over blocks of cycles of a single one): that sorts
-    the leaderboard. Their errors on the test recordings, which nothing is chosen by, stand beside, with
-    their rank. A model that fails is a row with its reason. The mean of the training output is a row as
-    well: where no model beats it beyond chance, none is recommended. An interrupt ends the work at once;
-    the leaderboard then holds what was finished, and names what is pending.
+    Every error is free-running. Models are fitted to the training recordings, and chosen by
+    cross-validation within them (over recordings, or over blocks of cycles of a single one); nothing is
+    chosen by the test. A model that fails is a row with its reason. The mean of the training output is
+    a row as well: where no model beats it beyond chance, none is recommended. An interrupt ends the
+    work at once; the leaderboard then holds what was finished, and names what is pending.
 
     Parameters
     ----------
     train : Recording or sequence of Recording
         To fit and to choose.
     test : Recording or sequence of Recording, optional
-        To test on. Default: the last quarter of the input's travel over the
-        training recordings, which is then left out of training; of several muscles, or under loads,
+        To test on. Default: the last quarter of the input's travel over the training recordings in
+        which the output moves, which is then left out of training; of several muscles, or under loads,
         every third level of what schedules, or every third recording.
     inputs, outputs : str or sequence of str, optional
-        Channels. Default ``pressure`` and ``displacement``; of several muscles ``pressure_1`` and so on,
-        and ``displacement_1`` and so on. Of several outputs, models are chosen by the mean error.
+        Channels, by default as their names say: ``pressure`` and ``displacement``, of several muscles
+        ``pressure_1`` and so on. Of several outputs, models are chosen by the mean error.
     load : str, optional
-        Channel of a load that varies: models are told it, and `mpi` for each load stands beside.
+        Channel of a load that varies, given to models; `mpi` for each load stands beside.
     validation : sequence of Recording
         To stop searches early and to choose on; nothing is fitted to them.
     models : "all", "quick", str or sequence of str
-        Short names, in a text with commas between; "all" leaves out models that are made for other
+        Short names, in a text with commas between; "all" leaves out models that do not apply to the
         channels, "quick" is a choice that takes seconds.
     settings : mapping of str to mapping, optional
         Model name to settings of its estimator.
     n_folds : int
-        Parts of the cross-validation; those whose input goes beyond that of the rest are not tried.
+        Parts of the cross-validation; those whose input goes beyond that of the rest are not used.
         1, or too few cycles: a single fit without the last quarter of the training data, tried on that.
         0: none, and the choice is by the error on the data fitted.
     seed : int
         Of everything random.
     jobs : int, optional
         Processes, which share the models and their folds; default as many as there are cores, or none
-        for little work. A joblib backend chosen outside, such as Dask's or Ray's, is used instead.
-        Results are the same to the bit.
+        for little work. A joblib backend chosen outside, such as Dask's, is used instead. Results are
+        the same to the bit.
     most_samples : int
         Longer recordings are thinned to so many samples to fit, and to test on, turning points kept.
         Default: 100 000; of more than a million, 40 000, in stretches where thinning would lose the
-        motion. Scores are of the samples kept, and notes say what was done.
+        motion. Scores are of the samples kept.
     allow_shared : bool
-        Whether to go on where recordings to test on are those fitted to, or training has some twice; the
-        leaderboard then says so.
+        Whether to go on where recordings to test on are those fitted to, or training has some twice.
     allow_early : bool
         Whether to go on where the output moves before its input.
     folder : path, optional
@@ -158,12 +156,12 @@ def compare(
         Whether to forget what was kept when all is done; else the caller does, once it has written
         what is returned, by ``Checkpoints(folder).clear()``.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told how far it is, whenever that changes.
+        Whether to show a bar; or called with the `Standing` whenever that changes.
     found : callable, optional
-        Told the leaderboard of the models finished, whenever one is.
+        Called with the leaderboard of the models finished, whenever one is.
     watch : callable, optional
-        Told, while a model is fitted, its name, the share done of the fits of this process, those of
-        the cross-validation first, and the least cost so far of this one; not on joblib's backends.
+        Called, while a model is fitted, with its name, the share done of its fits, and the least cost
+        so far; not on joblib's backends.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The models on offer: what each is, how it can be set, and which have a place on recordings."""
+"""The models on offer: what each is, and how it can be set."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
 from mckibben import registry
-from mckibben.comparison.channels import Channels
 from mckibben.errors import ModelError
 from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
 from mckibben.estimators.core.settings import check_settings, setting_value
-from mckibben.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -124,32 +122,6 @@ def defaults(model: str) -> dict[str, Any]:
     """Return the settings of a model's estimator that have a default, and that."""
     known = fields(registry.load("estimators", model))
     return {field.name: field.default for field in known if field.default is not MISSING}
-
-
-def objections(
-    models: Iterable[str], recordings: Sequence[Recording], channels: Channels
-) -> dict[str, str]:
-    """Return which of some models have no place on channels of recordings, and why."""
-    asked = recordings, channels.inputs, channels.outputs, channels.scheduling
-    found: dict[str, str] = {}
-    for name in models:
-        try:
-            estimator = registry.load("estimators", name)
-            reason = estimator.objection(*asked) or _timeless(estimator, recordings)
-        except ModelError as error:  # a plug-in that is broken is not the end of all others
-            reason = str(error)
-        if reason is not None:
-            found[name] = reason
-    return found
-
-
-def _timeless(estimator: type[Estimator], recordings: Sequence[Recording]) -> str | None:
-    """Return which recordings lack the time that a model needs, or None."""
-    missing = [each.name for each in recordings if each.sample_time is None]
-    if not (missing and estimator.needs_time):
-        return None
-    more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
-    return f"it needs time, and {missing[0]}{more} has none: give a rate, or a column of times"
 
 
 def settings_of(model: str, written: Sequence[str]) -> dict[str, Any]:

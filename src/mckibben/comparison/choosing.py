@@ -56,8 +56,6 @@ def order(
 
     Parameters
     ----------
-    model : str
-        Short name.
     validated, fitted : float or None
         Error of the cross-validation, and on the data fitted, by which the others are sorted.
     skill_least : float or None

@@ -13,13 +13,13 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.bands.held import Held
 from mckibben.blocks.base import Block
+from mckibben.blocks.free_run import Mask, run_free
 from mckibben.comparison import backends
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.choosing import CONSTANT, skill_of
-from mckibben.comparison.free_run import run_free
 from mckibben.comparison.leaderboard import Row
 from mckibben.comparison.memory_test import Memory, memory_test
-from mckibben.comparison.splits import Fold, Mask, Split
+from mckibben.comparison.splits import Fold, Split
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.optimisers.tracker import Progress, whole_searches
 from mckibben.metrics import Scores, mean_scores, score
@@ -306,8 +306,6 @@ def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed
         Of all its tasks.
     constant : array, shape (pieces, k), or None
         Squared errors of the mean of the training output; see `squares_of`.
-    seed : int
-        Of the resampling of pieces.
     """
     if found.reason is not None:
         return Row(name, reason=found.reason)

@@ -64,7 +64,7 @@ def identify(
     Parameters
     ----------
     recordings : Recording or sequence of Recording
-        What to learn from; folds are recordings, or blocks of cycles of a single one.
+        Folds are recordings, or blocks of cycles of a single one.
     family : str
         Short name of a model, such as ``"oe"``.
     orders : mapping of str to sequence, optional
@@ -123,7 +123,6 @@ def identify(
 
 
 def _channels(estimator: Estimator, recordings: Sequence[Recording]) -> Channels:
-    """Return the channels that an estimator takes of recordings."""
     if isinstance(estimator.input, str) and isinstance(estimator.output, str):
         return Channels((estimator.input,), (estimator.output,))
     data = estimator.data(recordings)

@@ -58,15 +58,7 @@ class Shared(NamedTuple):
 def shared_rows(
     recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
 ) -> list[Shared]:
-    """Return which recordings share data.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        All have the channels.
-    inputs, outputs : sequence of str
-        All of these agree where rows are common; outputs are what must move.
-    """
+    """Return which recordings share data: rows in which all channels agree while an output moves."""
     if len(recordings) < 2:
         return []
     moves = _movements(recordings, inputs, outputs)
@@ -111,8 +103,6 @@ def check_shared(
     ----------
     roles : mapping of str to sequence of Recording
         What each is for: "fit", "validate", "calibrate", "test" in this order, or one other verb.
-    inputs, outputs : sequence of str
-        Channels.
     allow : bool, optional
         Whether not to refuse; None where users have no such option.
 

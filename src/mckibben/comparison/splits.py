@@ -7,15 +7,13 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array
+from mckibben.blocks.free_run import Mask, predecessor
 from mckibben.comparison.channels import Channels, held_at_levels
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals import reversals, split_cycles
-
-Mask = NDArray[np.bool_]
 
 FEWEST = 10
 """Samples in either part of a split."""
@@ -347,11 +345,6 @@ def _interpolates(part: Fold, channel: str) -> bool:
         for runs, rows in ((part.test, part.test_rows), (part.train, part.train_rows))
     )
     return _within(tested, fitted)
-
-
-def predecessor(recording: Recording, others: Sequence[Recording]) -> Recording | None:
-    """Return the recording among others that this one continues, or None."""
-    return next((other for other in others if recording.continues(other)), None)
 
 
 def _count(rows: Sequence[Mask]) -> int:

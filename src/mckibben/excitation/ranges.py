@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.comparison.free_run import PERIODIC
+from mckibben.blocks.free_run import PERIODIC
 from mckibben.excitation.gap import Gap, between, counted, listing, value
 from mckibben.excitation.seen import Seen
 

@@ -268,8 +268,8 @@ def run(one: Set, task: Task, recordings: list[Recording]) -> tuple[str, str]:
     given = ", ".join(inputs_of([*train, *test], channels))
     lines = [
         f"## {title}\n",
-        f"{', '.join(channels.outputs)} [{plan.unit}] from {given}; {plan.board().split}.\n",
-        f"| model | test RMSE [{plan.unit}] | of range [%] | settings |",
+        f"{', '.join(channels.outputs)} [{plan.empty.unit}] from {given}; {plan.board().split}.\n",
+        f"| model | test RMSE [{plan.empty.unit}] | of range [%] | settings |",
         "|---|---:|---:|---|",
         *section([*peers, *ours]),
     ]

@@ -40,18 +40,9 @@ PIECES = 8
 
 @dataclass(frozen=True)
 class Data:
-    """What all models are given.
+    """What all models are given: data to fit and test on, parts of the cross-validation, channels.
 
-    Parameters
-    ----------
-    split : Split
-        Data to fit and to test on.
-    folds : tuple of Fold
-        Parts of the cross-validation within the training data.
-    channels : Channels
-        What drives, what is to be modelled, and what schedules.
-    early : tuple of Recording
-        For searches that stop early.
+    ``early`` are recordings for searches that stop early.
     """
 
     split: Split
@@ -90,17 +81,7 @@ class Data:
 
 @dataclass(frozen=True)
 class Item:
-    """A model to fit.
-
-    Parameters
-    ----------
-    model : str
-        Short name.
-    settings : mapping
-        Of its estimator.
-    only : int or None
-        Index of the only recording that it is fitted to; None for all of them.
-    """
+    """A model to fit, and its settings; perhaps only to the recording of that index."""
 
     model: str
     settings: Mapping[str, Any]
@@ -128,20 +109,14 @@ class FitResult:
     ----------
     predictions : mapping of int to tuple of array, shape (n, k)
         Fold to the free-running outputs on its test recordings.
-    invalid : str or None
-        Why a fold could not be fitted.
-    reason : str or None
-        Why the model failed.
+    invalid, reason : str or None
+        Why a fold could not be fitted; why the model failed.
     block : Block or None
-        Fitted to all training data.
+        Fitted to all training data; ``seconds``, ``memory`` and ``diagnostics`` are of that fit.
     outputs : tuple of array, shape (n, k)
         Its free-running outputs on every training recording, then every test recording.
-    seconds, step_ns : float
-        Of that fit [s], and of one simulated sample [ns].
-    memory : Memory or None
-        The memory test, on the test recordings.
-    diagnostics : mapping
-        Of that fit.
+    step_ns : float
+        Of one simulated sample [ns].
     """
 
     predictions: Mapping[int, tuple[Array, ...]] = field(default_factory=dict)

@@ -147,8 +147,9 @@ class Row:
         if self.test is not None:
             test = asdict(self.test) | {
                 "rank": self.test_rank,
-                "rmse_interval": _listed(self.rmse_interval),
-                "difference_to_chosen_interval": _listed(self.difference_interval),
+                "rmse_interval": self.rmse_interval and list(self.rmse_interval),
+                "difference_to_chosen_interval": self.difference_interval
+                and list(self.difference_interval),
                 "level_with_chosen": self.level,
             }
         return {
@@ -199,10 +200,6 @@ def _solves(block: Block) -> bool:
 
 def _finite(value: float | None) -> float | None:
     return value if value is not None and np.isfinite(value) else None
-
-
-def _listed(interval: tuple[float, float] | None) -> list[float] | None:
-    return None if interval is None else list(interval)
 
 
 @dataclass(frozen=True, repr=False)

@@ -28,9 +28,8 @@ class Memory:
     Parameters
     ----------
     gap_ratio : float or None
-        Slope of the model's branch gaps over the measured ones, at instants with the same input
-        reached from opposite directions: 1 is exact, 0 means that the model forgot. None where the
-        data have no such pairs.
+        Slope of the model's branch gaps over the measured ones, at equal inputs reached from opposite
+        directions: 1 is exact, 0 means that the model forgot. None where there are no such pairs.
     n_pairs : int
         Number of pairs of instants behind it.
     hold_ratio : float or None

@@ -35,8 +35,6 @@ class Plan:
 
     Parameters
     ----------
-    data : Data
-        What all models are given.
     items : mapping of str to Item
         What every row is called, and what is fitted for it, cheapest first.
     empty : Leaderboard
@@ -49,16 +47,6 @@ class Plan:
     items: Mapping[str, Item]
     empty: Leaderboard
     refused: Mapping[str, str]
-
-    @property
-    def unit(self) -> str:
-        """Unit of the outputs."""
-        return self.empty.unit
-
-    @property
-    def seed(self) -> int:
-        """Of everything random."""
-        return self.empty.seed
 
     @property
     def notes(self) -> tuple[str, ...]:

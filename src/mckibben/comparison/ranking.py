@@ -44,19 +44,7 @@ Watch = Callable[[str, float, float], None]
 
 @dataclass(frozen=True)
 class Standing:
-    """How far a comparison is.
-
-    Parameters
-    ----------
-    done, total : int
-        Models.
-    fitting : tuple of str
-        Models in work, the latest last.
-    best : Row or None
-        The model that would be chosen so far.
-    unit : str
-        Of its error.
-    """
+    """How far a comparison is: models done, those in work, and the one that would be chosen so far."""
 
     done: int
     total: int
@@ -210,15 +198,7 @@ def compare(
 
 @dataclass(frozen=True)
 class Ranking:
-    """A leaderboard, perhaps of a part of the models, and what they predict.
-
-    Parameters
-    ----------
-    board : Leaderboard
-        Models finished.
-    outputs : mapping of str to tuple of array
-        Model name to its free-running output on every training recording, then every test recording.
-    """
+    """A leaderboard of the models finished, and their outputs on all recordings, training first."""
 
     board: Leaderboard
     outputs: Mapping[str, tuple[Array, ...]] = field(repr=False)
@@ -264,7 +244,7 @@ def ranked(
         if progress is not None:
             working = tuple(name for name in begun if name in waiting)
             best = plan.board(table.sorted()).best
-            progress(Standing(len(table.rows), len(plan.items), working, best, plan.unit))
+            progress(Standing(len(table.rows), len(plan.items), working, best, plan.empty.unit))
 
     def told(index: int, *what: float) -> None:
         name = tasks[index].name
@@ -296,7 +276,7 @@ def ranked(
 def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
     """Return the row of a model, with its band where it is the best until now, as it may be chosen."""
     try:
-        row = row_of(plan.data, name, found, plan.constant.squares, plan.seed)
+        row = row_of(plan.data, name, found, plan.constant.squares, plan.empty.seed)
     except MckibbenError as error:  # its outputs overflow
         return Row(name, reason=str(error))
     better = any(other.sound and other.order < row.order for other in table.rows.values())
@@ -369,7 +349,7 @@ class _Table:
         blocks = tuple(block_length(n, correlation) for n in self._lengths)
         missing = [model for model in models if (model, blocks) not in self._resamples]
         if missing:
-            bootstrap = BlockBootstrap(self._lengths, self._plan.seed, correlation)
+            bootstrap = BlockBootstrap(self._lengths, self._plan.empty.seed, correlation)
             for model in missing:
                 self._resamples[model, blocks] = bootstrap.rmse(self._errors[model])
         return [self._resamples[model, blocks] for model in models]

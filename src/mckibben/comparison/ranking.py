@@ -260,8 +260,10 @@ def ranked(
     found: dict[str, list[FitResult]] = {name: [] for name in remaining}
     for outcome in results(data, tasks, workers, told):
         name = tasks[outcome.index].name
-        failed = None if outcome.error is None else FitResult(reason=str(outcome.error))
-        found[name].append(failed or outcome.value)
+        what = outcome.value
+        if not isinstance(what, FitResult):
+            what = FitResult(reason=str(outcome.error or "its process gave no result"))
+        found[name].append(what)
         if len(found[name]) == len(waiting[name]):
             del waiting[name]
             whole = joined(found.pop(name))

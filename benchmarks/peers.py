@@ -25,10 +25,10 @@ from typing import Any
 import numpy as np
 
 from mckibben import compare
+from mckibben.blocks.free_run import predecessor
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import plan_of
-from mckibben.comparison.splits import predecessor
 from mckibben.errors import MckibbenError
 from mckibben.measured.sets import Set, parted, sets_in
 from mckibben.measured.splits import Task
@@ -268,8 +268,8 @@ def run(one: Set, task: Task, recordings: list[Recording]) -> tuple[str, str]:
     given = ", ".join(inputs_of([*train, *test], channels))
     lines = [
         f"## {title}\n",
-        f"{', '.join(channels.outputs)} [{plan.unit}] from {given}; {plan.board().split}.\n",
-        f"| model | test RMSE [{plan.unit}] | of range [%] | settings |",
+        f"{', '.join(channels.outputs)} [{plan.empty.unit}] from {given}; {plan.board().split}.\n",
+        f"| model | test RMSE [{plan.empty.unit}] | of range [%] | settings |",
         "|---|---:|---:|---|",
         *section([*peers, *ours]),
     ]

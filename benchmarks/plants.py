@@ -36,9 +36,9 @@ from mckibben import Recording, registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance_response import KINDS
+from mckibben.blocks.free_run import run_free
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.free_run import run_free
-from mckibben.comparison.offered import objections
+from mckibben.comparison.planning import objections
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_words import said_of

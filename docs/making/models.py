@@ -17,8 +17,8 @@ from making.settings import settings_table
 from mckibben import registry
 from mckibben.blocks.equations import quantities, written
 from mckibben.blocks.notation import Written, unit_tex
-from mckibben.comparison.offered import ability, declared, full_name, needs
 from mckibben.errors import MckibbenError
+from mckibben.estimators.catalogue import ability, declared, full_name, needs
 
 
 def named() -> dict[str, tuple[str, str]]:

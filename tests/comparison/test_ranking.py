@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, DataError, ModelError, Recording, compare, registry
+from mckibben.blocks.free_run import run_free
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.choosing import USEFUL, order, recommended
-from mckibben.comparison.free_run import run_free
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.splits import folds, given_split, held_out_part, validation_folds
 from mckibben.estimators.core.estimator import Estimator

@@ -20,7 +20,7 @@ LAYERS = (
     {"rigs"},
     {"blocks"},
     {"muscles"},
-    {"estimators", "export", "stream", "link", "outputs"},
+    {"estimators", "export", "stream", "link", "outputs", "checkpoints"},
     {"control", "simulators", "ros"},
     {"environments"},
     {"bands"},

@@ -10,8 +10,8 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.dynamics.creep import Creep
 from mckibben.blocks.dynamics.starts import fitted_places, fitted_state
+from mckibben.blocks.free_run import run_free
 from mckibben.blocks.memoryless import Negative
-from mckibben.comparison.free_run import run_free
 from mckibben.estimators.core.data import training_data
 from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.hysteresis.creep_pi import CreepPIEstimator

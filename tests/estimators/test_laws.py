@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from mckibben import GPI, DataError, ModelError, RateDependentPI, Recording
 from mckibben.blocks.base import Block
-from mckibben.comparison.offered import defaults
+from mckibben.estimators.catalogue import defaults
 from mckibben.estimators.core.settings import Setting, settings_with_defaults
 from mckibben.registry import load, names
 from tests.estimators.examples import CASES, KINDS, example_for, kinds_for, quick, recorded

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from mckibben import DataError, ModelError, Recording, identify
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.comparison.free_run import run_free
+from mckibben.blocks.free_run import run_free
 from mckibben.estimators.core.data import training_data
 from mckibben.estimators.dynamics.prediction_error import Orders, errors
 from mckibben.papers.field_models.affine_match import affine_match
@@ -180,9 +180,9 @@ def test_identify_chooses_orders_by_cross_validation() -> None:
     assert len(choice.tried) == 2
 
 
-@pytest.mark.parametrize(("family", "named"), [("rdpi", "'n_operators'"), ("air", "to try.$")])
-def test_identify_asks_for_orders_that_the_model_has(family: str, named: str) -> None:
-    with pytest.raises(ModelError, match=f"'{family}'.*{named}"):
+@pytest.mark.parametrize("family", ["rdpi", "air"])
+def test_identify_asks_for_orders_where_none_are_usual(family: str) -> None:
+    with pytest.raises(ModelError, match=f"'{family}'.*orders"):
         identify(recorded(0, 300), family)
 
 

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from mckibben import GPI, PIEstimator, Recording, registry
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.papers.keeping import fitted, recorded
 from mckibben.papers.sdchm.models import BALANCE, LINEAR, OURS, PREDICTING, PUBLISHED, Models

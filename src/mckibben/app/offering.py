@@ -9,9 +9,10 @@ from mckibben import registry
 from mckibben.app.desk import Desk
 from mckibben.app.together import obstacle
 from mckibben.comparison.channels import DRIVING, FORCE, Channels, any_moves
-from mckibben.comparison.offered import Need, ability, declared, full_name, needs, objections
+from mckibben.comparison.planning import objections
 from mckibben.comparison.splits import held_out
 from mckibben.errors import DataError
+from mckibben.estimators.catalogue import Need, ability, declared, full_name, needs
 from mckibben.estimators.core.estimator import InverseKind
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording

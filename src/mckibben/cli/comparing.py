@@ -64,7 +64,7 @@ class Asked:
     ) -> Begun:
         """Check what is asked, claim what will be written by the models' names, and read the files."""
         from mckibben import registry
-        from mckibben.comparison.offered import settings_of_all
+        from mckibben.estimators.catalogue import settings_of_all
         from mckibben.files.sources import expanded
         from mckibben.outputs import Results
         from mckibben.system import workers

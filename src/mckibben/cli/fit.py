@@ -70,8 +70,8 @@ def fit(
     """
     from mckibben import registry
     from mckibben.blocks.equations import quantities
-    from mckibben.comparison.offered import settings_of
     from mckibben.comparison.shared_rows import check_shared
+    from mckibben.estimators.catalogue import settings_of
     from mckibben.outputs import claim_model
 
     estimator_class = registry.load("estimators", model)

@@ -70,7 +70,7 @@ def _is_columns(file: Path) -> bool:
 
 def _models(as_json: bool) -> None:
     from mckibben import registry
-    from mckibben.comparison.offered import defaults, summary
+    from mckibben.estimators.catalogue import defaults, summary
 
     found = {
         name: {"summary": summary(name), "settings": defaults(name)}

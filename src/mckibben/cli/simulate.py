@@ -139,7 +139,7 @@ def _started_elsewhere(block: Any, recording: Any) -> list[str]:
     """Return that a run does not begin as the model does, while its band knows how it begins."""
     import numpy as np
 
-    from mckibben.comparison.free_run import measured_start
+    from mckibben.blocks.free_run import measured_start
 
     names = [channel.name for channel in block.outputs]
     own = block.initial_state(recording.matrix(c.name for c in block.inputs)[0])
@@ -180,7 +180,7 @@ def _initial(rule: str, block: Any, recording: Any) -> Any:
     if rule == "model":
         return None
     if rule == "measured":
-        from mckibben.comparison.free_run import measured_start
+        from mckibben.blocks.free_run import measured_start
 
         name = block.outputs[0].name
         recording[name]

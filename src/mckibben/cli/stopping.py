@@ -129,7 +129,7 @@ def _kept(folder: Path | None) -> str:
 
 def forget_kept(folder: Path | None) -> None:
     """Forget what was kept, now that everything is written; nothing interrupts that any more."""
-    from mckibben.comparison.checkpoints import Checkpoints
+    from mckibben.checkpoints import Checkpoints
 
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)

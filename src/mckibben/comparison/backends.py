@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -29,13 +29,12 @@ def on_cluster(address: str | None) -> Iterator[None]:
     Parameters
     ----------
     address : str or None
-        Of the scheduler, such as ``tcp://10.0.0.1:8786``. Its answers are unpickled: name none but your
-        own.
+        Of the scheduler, such as ``tcp://10.0.0.1:8786``: name none but your own.
 
     Raises
     ------
     DataError
-        If Dask is not installed, the scheduler does not answer, or it has no workers.
+        If Dask is not installed, or no scheduler with workers answers.
     """
     if address is None:
         yield
@@ -44,20 +43,14 @@ def on_cluster(address: str | None) -> Iterator[None]:
     distributed: Any = import_module("distributed")
     from joblib import parallel_config
 
-    try:
-        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise DataError(
-            f"no Dask scheduler answers at {address} ({type(error).__name__})",
-            remedy="start one with 'dask scheduler', and give its tcp:// address",
-        ) from None
-    with client:
+    with ExitStack() as stack:
         try:
-            client.wait_for_workers(1, timeout=PATIENCE)
-        except TimeoutError:
+            client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+            stack.enter_context(client).wait_for_workers(1, timeout=PATIENCE)
+        except (OSError, ValueError, TypeError) as error:  # a time-out among them
             raise DataError(
-                f"the Dask cluster at {address} has no workers",
-                remedy="start some with 'dask worker ADDRESS'",
+                f"no Dask scheduler with workers answers at {address} ({type(error).__name__})",
+                remedy="start 'dask scheduler' and 'dask worker ADDRESS', and give its tcp:// address",
             ) from None
         with parallel_config("dask", client=client):
             yield

@@ -11,8 +11,8 @@ from mckibben.bands.finding import Found, Unit, find_band
 from mckibben.bands.held import Held
 from mckibben.blocks.bands import Banded, inside
 from mckibben.blocks.base import Block
+from mckibben.blocks.free_run import refuse_runaway, run_free
 from mckibben.blocks.inverse import commands
-from mckibben.comparison.free_run import refuse_runaway, run_free
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.recording import Recording, listed

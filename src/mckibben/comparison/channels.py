@@ -160,18 +160,9 @@ def channels_of(
 
 
 def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Sides:
-    """Return which of some channels are taken for inputs and for outputs; of several muscles, all.
+    """Return which of some channels that all recordings have are inputs and outputs; of several, all.
 
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    channels : sequence of str
-        Those that all recordings have. Where none is recognised, the first drives the second.
-
-    Returns
-    -------
-    tuple of (tuple of str, tuple of str)
-        Inputs and outputs; empty where there is no channel.
+    Where none is recognised, the first drives the second.
     """
     if not channels:
         return (), ()
@@ -237,16 +228,7 @@ def lacks_displacement(recordings: Sequence[Recording]) -> bool:
 
 
 def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str]) -> str:
-    """Return the channel over which an output loops: its input, or where that is held what drives.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    given : str
-        The input.
-    channels : sequence of str
-        Those that may replace it.
-    """
+    """Return the channel over which an output loops: its input, or where that is held what drives."""
     if any_moves(recordings, (given,)):
         return given
     driving = _called(channels, DRIVING)

@@ -1,17 +1,14 @@
-"""The choice among models: by cross-validated error, never by the test; and what choosing costs."""
+"""The choice among models: by cross-validated error, never by the test."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal, Protocol, TypeVar
+from collections.abc import Sequence
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.comparison.offered import caution
-from mckibben.signals.checking import generator
+from mckibben.estimators.catalogue import caution
 from mckibben.statistics import RESAMPLES
 
 CONSTANT = "constant"
@@ -22,9 +19,6 @@ CAUTION = 2.0
 
 USEFUL = 0.9
 """Share of the constant's error on the test from which on a model is of no use."""
-
-FEWEST = 4
-"""Pieces of a cross-validation that can be resampled."""
 
 Against = Literal["validation", "test"]
 """Where the constant is not beaten, so that no model is recommended."""
@@ -62,8 +56,6 @@ def order(
 
     Parameters
     ----------
-    model : str
-        Short name.
     validated, fitted : float or None
         Error of the cross-validation, and on the data fitted, by which the others are sorted.
     skill_least : float or None
@@ -129,83 +121,3 @@ def skill_of(squares: Array, constant: Array, seed: int) -> tuple[float, float]:
     model, mean = both[:, drawn].sum(axis=2)
     left = model / np.maximum(mean, np.finfo(float).tiny)
     return float(1 - both[0].sum() / both[1].sum()), float(1 - np.quantile(left, 0.99))
-
-
-@dataclass(frozen=True)
-class Choice:
-    """The choice of the least of several cross-validated errors, and its cost.
-
-    Parameters
-    ----------
-    among : int
-        Models that could have been chosen.
-    picked : mapping of str to float
-        Share of the resamples of the cross-validation in which each would have been, most first.
-    error : float
-        Cross-validated RMSE of the model chosen.
-    expected : float
-        The same of data that did not choose: the mean error of each resample's choice on the pieces
-        that are not in the resample. At least `error`.
-    """
-
-    among: int
-    picked: Mapping[str, float]
-    error: float
-    expected: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the fields, ready for JSON."""
-        return asdict(self) | {"picked": dict(self.picked)}
-
-
-def choice_of(
-    squares: Mapping[str, Sequence[Sequence[float]]], counts: Sequence[int], seed: int
-) -> Choice | None:
-    """Return the choice among models by cross-validated RMSE, and what it costs.
-
-    By the bootstrap of Tsamardinos, Greasidou and Borboudakis (Machine Learning 107, 2018). No model
-    is fitted again.
-
-    Parameters
-    ----------
-    squares : mapping of str to sequence of sequence of float
-        Sums of squared errors by model, piece and output, of the same pieces.
-    counts : sequence of int
-        Samples of every piece.
-    seed : int
-        Of the resampling.
-
-    Returns
-    -------
-    Choice or None
-        None of fewer than two models, or of too few pieces.
-    """
-    sizes = np.array(counts, dtype=float)
-    if len(squares) < 2 or np.count_nonzero(sizes) < FEWEST:
-        return None
-    models = list(squares)
-    table = np.array([squares[model] for model in models])  # (models, pieces, outputs)
-    rng = generator(seed)
-    drawn = rng.multinomial(sizes.size, np.full(sizes.size, 1 / sizes.size), RESAMPLES)
-    left = drawn == 0
-    usable = ((drawn @ sizes) > 0) & ((left @ sizes) > 0)
-    drawn, left = drawn[usable], left[usable]
-    inside = np.sqrt(_mean_squares(table, sizes, drawn)).mean(axis=2)
-    choices: NDArray[np.intp] = inside.argmin(axis=0)
-    outside = _mean_squares(table, sizes, left)[choices, np.arange(len(choices))]
-    own = np.sqrt(table.sum(axis=1) / sizes.sum()).mean(axis=1)
-    shares = np.bincount(choices, minlength=len(models)) / len(choices)
-    places = sorted(range(len(models)), key=lambda k: (-shares[k], own[k]))
-    error = float(own.min())
-    return Choice(
-        among=len(models),
-        picked={models[k]: float(shares[k]) for k in places if shares[k] > 0},
-        error=error,
-        expected=max(error, float(np.sqrt(outside.mean(axis=0)).mean())),
-    )
-
-
-def _mean_squares(table: Array, sizes: Array, weights: NDArray[Any]) -> Array:
-    """Return mean squared errors under weights of pieces, shape (models, resamples, outputs)."""
-    summed = np.einsum("mpo,rp->mro", table, weights.astype(float))
-    return np.asarray(summed / (weights @ sizes)[:, np.newaxis])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,13 +13,13 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.bands.held import Held
 from mckibben.blocks.base import Block
+from mckibben.blocks.free_run import Mask, run_free
 from mckibben.comparison import backends
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.choosing import CONSTANT, skill_of
-from mckibben.comparison.free_run import run_free
 from mckibben.comparison.leaderboard import Row
 from mckibben.comparison.memory_test import Memory, memory_test
-from mckibben.comparison.splits import Fold, Mask, Split
+from mckibben.comparison.splits import Fold, Split
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.optimisers.tracker import Progress, whole_searches
 from mckibben.metrics import Scores, mean_scores, score
@@ -40,18 +40,9 @@ PIECES = 8
 
 @dataclass(frozen=True)
 class Data:
-    """What all models are given.
+    """What all models are given: data to fit and test on, parts of the cross-validation, channels.
 
-    Parameters
-    ----------
-    split : Split
-        Data to fit and to test on.
-    folds : tuple of Fold
-        Parts of the cross-validation within the training data.
-    channels : Channels
-        What drives, what is to be modelled, and what schedules.
-    early : tuple of Recording
-        For searches that stop early.
+    ``early`` are recordings for searches that stop early.
     """
 
     split: Split
@@ -90,17 +81,7 @@ class Data:
 
 @dataclass(frozen=True)
 class Item:
-    """A model to fit.
-
-    Parameters
-    ----------
-    model : str
-        Short name.
-    settings : mapping
-        Of its estimator.
-    only : int or None
-        Index of the only recording that it is fitted to; None for all of them.
-    """
+    """A model to fit, and its settings; perhaps only to the recording of that index."""
 
     model: str
     settings: Mapping[str, Any]
@@ -128,20 +109,14 @@ class FitResult:
     ----------
     predictions : mapping of int to tuple of array, shape (n, k)
         Fold to the free-running outputs on its test recordings.
-    invalid : str or None
-        Why a fold could not be fitted.
-    reason : str or None
-        Why the model failed.
+    invalid, reason : str or None
+        Why a fold could not be fitted; why the model failed.
     block : Block or None
-        Fitted to all training data.
+        Fitted to all training data; ``seconds``, ``memory`` and ``diagnostics`` are of that fit.
     outputs : tuple of array, shape (n, k)
         Its free-running outputs on every training recording, then every test recording.
-    seconds, step_ns : float
-        Of that fit [s], and of one simulated sample [ns].
-    memory : Memory or None
-        The memory test, on the test recordings.
-    diagnostics : mapping
-        Of that fit.
+    step_ns : float
+        Of one simulated sample [ns].
     """
 
     predictions: Mapping[int, tuple[Array, ...]] = field(default_factory=dict)
@@ -297,17 +272,15 @@ def joined(tasks: Sequence[FitResult]) -> FitResult:
     return replace(whole, predictions=predictions, invalid=invalid)
 
 
-def row_of(data: Data, name: str, found: FitResult, constant: Row | None, seed: int) -> Row:
+def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed: int) -> Row:
     """Return the row of a model: all its scores, and its skill over the constant.
 
     Parameters
     ----------
     found : FitResult
         Of all its tasks.
-    constant : Row or None
-        Of the mean of the training output.
-    seed : int
-        Of the resampling of blocks.
+    constant : array, shape (pieces, k), or None
+        Squared errors of the mean of the training output; see `squares_of`.
     """
     if found.reason is not None:
         return Row(name, reason=found.reason)
@@ -321,18 +294,15 @@ def row_of(data: Data, name: str, found: FitResult, constant: Row | None, seed: 
         return {name: score(*pair) for name, *pair in zip(names, *columns, strict=True)}
 
     on_train, on_test = scores(slice(n_train)), scores(slice(n_train, None))
-    invalid = found.invalid
-    squares: tuple[tuple[float, ...], ...] = ()
+    invalid, by_output, skill, least = found.invalid, {}, None, None
     if invalid is None and found.predictions:
         squares = squares_of(data, found.predictions)
-        if not np.isfinite(squares).all():
+        if np.isfinite(squares).all():
+            by_output = validated(data, squares)
+            if constant is not None:
+                skill, least = skill_of(squares.sum(axis=1), constant.sum(axis=1), seed)
+        else:
             invalid = "its outputs ran away on a part of the data that it was not fitted to"
-            squares = ()
-    by_output = validated(data, found.predictions) if squares else {}
-    skill = least = None
-    if squares and constant is not None:
-        own, others = (np.sum(some, axis=1) for some in (squares, constant.squares))
-        skill, least = skill_of(own, others, seed)
     return Row(
         model=name,
         n_parameters=len(names) if block is None else block.n_parameters,
@@ -346,53 +316,56 @@ def row_of(data: Data, name: str, found: FitResult, constant: Row | None, seed: 
         validation_failed=invalid,
         skill=skill,
         skill_least=least,
-        squares=squares,
         memory=found.memory,
         block=block,
         diagnostics=found.diagnostics,
     )
 
 
-def constant_of(data: Data) -> tuple[Row, tuple[Array, ...]]:
-    """Return the row of the mean of the training outputs, whatever the input, and its outputs."""
+def squares_of(data: Data, predictions: Mapping[int, Sequence[Array]]) -> Array:
+    """Return squared errors of consecutive pieces of all that is held out, summed, shape (pieces, k)."""
     names = data.channels.outputs
-
-    def mean(recordings: Sequence[Recording], rows: Sequence[Mask]) -> Array:
-        kept = [run.matrix(names)[mask] for run, mask in zip(recordings, rows, strict=True)]
-        return np.asarray(np.concatenate(kept).mean(axis=0))
-
-    def constant(value: Array, recordings: Sequence[Recording]) -> tuple[Array, ...]:
-        return tuple(np.tile(value, (len(recording), 1)) for recording in recordings)
-
-    train = data.split.train
-    outputs = constant(mean(train, [np.ones(len(run), bool) for run in train]), data.recordings)
-    predictions = {
-        place: constant(mean(fold.train, fold.train_rows), fold.test)
-        for place, fold in enumerate(data.folds)
-    }
-    found = FitResult(predictions, outputs=outputs)
-    return row_of(data, CONSTANT, found, None, 0), outputs
-
-
-def validated(data: Data, predictions: Mapping[int, Sequence[Array]]) -> dict[str, float]:
-    """Return the RMSE of every output over all that is held out."""
-    means = np.sum(squares_of(data, predictions), axis=0) / sum(counts_of(data.folds))
-    return dict(zip(data.channels.outputs, np.sqrt(means).tolist(), strict=True))
-
-
-def squares_of(
-    data: Data, predictions: Mapping[int, Sequence[Array]]
-) -> tuple[tuple[float, ...], ...]:
-    """Return sums of squared errors of consecutive pieces of all that is held out, by output."""
-    return tuple(
-        tuple((piece**2).sum(axis=0).tolist())
-        for place, fold in enumerate(data.folds)
-        for run, rows, modelled in zip(fold.test, fold.test_rows, predictions[place], strict=True)
-        for piece in np.array_split((modelled - run.matrix(data.channels.outputs))[rows], PIECES)
+    return np.array(
+        [
+            (piece**2).sum(axis=0)
+            for place, fold in enumerate(data.folds)
+            for run, rows, modelled in zip(
+                fold.test, fold.test_rows, predictions[place], strict=True
+            )
+            for piece in np.array_split((modelled - run.matrix(names))[rows], PIECES)
+        ]
     )
 
 
-def counts_of(folds: Sequence[Fold]) -> list[int]:
-    """Return how many samples every piece has, in the order of their squares."""
-    held_out = [int(rows.sum()) for fold in folds for rows in fold.test_rows]
-    return [len(piece) for n in held_out for piece in np.array_split(np.empty(n), PIECES)]
+def validated(data: Data, squares: Array) -> dict[str, float]:
+    """Return the RMSE of every output over all that is held out, from its squared errors."""
+    count = sum(int(rows.sum()) for fold in data.folds for rows in fold.test_rows)
+    errors = np.sqrt(squares.sum(axis=0) / count)
+    return dict(zip(data.channels.outputs, errors.tolist(), strict=True))
+
+
+class Constant(NamedTuple):
+    """The mean of the training output as a model, whatever the input."""
+
+    row: Row
+    outputs: tuple[Array, ...]
+    squares: Array | None
+
+
+def constant_of(data: Data) -> Constant:
+    """Return the row of the mean of the training output, its outputs, and its squared errors."""
+    names = data.channels.outputs
+
+    def means(fold: Fold, recordings: Sequence[Recording]) -> tuple[Array, ...]:
+        runs = zip(fold.train, fold.train_rows, strict=True)
+        mean = np.concatenate([run.matrix(names)[rows] for run, rows in runs]).mean(axis=0)
+        return tuple(np.tile(mean, (len(recording), 1)) for recording in recordings)
+
+    train = data.split.train
+    whole = Fold(train, tuple(np.ones(len(run), dtype=bool) for run in train), (), ())
+    found = FitResult(
+        {place: means(fold, fold.test) for place, fold in enumerate(data.folds)},
+        outputs=means(whole, data.recordings),
+    )
+    squares = squares_of(data, found.predictions) if data.folds else None
+    return Constant(row_of(data, CONSTANT, found, None, 0), found.outputs, squares)

@@ -19,6 +19,7 @@ from mckibben.comparison.fitting import (
     effort_of,
     processes_for,
     results,
+    squares_of,
     validated,
 )
 from mckibben.comparison.splits import folds, given_split
@@ -63,7 +64,7 @@ def identify(
     Parameters
     ----------
     recordings : Recording or sequence of Recording
-        What to learn from; folds are recordings, or blocks of cycles of a single one.
+        Folds are recordings, or blocks of cycles of a single one.
     family : str
         Short name of a model, such as ``"oe"``.
     orders : mapping of str to sequence, optional
@@ -111,7 +112,8 @@ def identify(
     tried = []
     for place, one in enumerate(orders_tried):
         reason = found[place].invalid or found[place].reason or ""
-        errors = [np.inf] if reason else list(validated(data, found[place].predictions).values())
+        squares = None if reason else squares_of(data, found[place].predictions)
+        errors = [np.inf] if squares is None else list(validated(data, squares).values())
         tried.append((one, float(np.mean(errors)), reason))
     best, lowest, reason = min(tried, key=lambda item: item[1])
     if not np.isfinite(lowest):
@@ -121,7 +123,6 @@ def identify(
 
 
 def _channels(estimator: Estimator, recordings: Sequence[Recording]) -> Channels:
-    """Return the channels that an estimator takes of recordings."""
     if isinstance(estimator.input, str) and isinstance(estimator.output, str):
         return Channels((estimator.input,), (estimator.output,))
     data = estimator.data(recordings)

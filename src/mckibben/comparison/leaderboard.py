@@ -13,10 +13,10 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
 from mckibben.comparison.banding import TestedBand
-from mckibben.comparison.choosing import CONSTANT, Against, Choice, order, recommended
+from mckibben.comparison.choosing import CONSTANT, Against, order, recommended
 from mckibben.comparison.memory_test import Memory
-from mckibben.comparison.offered import caution
 from mckibben.errors import MckibbenError
+from mckibben.estimators.catalogue import caution
 from mckibben.metrics import Scores
 from mckibben.system.showing import DrawsItself
 
@@ -41,25 +41,20 @@ class Row:
     step_ns : float
         Time of one sample in a long simulation [ns].
     train, test : Scores or None
-        Free-running scores, in the unit of the output; test is on data not used to fit or choose. Of
-        several outputs, the means of theirs, and the largest of their largest errors.
+        Free-running scores, in the unit of the output. Of several outputs, the means of theirs, and the
+        largest of their largest errors.
     outputs : mapping of str to Scores
-        The same on the test data, of every output.
+        Those on the test data, of every output.
     validation_rmse : float or None
-        Cross-validated RMSE within the training set, by which models are chosen; None where that
-        failed or was not asked for. Of several outputs, the mean of theirs.
+        Cross-validated RMSE, by which models are chosen, of several outputs their mean; None where that
+        failed or was not asked for.
     validation_by_output : mapping of str to float
         The same of every output.
     validation_failed : str or None
         Why a part of the cross-validation failed, or None.
-    skill : float or None
-        Share of the squared error of the constant, the mean of what is fitted to, that the model removes
-        in the cross-validation: 1 is perfect, 0 no better.
-    skill_least : float or None
-        What 99 % of resamples of its blocks exceed; a model is recommended only where that is above 0.
-    squares : tuple of tuple of float
-        Sums of squared errors of the cross-validation by piece and output; none where models are not
-        validated on the same.
+    skill, skill_least : float or None
+        Share of the constant's squared error that the model removes in the cross-validation, and what
+        99 % of resamples of its pieces exceed.
     memory : Memory or None
         The memory test, on the test set.
     band : TestedBand or None
@@ -92,7 +87,6 @@ class Row:
     validation_failed: str | None = None
     skill: float | None = None
     skill_least: float | None = None
-    squares: tuple[tuple[float, ...], ...] = field(default=(), repr=False)
     memory: Memory | None = None
     band: TestedBand | None = None
     block: Block | None = field(default=None, repr=False)
@@ -153,8 +147,9 @@ class Row:
         if self.test is not None:
             test = asdict(self.test) | {
                 "rank": self.test_rank,
-                "rmse_interval": _listed(self.rmse_interval),
-                "difference_to_chosen_interval": _listed(self.difference_interval),
+                "rmse_interval": self.rmse_interval and list(self.rmse_interval),
+                "difference_to_chosen_interval": self.difference_interval
+                and list(self.difference_interval),
                 "level_with_chosen": self.level,
             }
         return {
@@ -207,10 +202,6 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and np.isfinite(value) else None
 
 
-def _listed(interval: tuple[float, float] | None) -> list[float] | None:
-    return None if interval is None else list(interval)
-
-
 @dataclass(frozen=True, repr=False)
 class Leaderboard(DrawsItself):
     """Models chosen on the training side, and their errors on data not used to fit or to choose.
@@ -222,7 +213,7 @@ class Leaderboard(DrawsItself):
     unit : str
         Unit of the outputs and of every RMSE.
     rows : tuple of Row
-        Sorted by what they are chosen by; those for which it failed behind, models that failed last.
+        In the order of the choice; models that failed last.
     split : str
         What was used to fit, to choose, and to test.
     seed : int
@@ -244,8 +235,6 @@ class Leaderboard(DrawsItself):
         The mean of the training output as a model: what every model has to beat.
     shared : tuple of str
         Where recordings to fit to and to test on are the same data, which the user insisted on.
-    choice : Choice or None
-        What choosing among so many costs; None without a cross-validation to resample.
     loads : tuple of str
         Channels given to models beside the inputs, and never commanded.
     ignored : tuple of str
@@ -271,7 +260,6 @@ class Leaderboard(DrawsItself):
     stopped: bool = False
     constant: Row | None = None
     shared: tuple[str, ...] = ()
-    choice: Choice | None = None
     loads: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     outside: Mapping[str, float] = field(default_factory=dict)
@@ -352,7 +340,6 @@ class Leaderboard(DrawsItself):
             "chosen_by": self.chosen_by,
             "chosen": None if best is None else best.model,
             "not_recommended": self.not_recommended,
-            "choice": None if self.choice is None else self.choice.to_dict(),
             "lowest_on_test": None if lowest is None else lowest.model,
             "left_out": dict(self.left_out),
             "pending": list(self.pending),

@@ -28,9 +28,8 @@ class Memory:
     Parameters
     ----------
     gap_ratio : float or None
-        Slope of the model's branch gaps over the measured ones, at instants with the same input
-        reached from opposite directions: 1 is exact, 0 means that the model forgot. None where the
-        data have no such pairs.
+        Slope of the model's branch gaps over the measured ones, at equal inputs reached from opposite
+        directions: 1 is exact, 0 means that the model forgot. None where there are no such pairs.
     n_pairs : int
         Number of pairs of instants behind it.
     hold_ratio : float or None
@@ -51,17 +50,12 @@ def memory_test(
 ) -> Memory:
     """Compare the branch gaps of a model with the measured ones, and let it hold.
 
-    Of several outputs, each over the input that is its own, while the others do what they do. Where an
-    input rests, as a held length does, over the first that moves of what else the model is told.
-
     Parameters
     ----------
-    recordings : sequence of Recording
-        Measured.
     outputs : sequence of array, shape (n, k)
-        The model's free-running outputs on each.
+        The model's free-running outputs on each recording.
     pairs : sequence of (str, str), length k
-        Every output's input, and the output.
+        Every output's own input, or where that rests the first of the block's that moves; the output.
     """
     measured, modelled = [], []
     pairs = [(_moving(block, recordings, given), output) for given, output in pairs]
@@ -80,7 +74,6 @@ def memory_test(
 
 
 def _moving(block: Block, recordings: Sequence[Recording], given: str) -> str:
-    """Return an input, or where it rests the first of the block's that moves."""
     for name in (given, *(channel.name for channel in block.inputs if channel.name != given)):
         if any(name in r and np.ptp(r[name]) > 0 for r in recordings):
             return name
@@ -88,18 +81,9 @@ def _moving(block: Block, recordings: Sequence[Recording], given: str) -> str:
 
 
 def branch_gaps(u: Array, y: Array) -> Array:
-    """Return y on the falling branch less y on the rising one, at equal inputs.
+    """Return y (n, k) on the falling branch less y on the rising one, at equal inputs u (n,).
 
-    Every level is taken on each pair of neighbouring branches that cross it.
-
-    Parameters
-    ----------
-    u : array, shape (n,)
-    y : array, shape (n, k)
-
-    Returns
-    -------
-    array, shape (number of pairs, k)
+    Shape (pairs, k): every level is taken on each pair of neighbouring branches that cross it.
     """
     low, high = np.quantile(u, [0.0, 1.0])
     levels = low + (high - low) * np.linspace(0.05, 0.95, LEVELS)
@@ -159,7 +143,6 @@ def hold_test(
 
 
 def _with_rest(along: Array, rest: Array, place: int) -> Array:
-    """Return inputs of which one goes along, and all others stay."""
     inputs = np.tile(rest, (along.size, 1))
     inputs[:, place] = along
     return inputs

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
-from mckibben.arrays import Array
+from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.channels import Channels, Names, channels_of
-from mckibben.comparison.checkpoints import Checkpoints
-from mckibben.comparison.fitting import Data, Item, constant_of
+from mckibben.comparison.fitting import Constant, Data, Item, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.comparison.offered import declared, default_model, objections
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.comparison.splits import Split, split_of, validation_folds
 from mckibben.errors import DataError, ModelError
+from mckibben.estimators.catalogue import declared, default_model
+from mckibben.estimators.core.estimator import Estimator
 from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
 
@@ -35,8 +35,6 @@ class Plan:
 
     Parameters
     ----------
-    data : Data
-        What all models are given.
     items : mapping of str to Item
         What every row is called, and what is fitted for it, cheapest first.
     empty : Leaderboard
@@ -51,23 +49,13 @@ class Plan:
     refused: Mapping[str, str]
 
     @property
-    def unit(self) -> str:
-        """Unit of the outputs."""
-        return self.empty.unit
-
-    @property
-    def seed(self) -> int:
-        """Of everything random."""
-        return self.empty.seed
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """What was done to the recordings."""
         return self.empty.notes
 
     @cached_property
-    def constant(self) -> tuple[Row, tuple[Array, ...]]:
-        """The row of the mean of the training output, and its outputs on all recordings."""
+    def constant(self) -> Constant:
+        """The mean of the training output as a model."""
         return constant_of(self.data)
 
     def kept(self, folder: str | Path | None) -> Checkpoints:
@@ -78,7 +66,7 @@ class Plan:
         """Return the leaderboard of the models that are finished."""
         done = {row.model for row in rows}
         pending = tuple(name for name in self.items if name not in done)
-        return replace(self.empty, rows=tuple(rows), pending=pending, constant=self.constant[0])
+        return replace(self.empty, rows=tuple(rows), pending=pending, constant=self.constant.row)
 
 
 def plan_of(
@@ -246,3 +234,29 @@ def _chosen(
             f"Remedy: name some of {', '.join(registry.names('estimators'))}, or all."
         )
     return tuple(names), left_out
+
+
+def objections(
+    models: Iterable[str], recordings: Sequence[Recording], channels: Channels
+) -> dict[str, str]:
+    """Return which of some models have no place on channels of recordings, and why."""
+    asked = recordings, channels.inputs, channels.outputs, channels.scheduling
+    found: dict[str, str] = {}
+    for name in models:
+        try:
+            estimator = registry.load("estimators", name)
+            reason = estimator.objection(*asked) or _timeless(estimator, recordings)
+        except ModelError as error:  # a plug-in that is broken is not the end of all others
+            reason = str(error)
+        if reason is not None:
+            found[name] = reason
+    return found
+
+
+def _timeless(estimator: type[Estimator], recordings: Sequence[Recording]) -> str | None:
+    """Return which recordings lack the time that a model needs, or None."""
+    missing = [each.name for each in recordings if each.sample_time is None]
+    if not (missing and estimator.needs_time):
+        return None
+    more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+    return f"it needs time, and {missing[0]}{more} has none: give a rate, or a column of times"

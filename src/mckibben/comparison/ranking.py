@@ -11,13 +11,12 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
+from mckibben.checkpoints import Checkpoints, source
 from mckibben.comparison.banding import tested_band
 from mckibben.comparison.channels import Names
-from mckibben.comparison.checkpoints import Checkpoints, source
-from mckibben.comparison.choosing import CONSTANT, Choice, choice_of
+from mckibben.comparison.choosing import CONSTANT
 from mckibben.comparison.fitting import (
     FitResult,
-    counts_of,
     effort_of,
     joined,
     outputs_of,
@@ -45,19 +44,7 @@ Watch = Callable[[str, float, float], None]
 
 @dataclass(frozen=True)
 class Standing:
-    """How far a comparison is.
-
-    Parameters
-    ----------
-    done, total : int
-        Models.
-    fitting : tuple of str
-        Models in work, the latest last.
-    best : Row or None
-        The model that would be chosen so far.
-    unit : str
-        Of its error.
-    """
+    """How far a comparison is: models done, those in work, and the one that would be chosen so far."""
 
     done: int
     total: int
@@ -106,50 +93,48 @@ def compare(
 ) -> Leaderboard:
     """Fit models on the same data with the same seeds, choose one, and test all.
 
-    Every figure is free-running. Models are fitted on the training recordings, and chosen by
-    cross-validation within them (over recordings, or over blocks of cycles of a single one): that sorts
-    the leaderboard. Their errors on the test recordings, which nothing is chosen by, stand beside, with
-    their rank. A model that fails is a row with its reason. The mean of the training output is a row as
-    well: where no model beats it beyond chance, none is recommended. An interrupt ends the work at once;
-    the leaderboard then holds what was finished, and names what is pending.
+    Every error is free-running. Models are fitted to the training recordings, and chosen by
+    cross-validation within them (over recordings, or over blocks of cycles of a single one); nothing is
+    chosen by the test. A model that fails is a row with its reason. The mean of the training output is
+    a row as well: where no model beats it beyond chance, none is recommended. An interrupt ends the
+    work at once; the leaderboard then holds what was finished, and names what is pending.
 
     Parameters
     ----------
     train : Recording or sequence of Recording
         To fit and to choose.
     test : Recording or sequence of Recording, optional
-        To test on. Default: the last quarter of the input's travel over the
-        training recordings, which is then left out of training; of several muscles, or under loads,
+        To test on. Default: the last quarter of the input's travel over the training recordings in
+        which the output moves, which is then left out of training; of several muscles, or under loads,
         every third level of what schedules, or every third recording.
     inputs, outputs : str or sequence of str, optional
-        Channels. Default ``pressure`` and ``displacement``; of several muscles ``pressure_1`` and so on,
-        and ``displacement_1`` and so on. Of several outputs, models are chosen by the mean error.
+        Channels, by default as their names say: ``pressure`` and ``displacement``, of several muscles
+        ``pressure_1`` and so on. Of several outputs, models are chosen by the mean error.
     load : str, optional
-        Channel of a load that varies: models are told it, and `mpi` for each load stands beside.
+        Channel of a load that varies, given to models; `mpi` for each load stands beside.
     validation : sequence of Recording
         To stop searches early and to choose on; nothing is fitted to them.
     models : "all", "quick", str or sequence of str
-        Short names, in a text with commas between; "all" leaves out models that are made for other
+        Short names, in a text with commas between; "all" leaves out models that do not apply to the
         channels, "quick" is a choice that takes seconds.
     settings : mapping of str to mapping, optional
         Model name to settings of its estimator.
     n_folds : int
-        Parts of the cross-validation; those whose input goes beyond that of the rest are not tried.
+        Parts of the cross-validation; those whose input goes beyond that of the rest are not used.
         1, or too few cycles: a single fit without the last quarter of the training data, tried on that.
         0: none, and the choice is by the error on the data fitted.
     seed : int
         Of everything random.
     jobs : int, optional
         Processes, which share the models and their folds; default as many as there are cores, or none
-        for little work. A joblib backend chosen outside, such as Dask's or Ray's, is used instead.
-        Results are the same to the bit.
+        for little work. A joblib backend chosen outside, such as Dask's, is used instead. Results are
+        the same to the bit.
     most_samples : int
         Longer recordings are thinned to so many samples to fit, and to test on, turning points kept.
         Default: 100 000; of more than a million, 40 000, in stretches where thinning would lose the
-        motion. Scores are of the samples kept, and notes say what was done.
+        motion. Scores are of the samples kept.
     allow_shared : bool
-        Whether to go on where recordings to test on are those fitted to, or training has some twice; the
-        leaderboard then says so.
+        Whether to go on where recordings to test on are those fitted to, or training has some twice.
     allow_early : bool
         Whether to go on where the output moves before its input.
     folder : path, optional
@@ -159,12 +144,12 @@ def compare(
         Whether to forget what was kept when all is done; else the caller does, once it has written
         what is returned, by ``Checkpoints(folder).clear()``.
     progress : bool or callable, optional
-        Whether to show a bar; or who is told how far it is, whenever that changes.
+        Whether to show a bar; or called with the `Standing` whenever that changes.
     found : callable, optional
-        Told the leaderboard of the models finished, whenever one is.
+        Called with the leaderboard of the models finished, whenever one is.
     watch : callable, optional
-        Told, while a model is fitted, its name, the share done of the fits of this process, those of
-        the cross-validation first, and the least cost so far of this one; not on joblib's backends.
+        Called, while a model is fitted, with its name, the share done of its fits, and the least cost
+        so far; not on joblib's backends.
 
     Returns
     -------
@@ -213,15 +198,7 @@ def compare(
 
 @dataclass(frozen=True)
 class Ranking:
-    """A leaderboard, perhaps of a part of the models, and what they predict.
-
-    Parameters
-    ----------
-    board : Leaderboard
-        Models finished.
-    outputs : mapping of str to tuple of array
-        Model name to its free-running output on every training recording, then every test recording.
-    """
+    """A leaderboard of the models finished, and their outputs on all recordings, training first."""
 
     board: Leaderboard
     outputs: Mapping[str, tuple[Array, ...]] = field(repr=False)
@@ -267,7 +244,7 @@ def ranked(
         if progress is not None:
             working = tuple(name for name in begun if name in waiting)
             best = plan.board(table.sorted()).best
-            progress(Standing(len(table.rows), len(plan.items), working, best, plan.unit))
+            progress(Standing(len(table.rows), len(plan.items), working, best, plan.empty.unit))
 
     def told(index: int, *what: float) -> None:
         name = tasks[index].name
@@ -283,8 +260,10 @@ def ranked(
     found: dict[str, list[FitResult]] = {name: [] for name in remaining}
     for outcome in results(data, tasks, workers, told):
         name = tasks[outcome.index].name
-        failed = None if outcome.error is None else FitResult(reason=str(outcome.error))
-        found[name].append(failed or outcome.value)
+        what = outcome.value
+        if not isinstance(what, FitResult):
+            what = FitResult(reason=str(outcome.error or "its process gave no result"))
+        found[name].append(what)
         if len(found[name]) == len(waiting[name]):
             del waiting[name]
             whole = joined(found.pop(name))
@@ -299,7 +278,7 @@ def ranked(
 def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
     """Return the row of a model, with its band where it is the best until now, as it may be chosen."""
     try:
-        row = row_of(plan.data, name, found, plan.constant[0], plan.seed)
+        row = row_of(plan.data, name, found, plan.constant.squares, plan.empty.seed)
     except MckibbenError as error:  # its outputs overflow
         return Row(name, reason=str(error))
     better = any(other.sound and other.order < row.order for other in table.rows.values())
@@ -318,7 +297,7 @@ class _Table:
         self._plan = plan
         self._outputs: dict[str, tuple[Array, ...]] = {}
         self._lengths = [int(rows.sum()) for rows in plan.data.split.test_rows if rows.any()]
-        self._errors = {CONSTANT: plan.data.test_errors(plan.constant[1])}
+        self._errors = {CONSTANT: plan.data.test_errors(plan.constant.outputs)}
         self._correlation: dict[str, float] = {}
         self._resamples: dict[tuple[str, tuple[int, ...]], Array] = {}
 
@@ -344,7 +323,7 @@ class _Table:
         failed.sort(key=lambda row: row.model)
         if not rows:
             return Ranking(plan.board(failed), {})
-        every = [*rows, plan.constant[0]]
+        every = [*rows, plan.constant.row]
         errors = np.array([row.test_error for row in every])
         samples = np.array(self._resampled([row.model for row in every]))
         best = plan.board(rows).best or rows[0]
@@ -363,8 +342,8 @@ class _Table:
             for row, own, between in zip(every, samples, ends, strict=True)
         ]
         board = plan.board([*placed[:-1], *failed])
-        board = replace(board, constant=placed[-1], choice=_choice(rows, plan))
-        return Ranking(board, {row.model: self._outputs[row.model] for row in rows})
+        outputs = {row.model: self._outputs[row.model] for row in rows}
+        return Ranking(replace(board, constant=placed[-1]), outputs)
 
     def _resampled(self, models: Sequence[str]) -> list[Array]:
         """Return resampled test RMSE of models; blocks suit the median of their correlation lengths."""
@@ -372,20 +351,7 @@ class _Table:
         blocks = tuple(block_length(n, correlation) for n in self._lengths)
         missing = [model for model in models if (model, blocks) not in self._resamples]
         if missing:
-            bootstrap = BlockBootstrap(self._lengths, self._plan.seed, correlation)
+            bootstrap = BlockBootstrap(self._lengths, self._plan.empty.seed, correlation)
             for model in missing:
                 self._resamples[model, blocks] = bootstrap.rmse(self._errors[model])
         return [self._resamples[model, blocks] for model in models]
-
-
-def _choice(rows: Sequence[Row], plan: Plan) -> Choice | None:
-    """Return the choice among the models that could have been chosen beside the first."""
-    rivals = [
-        row
-        for row in rows
-        if row.order[:2] == rows[0].order[:2]
-        and bool(row.caution) == bool(rows[0].caution)
-        and (row.skill_least is None or row.skill_least > 0)
-    ]
-    squares = {row.model: row.squares for row in rivals if row.squares}
-    return choice_of(squares, counts_of(plan.data.folds), plan.seed)

@@ -1,10 +1,7 @@
 """Rows that two recordings have in common: copies, slices, one file given twice.
 
-Two runs of one experiment never agree over many movements of the output: noise, creep and the start
-prevent it. Where all channels do, to rounding, it is one measurement in two places, whatever the files'
-formats, names and times. A simulation without noise that is run twice is the same data likewise. Of
-rests only the length counts, since all recordings of one muscle agree there. Copies that were resampled,
-filtered or zeroed hold other numbers, and are not found.
+Two runs of one experiment never agree, to rounding, over many movements of the output. Of rests only the
+length counts. Copies that were resampled, filtered or zeroed hold other numbers, and are not found.
 """
 
 from __future__ import annotations
@@ -31,9 +28,6 @@ ROUNDING = 2e-4
 
 GRAVE = 0.05
 """Share of the windows of the recording that has fewer from which two recordings share data."""
-
-TESTED = "tested on data it was fitted to, so that the figures say nothing of other data"
-"""What every result says where that is so."""
 
 _WEIGHTS = np.random.default_rng(0).integers(2**64, size=1024, dtype=np.uint64)  # any will do
 
@@ -64,15 +58,7 @@ class Shared(NamedTuple):
 def shared_rows(
     recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
 ) -> list[Shared]:
-    """Return which recordings share data.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        All have the channels.
-    inputs, outputs : sequence of str
-        All of these agree where rows are common; outputs are what must move.
-    """
+    """Return which recordings share data: rows in which all channels agree while an output moves."""
     if len(recordings) < 2:
         return []
     moves = _movements(recordings, inputs, outputs)
@@ -117,8 +103,6 @@ def check_shared(
     ----------
     roles : mapping of str to sequence of Recording
         What each is for: "fit", "validate", "calibrate", "test" in this order, or one other verb.
-    inputs, outputs : sequence of str
-        Channels.
     allow : bool, optional
         Whether not to refuse; None where users have no such option.
 
@@ -157,17 +141,15 @@ def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
         names = [f"{each.name} ({each.source})" for each in (one, other)]
     unit = "samples" if other.sample_time is None else "s"
     start, stop = shared.start - other.start_time, shared.stop - other.start_time
-    where = (
-        f"{start:.6g} to {stop:.6g} {unit} after the start of {names[1]} are those of {names[0]} from "
-        f"{shared.begins - one.start_time:.6g} {unit} on, "
-        f"{100 * shared.share:.0f} % of the shorter one's motion"
-    )
-    if role == other_role:
-        return f"the same samples would count twice to {role}: {where}"
-    if "fit" not in (role, other_role):
-        return f"the choice would be made on what is tested on: {where}"
     verb = {"validate": "validated", "calibrate": "calibrated"}.get(other_role, "tested")
-    return f"{TESTED.replace('tested', verb)}: {where}"
+    what = f"{verb} on data that it was {'fitted to' if role == 'fit' else 'chosen by'}"
+    if role == other_role:
+        what = f"the same samples would count twice to {role}"
+    return (
+        f"{what}: {start:.6g} to {stop:.6g} {unit} after the start of {names[1]} are those of "
+        f"{names[0]} from {shared.begins - one.start_time:.6g} {unit} on, {100 * shared.share:.0f} % of "
+        "the shorter one's motion"
+    )
 
 
 def _movements(

@@ -1,4 +1,4 @@
-"""What is used to fit, to choose and to test; each split is one function."""
+"""What is used to fit, to choose and to test."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array
+from mckibben.blocks.free_run import Mask, predecessor
 from mckibben.comparison.channels import Channels, held_at_levels
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals import reversals, split_cycles
-
-Mask = NDArray[np.bool_]
 
 FEWEST = 10
 """Samples in either part of a split."""
@@ -27,7 +25,7 @@ EVERY = 3
 """Of the runs of several muscles, or of a muscle under loads, each so-manieth is held out."""
 
 ENOUGH = 12
-"""Fewest runs of which a third can be spared: of a few, each shows what no other does."""
+"""Fewest runs of which a third can be held out in turn."""
 
 PIECES = 4
 """Of a part that has pieces from all over a recording."""
@@ -36,7 +34,7 @@ HARDLY = 0.2
 """Standard deviation of an output in a part, over that in all, below which it hardly moves there."""
 
 BEYOND = 0.05
-"""Share of the range of an input that a part may go beyond and still be within it: noise does."""
+"""Share of the range of an input that a part may go beyond, as noise does, and still be within it."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ class Split:
         Used to fit and to choose.
     test : tuple of Recording
         Run free from their own start or, where they continue a training recording, from its memory.
-    test_rows : tuple of bool arrays
+    test_rows : tuple of array of bool
         For every test recording, the samples that are scored.
     described : str
         The split in words.
@@ -63,15 +61,7 @@ class Split:
 
 @dataclass(frozen=True)
 class Fold:
-    """One part of a cross-validation: what is fitted, and what is scored.
-
-    Parameters
-    ----------
-    train, train_rows
-        Recordings to fit, and their samples that count.
-    test, test_rows
-        Recordings to run free, and their samples that are scored.
-    """
+    """Part of a cross-validation: recordings to fit and to run free, and their samples that count."""
 
     train: tuple[Recording, ...]
     train_rows: tuple[Mask, ...]
@@ -82,8 +72,8 @@ class Fold:
 def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
     """Return the split that the user gave.
 
-    The first sample of a test recording that continues no training recording is used to start its
-    memory, so it is not scored.
+    The first sample of a test recording starts its memory, unless it continues a training recording,
+    and is not scored.
     """
     rows = []
     for recording in test:
@@ -112,61 +102,46 @@ def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
     its levels, or levels within. Of several muscles, or under loads, every third level of what
     schedules, ends excepted; without several levels, every third run; of fewer, the last part as well.
     """
-    if channels.single and len(recordings) > 1 and (held := _held(recordings, channels.inputs[0])):
-        return held
-    if not channels.single:
-        for name in channels.scheduled(recordings):
-            means = [round(float(recording[name].mean()), 1) for recording in recordings]
-            unseen = set(sorted(set(means))[1:-1][::EVERY])
-            if unseen and held_at_levels(recordings, name):
-                listed = ", ".join(f"{level:g}" for level in sorted(unseen))
-                unit = recordings[0].units[name]
-                return _parted(
-                    recordings,
-                    [mean in unseen for mean in means],
-                    f"runs at {name} {listed} {unit} held out",
-                )
-        if len(recordings) >= EVERY:
-            chosen = [place % EVERY == EVERY - 1 for place in range(len(recordings))]
-            return _parted(recordings, chosen, "every third run held out")
+    if channels.single and len(recordings) > 1:
+        groups = _repeats(recordings, channels.inputs[0], EVERY)
+        if len(groups) > 1:
+            tested = [place in groups[-1] for place in range(len(recordings))]
+            return _parted(recordings, tested, f"the last run at each {channels.inputs[0]}")
+    given = channels.inputs[:1] if channels.single else channels.scheduled(recordings)
+    for name in given if len(recordings) > 1 else ():
+        means = [float(f"{recording[name].mean():.3g}") for recording in recordings]
+        unseen = sorted(set(means))[1:-1][::EVERY]
+        if unseen and held_at_levels(recordings, name):
+            levels = f"{', '.join(f'{level:g}' for level in unseen)} {recordings[0].units[name]}"
+            return _parted(
+                recordings, [mean in unseen for mean in means], f"runs at {name} {levels}"
+            )
+    if len(recordings) >= EVERY and not channels.single:
+        tested = [place % EVERY == EVERY - 1 for place in range(len(recordings))]
+        return _parted(recordings, tested, "every third run")
     return held_out_part(recordings, channels, HELD_OUT)
 
 
-def _held(recordings: Sequence[Recording], channel: str) -> Split | None:
-    """Return the split of runs that each hold the input; None where one moves it, or all are alike."""
-    groups = _repeats(recordings, channel, EVERY)
-    if len(groups) > 1:
-        tested = [place in groups[-1] for place in range(len(recordings))]
-        return _parted(recordings, tested, f"the last run at each {channel} held out")
-    if any(np.ptp(recording[channel]) > 0 for recording in recordings):
-        return None
-    levels = [float(recording[channel][0]) for recording in recordings]
-    unseen = sorted(set(levels))[1:-1][::EVERY]
-    listed = ", ".join(f"{level:g}" for level in unseen)
-    how = f"runs at {channel} {listed} {recordings[0].units[channel]} held out"
-    return _parted(recordings, [level in unseen for level in levels], how) if unseen else None
-
-
-def _parted(recordings: Sequence[Recording], tested: Sequence[bool], how: str) -> Split:
+def _parted(recordings: Sequence[Recording], tested: Sequence[bool], which: str) -> Split:
     train = [run for run, is_test in zip(recordings, tested, strict=True) if not is_test]
     test = [run for run, is_test in zip(recordings, tested, strict=True) if is_test]
     split = given_split(train, test)
-    return replace(split, described=f"{split.described}: {how}")
+    return replace(split, described=f"{split.described}: {which} held out")
 
 
 def held_out_part(recordings: Sequence[Recording], channels: Channels, share: float) -> Split:
     """Hold out the last part of the recordings in which an output moves.
 
-    Whole recordings from the end, then the tail of one. That one is run through from its start, so
-    that its memory is right, and scored on the tail only. Where outputs hardly move there, the part
-    before it is held out instead, if one moves there.
+    Whole recordings from the end, then the tail of one, which is run through from its start, so that
+    its memory is right, and scored on the tail only. Where outputs hardly move there, the part before
+    it is held out instead, if one moves there.
 
     Parameters
     ----------
     channels : Channels
-        The first input, whose travel is divided: a rest at the end of a recording tests nothing.
+        The travel of the first input is divided: a rest at the end of a recording tests nothing.
     share : float
-        Of the input's travel over all recordings to hold out, between 0 and 1.
+        Of that travel over all recordings to hold out, between 0 and 1.
 
     Raises
     ------
@@ -178,7 +153,9 @@ def held_out_part(recordings: Sequence[Recording], channels: Channels, share: fl
     deviation = np.concatenate([recording.matrix(names) for recording in recordings]).std(axis=0)
 
     def moves(split: Split) -> bool:
-        return bool((_scored(split, names).std(axis=0) >= HARDLY * deviation).any())
+        runs = zip(split.test, split.test_rows, strict=True)
+        scored = np.concatenate([recording.matrix(names)[rows] for recording, rows in runs])
+        return bool((scored.std(axis=0) >= HARDLY * deviation).any())
 
     split = last = _tail(recordings, channel, travel, "all before")
     for place in range(1, int(1 / share)):
@@ -236,12 +213,6 @@ def _cut(
     return before[:-1], (run, start), after
 
 
-def _scored(split: Split, names: Sequence[str]) -> Array:
-    """Return the outputs at all samples that are scored, shape (n, k)."""
-    runs = zip(split.test, split.test_rows, strict=True)
-    return np.concatenate([recording.matrix(names)[rows] for recording, rows in runs])
-
-
 def _travel(u: Array) -> Array:
     """Return how far the input has gone up and down until every sample, without its noise."""
     turns = reversals(u)
@@ -255,8 +226,7 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
     """Yield the parts of a cross-validation over recordings, or over blocks of cycles of a single one.
 
     Of recordings that each hold the input, such as a length, every part has one of each level. Of a
-    recording of fewer cycles than parts, which would leave out whole branches, every part has pieces
-    from all over it.
+    recording of fewer cycles than parts, every part has pieces from all over it.
 
     Parameters
     ----------
@@ -269,9 +239,7 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
         for group in _repeats(train, channel, n) or np.array_split(
             np.arange(len(train)), min(n, len(train))
         ):
-            kept = tuple(r for index, r in enumerate(train) if index not in group)
-            left = tuple(train[index] for index in group)
-            yield Fold(kept, _all_rows(kept), left, _all_rows(left))
+            yield _left_out(train, [train[index] for index in group])
         return
     (recording,) = train
     cycles = list(split_cycles(recording, channel, n))
@@ -284,6 +252,11 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
     for part in range(place.max() + 1):
         mask = place == part
         yield Fold((recording,), (~mask,), (recording,), (mask,))
+
+
+def _left_out(train: Sequence[Recording], left: Sequence[Recording]) -> Fold:
+    kept = tuple(run for run in train if not any(run is other for other in left))
+    return Fold(kept, _all_rows(kept), tuple(left), _all_rows(left))
 
 
 def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]]:
@@ -302,18 +275,15 @@ def validation_folds(
     """Return the parts on which models are chosen within the training data, and what that is called.
 
     A cross-validation in ``n`` parts; where there are too few cycles for one, or for ``n`` of 1, the
-    last part of the training data is held out; where that is too little, or for 0, there is nothing.
-    A part whose input goes beyond that of the rest is left out of the cross-validation, unless all do:
-    the largest of decaying cycles would otherwise decide, by how models extrapolate to it, though the
-    model that is delivered has seen it.
+    last part of the training data; where that is too little, or for 0, nothing. A part whose input
+    goes beyond that of the rest is left out, unless all do: extrapolation to it would decide, though
+    the model that is delivered has seen it.
 
-    Of several muscles, or of one under loads, every third run is left out in turn, and scored where its
-    inputs stay within those of the rest; of fewer runs than twelve, the last quarter of each is.
+    Of several muscles, or of one under loads, every third run is left out in turn; of fewer than
+    `ENOUGH`, the last quarter of each is.
 
     Parameters
     ----------
-    channels : Channels
-        What drives, and what schedules.
     n : int
         Largest number of parts.
     given : sequence of Recording
@@ -327,13 +297,13 @@ def validation_folds(
     train = tuple(train)
     if given:
         return (Fold(train, _all_rows(train), tuple(given), _all_rows(given)),), "given"
-    channel = channels.inputs[0]
     if n >= 1 and not channels.single:
-        if len(train) >= ENOUGH and (found := tuple(_left_in_turn(train, channels))):
+        if len(train) >= ENOUGH and (found := tuple(_in_turn(train, channels))):
             return found, "cross-validation"
         starts = [len(run) - round(HELD_OUT * len(run)) for run in train]
         tails = tuple(np.arange(len(run)) >= s for run, s in zip(train, starts, strict=True))
         return (Fold(train, tuple(~tail for tail in tails), train, tails),), "validation"
+    channel = channels.inputs[0]
     if n >= 2:
         with suppress(DataError):  # of an input that never turns
             parts = tuple(folds(train, channel, n))
@@ -348,22 +318,22 @@ def validation_folds(
     return (), "fit"
 
 
-def _left_in_turn(train: Sequence[Recording], channels: Channels) -> Iterator[Fold]:
+def _in_turn(train: Sequence[Recording], channels: Channels) -> Iterator[Fold]:
     names = (*channels.inputs, *channels.scheduled(train))
     for first in range(EVERY):
-        kept = tuple(run for place, run in enumerate(train) if place % EVERY != first)
+        kept = [run for place, run in enumerate(train) if place % EVERY != first]
         seen = {name: np.concatenate([run[name] for run in kept]) for name in names}
-        left = tuple(
+        left = [
             run
             for run in train[first::EVERY]
-            if all(within(run[name], seen[name]) for name in names)
-        )
+            if all(_within(run[name], seen[name]) for name in names)
+        ]
         if left:
-            yield Fold(kept, _all_rows(kept), left, _all_rows(left))
+            yield Fold(tuple(kept), _all_rows(kept), tuple(left), _all_rows(left))
 
 
-def within(values: Array, others: Array) -> bool:
-    """Tell whether values stay within the range of others, nearly."""
+def _within(values: Array, others: Array) -> bool:
+    """Return whether values stay within the range of others, nearly."""
     low, high = others.min(), others.max()
     slack = BEYOND * (high - low)
     return bool(values.min() >= low - slack and values.max() <= high + slack)
@@ -374,12 +344,7 @@ def _interpolates(part: Fold, channel: str) -> bool:
         np.concatenate([r[channel][mask] for r, mask in zip(runs, rows, strict=True)])
         for runs, rows in ((part.test, part.test_rows), (part.train, part.train_rows))
     )
-    return within(tested, fitted)
-
-
-def predecessor(recording: Recording, others: Sequence[Recording]) -> Recording | None:
-    """Return the recording among others that this one continues, or None."""
-    return next((other for other in others if recording.continues(other)), None)
+    return _within(tested, fitted)
 
 
 def _count(rows: Sequence[Mask]) -> int:

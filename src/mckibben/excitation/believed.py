@@ -13,9 +13,9 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
-from mckibben.comparison.offered import default_model
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError, ModelError
+from mckibben.estimators.catalogue import default_model
 from mckibben.excitation.candidates import random_plan
 from mckibben.excitation.limits import (
     Limit,

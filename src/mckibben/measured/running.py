@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.ranking import Standing, compare
 from mckibben.errors import DataError, MckibbenError

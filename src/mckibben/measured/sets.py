@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
-from mckibben.comparison.free_run import PERIODIC
+from mckibben.blocks.free_run import PERIODIC
 from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
 from mckibben.files import read

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mckibben.blocks.base import Block
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.errors import MckibbenError
 from mckibben.estimators.optimisers.tracker import whole_searches
 from mckibben.files import read, write

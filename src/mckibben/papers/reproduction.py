@@ -12,7 +12,7 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.system.progress import telling
 from mckibben.system.threads import one_blas_thread
 

@@ -154,7 +154,7 @@ def plot_model(block: Block, recordings: Sequence[Recording], kind: str, path: s
     ModelError
         On an unknown kind, a model without weights, or one that does not suit the recordings.
     """
-    from mckibben.comparison.free_run import run_free
+    from mckibben.blocks.free_run import run_free
 
     name = "model"
     if _known(kind, MODEL_KINDS) == "weights":

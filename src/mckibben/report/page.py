@@ -203,7 +203,7 @@ def _coupled(study: Study, recordings: list[Recording]) -> coupling_subjects.Cou
 def _explained(board: Leaderboard) -> dict[str, str]:
     """Return the full name of every model of a leaderboard and what it can; nothing of unknown ones."""
     from mckibben import registry
-    from mckibben.comparison.offered import summary
+    from mckibben.estimators.catalogue import summary
 
     known = registry.names("estimators")
     return {row.model: summary(row.model) for row in board.ranking if row.model in known}

@@ -13,7 +13,7 @@ from mckibben.numerals import numeral
 from mckibben.recording import standard_unit
 
 if TYPE_CHECKING:
-    from mckibben.comparison.choosing import Against, Choice
+    from mckibben.comparison.choosing import Against
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.diagnosis.data_gaps import Gap
 
@@ -89,8 +89,7 @@ def not_recommended(
 
 def comparison(board: Leaderboard) -> list[str]:
     """Return what is to be said of a comparison beside its table."""
-    best, choice = board.best, board.choice
-    said = list(board.shared)
+    best, said = board.best, list(board.shared)
     if board.loads:
         said.append(f"Given to models beside the inputs: {', '.join(board.loads)}.")
     said += [
@@ -101,27 +100,11 @@ def comparison(board: Leaderboard) -> list[str]:
         f"{name} is outside its training range in {numeral(100 * share, 2)} % of the test samples."
         for name, share in board.outside.items()
     ]
-    if best is not None and choice is not None:
-        said.append(cost_of_choice(choice, board.unit))
     if best is not None and best.band is not None:
         said.append(f"{best.model}: {best.band}.")
     if best is not None:
         said += [f"{best.model}: {note}." for note in best.diagnostics.get("notes", ())]
     return said
-
-
-def cost_of_choice(choice: Choice, unit: str) -> str:
-    """Return what choosing among models by their errors costs."""
-    own, fair = (f"{numeral(e, 3)} {unit}".strip() for e in (choice.error, choice.expected))
-    picked = ", ".join(
-        f"{model} in {numeral(100 * share, 2)} %"
-        for model, share in choice.picked.items()
-        if share >= 0.01
-    )
-    return (
-        f"Chosen among {choice.among} models: the least error of cross-validation is {own}, and {fair} "
-        f"is to be expected of data that did not choose. Resampled data choose {picked}."
-    )
 
 
 def not_validated(board: Leaderboard) -> list[str]:

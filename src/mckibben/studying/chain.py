@@ -15,7 +15,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.feedback import MEASURED
-from mckibben.comparison.free_run import measured_start
+from mckibben.blocks.free_run import measured_start
 from mckibben.control.twin import COMMAND
 from mckibben.errors import ModelWarning
 from mckibben.recording import Recording

@@ -13,11 +13,11 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
+from mckibben.blocks.free_run import run_free
 from mckibben.blocks.inverse import Inverse
-from mckibben.comparison.free_run import run_free
-from mckibben.comparison.offered import declared
 from mckibben.comparison.splits import Fold, folds
 from mckibben.errors import MckibbenError, ModelWarning
+from mckibben.estimators.catalogue import declared
 from mckibben.recording import Recording
 from mckibben.statistics import BlockBootstrap, correlation_length, interval
 

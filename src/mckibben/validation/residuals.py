@@ -10,7 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.comparison.free_run import PERIODIC, measured_start, refuse_runaway, run_free
+from mckibben.blocks.free_run import PERIODIC, measured_start, refuse_runaway, run_free
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError
 from mckibben.recording import Recording

@@ -13,7 +13,7 @@ from mckibben.app.fields import said
 from mckibben.app.offering import Offer, Offered, offered
 from mckibben.app.pages import apart
 from mckibben.app.pages.settings import ask
-from mckibben.comparison.offered import Need
+from mckibben.estimators.catalogue import Need
 
 INVERSES = {
     "exact": "exact inverse",

@@ -31,11 +31,11 @@ from mckibben.app.pages.judging import (
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.equations import quantities
-from mckibben.comparison.free_run import run_free
-from mckibben.comparison.offered import caution as model_caution
-from mckibben.comparison.offered import full_name
-from mckibben.comparison.splits import Mask, Split, tested_from
+from mckibben.blocks.free_run import Mask, run_free
+from mckibben.comparison.splits import Split, tested_from
 from mckibben.errors import MckibbenError, ModelError
+from mckibben.estimators.catalogue import caution as model_caution
+from mckibben.estimators.catalogue import full_name
 from mckibben.numerals import numeral, typeset
 from mckibben.recording import Recording
 from mckibben.report import subjects, wording

@@ -14,8 +14,8 @@ from mckibben.app.jobs import DONE, ENDED, RUNNING, Job
 from mckibben.app.pages import leaderboard
 from mckibben.app.pages.choosing import Choice
 from mckibben.app.together import obstacle
-from mckibben.comparison.offered import settings_of
 from mckibben.errors import ModelError
+from mckibben.estimators.catalogue import settings_of
 
 FIT, FIT_MORE = "Models, by what they are for", "Fit more models, by what they are for"
 

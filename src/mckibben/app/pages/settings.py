@@ -9,8 +9,8 @@ from nicegui import ui
 
 from mckibben import registry
 from mckibben.app.desk import labelled, named, tell
-from mckibben.comparison.offered import full_name, settings_of
 from mckibben.errors import ModelError
+from mckibben.estimators.catalogue import full_name, settings_of
 from mckibben.estimators.core.settings import Setting, settings_with_defaults
 
 CHANNELS = ("input", "output", "scheduling")

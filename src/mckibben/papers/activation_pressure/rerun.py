@@ -14,7 +14,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.force.activation import ActivationMemory, ActivationPressure
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.force.activation import (
     ActivationMemoryEstimator,
     ActivationPressureEstimator,

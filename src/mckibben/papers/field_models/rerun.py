@@ -6,13 +6,14 @@ Source: "Analysis and modeling of a pneumatic artificial muscle system".
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.ranking import compare
 from mckibben.errors import MckibbenError, ModelError
@@ -256,6 +257,13 @@ def _weights(tried: Mapping[str, Tried]) -> Table:
     )
 
 
+def _inside(row: Mapping[str, Any], path: str, scale: float) -> Cell:
+    found: Any = row
+    for name in path.split("."):
+        found = (found or {}).get(name)
+    return None if found is None else scale * found
+
+
 def _leaderboard(board: Leaderboard) -> Table:
     validated = [("CV RMSE [mm]", "validation_rmse")] if board.chosen_by != "fit" else []
     columns = [
@@ -267,12 +275,10 @@ def _leaderboard(board: Leaderboard) -> Table:
         ("kept in a hold [%]", "memory.hold_ratio"),
         ("parameters", "n_parameters"),
     ]
-    table = board.to_frame().set_index("model").reindex(columns=[key for _, key in columns])
-    table *= [100.0 if heading.endswith("[%]") else 1.0 for heading, _ in columns]
-    values = table.astype(object).where(table.notna(), None)
     rows: list[tuple[Cell, ...]] = []
     for row in sorted(board.rows, key=lambda row: row.test_error):
-        rows.append((row.model, *values.loc[row.model], row.reason))
+        cells = [_inside(row.to_dict(), path, 100.0 if "[%]" in of else 1) for of, path in columns]
+        rows.append((row.model, *cells, row.reason))
     return Table(
         "The whole field on the same data, lowest test error first",
         ("model", *(heading for heading, _ in columns), "failed because"),

@@ -9,7 +9,7 @@ from typing import Any
 
 from mckibben import registry
 from mckibben.blocks.base import Block
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.errors import ModelWarning
 from mckibben.papers.keeping import fitted
 from mckibben.papers.mpi_narmax.protocol import HELD

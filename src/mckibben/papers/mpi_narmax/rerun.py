@@ -13,7 +13,7 @@ import numpy as np
 from mckibben import registry
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.load_estimate import load_of
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.control import (
     BlockController,
     EstimatedLoad,

@@ -12,7 +12,7 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.force.multistate_friction import SIZES as SIZES_OF
 from mckibben.blocks.force.multistate_friction import MultistateFriction
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.force.multistate import (
     MultistateEstimator,
     Structure,

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from mckibben import registry
 from mckibben.blocks.force.laws import ForceLaw
 from mckibben.blocks.force.multistate_friction import MultistateFriction
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.force.multistate import (
     extract_hysteresis,
 )

@@ -12,7 +12,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.feedback import PIDFeedback
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.control import Controller, Tracked, control_law, track, tune_pid
 from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.fuzzy import Consequents, Search, fit_network, printed_swarm

@@ -14,7 +14,7 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.papers.keeping import fitted
 from mckibben.papers.reproduction import Progress
 from mckibben.papers.sdchm.recordings import OUTPUTS, Recordings

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.papers.keeping import recorded
 from mckibben.papers.reproduction import Progress
 from mckibben.papers.sdchm.protocol import PERIOD

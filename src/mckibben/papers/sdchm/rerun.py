@@ -6,7 +6,7 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator".
 
 from __future__ import annotations
 
-from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.checkpoints import Checkpoints
 from mckibben.papers.reproduction import Progress, Reproduction, Source, Table
 from mckibben.papers.sdchm import printed
 from mckibben.papers.sdchm.compensation import run_loops

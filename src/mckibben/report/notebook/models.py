@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.comparison.free_run import run_free
+from mckibben.blocks.free_run import run_free
 from mckibben.control.identified import known_ranges
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.numerals import numeral

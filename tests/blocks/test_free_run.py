@@ -10,7 +10,7 @@ import pytest
 from mckibben import GPI, PI, RateDependentPI, Recording, Series
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.creep import Creep
-from mckibben.comparison.free_run import PERIODIC, measured_start, run_free
+from mckibben.blocks.free_run import PERIODIC, measured_start, run_free
 
 T = np.linspace(0, 1, 800)
 U = 2.5 + 2.0 * np.sin(17 * T) * (1 - 0.5 * T) - 0.4 * np.sin(50 * T)

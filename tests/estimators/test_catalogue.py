@@ -16,17 +16,17 @@ from mckibben import ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.leaderboard import inverse_of
-from mckibben.comparison.offered import (
+from mckibben.comparison.planning import objections
+from mckibben.errors import MckibbenError
+from mckibben.estimators.catalogue import (
     declared,
     default_model,
     full_name,
     needs,
-    objections,
     settings_of,
     settings_of_all,
     summary,
 )
-from mckibben.errors import MckibbenError
 from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
 from mckibben.estimators.hysteresis.pi import PIEstimator
 

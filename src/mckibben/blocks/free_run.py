@@ -6,23 +6,19 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.dynamics.starts import fitted_places, fitted_state
-from mckibben.comparison.splits import Mask, predecessor
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.recording import Recording
 
+Mask = NDArray[np.bool_]
+
 PERIODIC = "periodic"
 """In the ``meta`` of a recording that is one period of a motion which repeats itself."""
-
-STARTED = (
-    "Memory starts as training left it where the test goes on from there; else, with one driving input, "
-    "from what best explains the first measured output: what simulate calls a measured start."
-)
-"""How models are run free here, where a saved one starts by its own rule."""
 
 AWAY = 1e3
 """Ranges of the measured output by which a model that is off has run away."""
@@ -40,12 +36,10 @@ def run_free(
 ) -> Array:
     """Return modelled outputs over a recording, shape (n,) of one that is named, (n, k) of several.
 
-    Memory starts from the end of the known recording that this one continues; else from the one
-    excursion before the first sample that best explains the first measured output (`measured_start`).
-    A model of several driving inputs starts from its own rule, for there is no one such excursion.
-    A linear model whose start is fitted starts from what explains best those of its samples that are
-    known: the recording is one of the known ones, or begins as one of them does. After that nothing
-    measured but the inputs is used.
+    Memory starts from the end of the known recording that this one continues; else from the
+    `measured_start`, which of several driving inputs is the model's own rule. A linear model whose
+    start is fitted starts from what explains best its samples that are known, where the recording is or
+    begins as a known one. After that nothing measured but the inputs is used.
 
     Parameters
     ----------
@@ -79,13 +73,13 @@ def run_free(
     return found[:, 0] if isinstance(output, str) else found
 
 
-def refuse_runaway(block: Block, recording: Recording, modelled: Array, measured: Array) -> None:
-    """Refuse a model whose outputs (n, k) run away from what is measured.
+def predecessor(recording: Recording, others: Sequence[Recording]) -> Recording | None:
+    """Return the recording among others that this one continues, or None."""
+    return next((other for other in others if recording.continues(other)), None)
 
-    Raises
-    ------
-    ModelError
-    """
+
+def refuse_runaway(block: Block, recording: Recording, modelled: Array, measured: Array) -> None:
+    """Raise a `ModelError` where a model's outputs (n, k) run away from what is measured."""
     if not (np.abs(modelled - measured) <= AWAY * np.ptp(measured, axis=0)).all():
         far, wide = float(np.abs(modelled).max()), float(np.ptp(measured, axis=0).max())
         raise ModelError(
@@ -109,10 +103,7 @@ def _repeated(block: Block, recording: Recording, outputs: Sequence[str]) -> Arr
 def known_start(
     block: Block, recording: Recording, outputs: Sequence[str], rows: Mask | None = None
 ) -> Array:
-    """Return the state before the first sample of a recording whose outputs are known.
-
-    That of the least squared error where the block's start is fitted; else `measured_start`.
-    """
+    """Return the state of least squared error where the start is fitted; else `measured_start`."""
     if block.start == "fitted" or fitted_places(block):
         inputs = recording.matrix(channel.name for channel in block.inputs)
         return fitted_state(block, inputs, recording[outputs[0]], recording.sample_time, rows)

@@ -1,0 +1,438 @@
+"""Loops: output over input along rising and falling branches, and what can be read off them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.arrays import Array
+from mckibben.diagnosis.tracks import STILL, Range, Scale, Track, interval, median
+from mckibben.metrics import loop_area
+from mckibben.signals.reversals import whole_cycles
+
+SHARES = np.linspace(0.02, 0.98, 49)
+"""Input levels of a curve, as shares of its range; the middle one is mid input."""
+
+MIDDLE = SHARES.size // 2
+
+WINDOW = 0.025
+"""Samples this close to a level, as a share of the range, make the curve there."""
+
+FEWEST = 8
+"""Samples that a branch must have for its shape to be measured."""
+
+EQUAL = 0.98
+"""Amplitudes from this share of the largest on are as large."""
+
+AS_HIGH, VENTED = 0.05, 0.7
+"""Shares of the amplitude within which repeats turn, and that they have at least."""
+
+CLOSED, ENOUGH = 0.02, 0.8
+"""Shares of the amplitude within which a closed loop ends where it began, and which a closed loop has
+at least to be preferred to one that is not."""
+
+PART = 0.5
+"""Share of the other branch that a branch at either end of a recording must have to make a loop."""
+
+SLIGHT = 1.0
+"""Loop width below which a loop has no shape worth measuring [% of the output range]."""
+
+FLAT, REACH = 0.2, 2
+"""Share of the steepest slope below which the output hardly follows the input; levels on either side
+over which a slope is taken."""
+
+COVERS = 0.3
+"""Share of the input range that a branch covers whose slope counts."""
+
+BINS = 12
+"""Of input or velocity, by which variance is explained."""
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One cycle of the input, minimum to minimum, of at least a tenth of the input range.
+
+    The first and the last of a recording may lack half of a branch; what is measured is between the
+    levels that both branches cover.
+
+    Parameters
+    ----------
+    recording : int
+        Number of its recording, or of its stretch of one, from 0.
+    low, high : float
+        The input levels that both branches cover.
+    rate : float or None
+        Mean speed of the input, up and down [input unit/s]; None without time.
+    width : float
+        Loop width e_w [% of the cycle's output range].
+    """
+
+    recording: int
+    low: float
+    high: float
+    rate: float | None
+    width: float
+
+    @property
+    def amplitude(self) -> float:
+        """High less low."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The curves of one cycle: output ``up`` and ``down`` at input ``levels``, each of shape (49,).
+
+    ``begins`` and ``ends`` are its first and last sample, ``first`` whether its recording begins with
+    it, ``closed`` whether the input returns to where it began.
+    """
+
+    cycle: Cycle
+    levels: Array
+    up: Array
+    down: Array
+    span: float
+    area: float
+    begins: int
+    ends: int
+    closed: bool
+    first: bool
+
+    @property
+    def mid_width(self) -> float:
+        """Distance of the branches at mid input [output unit]."""
+        return float(abs(self.down[MIDDLE] - self.up[MIDDLE]))
+
+    @property
+    def asymmetry(self) -> float | None:
+        """How far a closed loop is from its own image, turned by half a turn [% of the output range].
+
+        Standard deviation over the levels of up(mid + s) + down(mid - s). Zero for every loop of a
+        classical Prandtl-Ishlinskii model; a bent or saturating loop has more.
+        """
+        return 100 * float(np.std(self.up + self.down[::-1])) / self.span if self.closed else None
+
+    @property
+    def width_centroid(self) -> float | None:
+        """Centroid of the width over the input, -1 low, 0 mid, 1 high; None for a slight loop."""
+        widths = np.abs(self.down - self.up)
+        if 100 * widths.mean() < SLIGHT / 2 * self.span:
+            return None
+        return float(np.sum((2 * SHARES - 1) * widths) / np.sum(widths))
+
+
+def loops_of(tracks: Sequence[Track], scale: Scale) -> list[Loop]:
+    """Return the cycles with at least eight samples on each branch, in order of time.
+
+    Minor loops within a branch are left out of it.
+    """
+    found = []
+    for number, track in enumerate(tracks):
+        for piece in whole_cycles(track.u, track.major_turns, PART):
+            loop = _loop(number, track, piece, scale)
+            if loop is not None:
+                found.append(loop)
+    return found
+
+
+def largest_of(loops: Sequence[Loop]) -> list[Loop]:
+    """Return the largest loops and their repeats, as high, from the narrowest to the widest.
+
+    The first of a recording is left out where others follow: it starts from an unknown memory.
+    """
+    most = max((loop.cycle.amplitude for loop in loops), default=0.0)
+    closed = [loop for loop in loops if loop.closed]
+    if any(loop.cycle.amplitude >= ENOUGH * most for loop in closed):
+        loops = closed
+    found: list[Loop] = []
+    for number in {loop.cycle.recording for loop in loops}:
+        own = [loop for loop in loops if loop.cycle.recording == number]
+        limit = EQUAL * max(loop.cycle.amplitude for loop in own)
+        large = [loop for loop in own if loop.cycle.amplitude >= limit]
+        found += [loop for loop in large if not loop.first] or large
+    if not found:
+        return []
+    largest = max((loop.cycle for loop in found), key=lambda cycle: cycle.amplitude)
+    repeats = (
+        loop
+        for loop in found
+        if loop.cycle.amplitude >= VENTED * largest.amplitude
+        and abs(loop.cycle.high - largest.high) <= AS_HIGH * largest.amplitude
+    )
+    return sorted(repeats, key=lambda loop: loop.cycle.width)
+
+
+def curve(u: Array, y: Array, levels: Array, half: float) -> Array:
+    """Return the output at input levels: a line fitted to the samples near each level.
+
+    Between samples further apart than that it is interpolated; beyond them it is NaN.
+
+    Parameters
+    ----------
+    u, y : array, shape (n,)
+        Samples in any order, n at least 1.
+    levels : array, shape (k,)
+    half : float
+        Samples at most this far from a level are near.
+    """
+    order = np.argsort(u, kind="stable")
+    x, z = u[order], y[order]
+    first = np.searchsorted(x, levels - half)
+    stop = np.searchsorted(x, levels + half, side="right")
+    centre, middle = 0.5 * (x[0] + x[-1]), float(z.mean())
+    v, w = x - centre, z - middle
+    count = stop - first
+    sums = [_sums(q, first, stop) / np.maximum(count, 1) for q in (v, w, v * v, v * w)]
+    mean_v, mean_w, mean_vv, mean_vw = sums
+    spread = mean_vv - mean_v**2
+    # A line needs samples on some length of input; the mean is all that a cluster gives.
+    wide = spread > (0.1 * half) ** 2
+    slope = np.where(wide, mean_vw - mean_v * mean_w, 0.0) / np.where(wide, spread, 1.0)
+    fitted = middle + mean_w + slope * (levels - centre - mean_v)
+    # no line is drawn on beyond its samples: what is near may be one cluster, far to one side
+    last = x.size - 1
+    amid = (x[np.minimum(first, last)] <= levels) & (levels <= x[np.clip(stop - 1, 0, last)])
+    near = (count >= 3) & wide & amid
+    found = np.where(near, fitted, np.interp(levels, x, z))
+    found[(levels < x[0]) | (levels > x[-1])] = np.nan
+    return np.asarray(found)
+
+
+@dataclass(frozen=True)
+class Branches:
+    """All major branches: curves (m, 49) at common levels, directions (m,), recordings (m,)."""
+
+    levels: Array
+    curves: Array
+    ways: Array
+    owners: Array
+
+    def mean(self, way: float) -> Array:
+        """Return the mean curve of one direction, NaN at levels that no such branch covers."""
+        chosen = self.curves[self.ways == way]
+        known = np.isfinite(chosen)
+        total, count = np.where(known, chosen, 0.0).sum(axis=0), known.sum(axis=0)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
+    """Return the curves of all major branches of three samples or more."""
+    levels = scale.u_low + SHARES * scale.u_span
+    half = _half(scale, scale.u_span)
+    found = [
+        (curve(track.u[part], track.y[part], levels, half), way, number)
+        for number, track in enumerate(tracks)
+        for part, way in track.branches
+        if part.stop - part.start >= 3
+    ]
+    curves, ways, owners = zip(*found, strict=True) if found else ((), (), ())
+    shape = (len(found), levels.size)
+    return Branches(levels, np.reshape(curves, shape), np.array(ways), np.array(owners))
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Distance of falling from rising branches, positive where the output lags [output unit].
+
+    ``gap`` is None where no two branches cover a level. Of fewer than four branches, which drift would
+    part as well, there are no ``limits`` (95 %) and no ``p``, the probability of as large a gap without
+    a loop.
+    """
+
+    gap: float | None = None
+    limits: Range | None = None
+    p: float | None = None
+
+
+def gaps_of(found: Branches, sign: float) -> Gaps:
+    """Return how far branches are from the mean of those before and after, so that drift cancels.
+
+    The error is that of branches which differ as much as those of one direction do: a t-test.
+    """
+    from scipy.special import fdtrc, stdtrit
+
+    gaps, repeats, pairs = [], [], []
+    for k in range(found.ways.size - 1):
+        if found.owners[k] == found.owners[k + 1]:
+            pairs += _mean(found.ways[k + 1] * (found.curves[k] - found.curves[k + 1]))
+            if k and found.owners[k - 1] == found.owners[k]:
+                before, here, after = found.curves[k - 1 : k + 2]
+                gaps += _mean(found.ways[k] * (0.5 * (before + after) - here))
+                repeats += _mean(np.where(np.isfinite(here), after - before, np.nan))
+    gap, n = sign * float(np.mean(gaps or pairs or [np.nan])), len(gaps)
+    if n < 2:
+        return Gaps(gap if gaps or pairs else None)
+    # of independent branches, gaps vary by 3/2, their mean by 4/n and repeats by 2 times their variance
+    error, freedom = float(np.sqrt(2 * np.mean(np.square(repeats)) / n)), max(n / 1.5, 1.0)
+    half = error * float(stdtrit(freedom, 0.975))
+    p = float(fdtrc(1.0, freedom, (gap / error) ** 2)) if error > 0 else float(gap == 0)
+    return Gaps(gap, (gap - half, gap + half), p)
+
+
+def _mean(apart: Array) -> list[float]:
+    """Return the mean over the levels that are known, if there are any."""
+    known = apart[np.isfinite(apart)]
+    return [float(known.mean())] if known.size else []
+
+
+@dataclass(frozen=True)
+class MeanCurve:
+    """The output over the input without its hysteresis; None where the recordings do not show it.
+
+    ``gain`` is the slope at mid input over a fifth of the range; below ``onset`` and above
+    ``saturation`` the slope stays under a fifth of its maximum.
+    """
+
+    gain: float | None = None
+    gain_limits: Range | None = None
+    onset: float | None = None
+    saturation: float | None = None
+
+
+def mean_curve(found: Branches, loops: Sequence[Loop], scale: Scale) -> MeanCurve:
+    """Return gain, onset and saturation of the mean of rising and falling output.
+
+    Of the largest loops where they cover the input range, else of all branches.
+    """
+    curves = [
+        (loop.levels, 0.5 * (loop.up + loop.down))
+        for loop in loops
+        if loop.cycle.amplitude >= ENOUGH * scale.u_span
+    ] or [(found.levels, 0.5 * (found.mean(1.0) + found.mean(-1.0)))]
+    each = [
+        _curve_of(u[known], y[known], scale) for u, y in curves if (known := np.isfinite(y)).any()
+    ]
+    gains = [one.gain for one in each if one.gain is not None]
+    onsets = [one.onset for one in each]
+    saturations = [one.saturation for one in each]
+    return MeanCurve(
+        median(gains),
+        interval(gains),
+        median([x for x in onsets if x is not None]) if None not in onsets else None,
+        median([x for x in saturations if x is not None]) if None not in saturations else None,
+    )
+
+
+def _curve_of(u: Array, mean: Array, scale: Scale) -> MeanCurve:
+    centre, fifth = 0.5 * (scale.u_low + scale.u_high), 0.1 * scale.u_span
+    gain = None
+    if u[0] <= centre - fifth and u[-1] >= centre + fifth:
+        low, high = np.interp([centre - fifth, centre + fifth], u, mean)
+        gain = float(high - low) / (2 * fifth)
+    if u.size < 4 * REACH:
+        return MeanCurve(gain)
+    rises = scale.sign * (mean[2 * REACH :] - mean[: -2 * REACH])
+    slopes, at = rises / (u[2 * REACH :] - u[: -2 * REACH]), u[REACH:-REACH]
+    steep = np.flatnonzero(slopes >= FLAT * slopes.max()) if slopes.max() > 0 else np.arange(0)
+    if not steep.size:
+        return MeanCurve(gain)
+    # A flat end counts when more than one slope is flat there, so that noise makes none.
+    onset = float(at[steep[0]]) if steep[0] > 1 else None
+    saturation = float(at[steep[-1]]) if steep[-1] < at.size - 2 else None
+    return MeanCurve(gain, None, onset, saturation)
+
+
+def p_of_slopes(tracks: Sequence[Track], scale: Scale) -> float | None:
+    """Return the probability of as consistent slopes along branches of an unrelated output.
+
+    Slope and curvature of every branch, its mean apart, by Hotelling's T² over branches; None of fewer
+    than three.
+    """
+    from scipy.special import fdtrc
+
+    found = []
+    for track in tracks:
+        for part, _ in track.branches:
+            x = 2 * (track.u[part] - scale.u_low) / scale.u_span - 1
+            if x.size >= FEWEST and np.ptp(x) >= 2 * COVERS:
+                columns = np.column_stack([np.ones(x.size), x, x * x])
+                found.append(np.linalg.lstsq(columns, track.y[part], rcond=None)[0][1:])
+    m = len(found)
+    if m < 3:
+        return None
+    terms = 2 if m > 4 else 1
+    slopes = np.array(found)[:, :terms]
+    mean, scatter = slopes.mean(axis=0), np.cov(slopes.T, ddof=1).reshape(terms, terms)
+    spread = m * float(mean @ np.linalg.pinv(scatter) @ mean)
+    if not scatter.any():
+        return 0.0 if mean.any() else 1.0
+    return float(fdtrc(terms, m - terms, spread * (m - terms) / (terms * (m - 1))))
+
+
+def explained(tracks: Sequence[Track]) -> tuple[float, float, float]:
+    """Return the shares of the output's variance that input, velocity, and input with direction explain.
+
+    Velocity is the change of the input from sample to sample. By means over bins with as many samples.
+    """
+    u, y = (np.concatenate([getattr(track, name) for track in tracks]) for name in "uy")
+    v = np.concatenate([np.gradient(track.u) for track in tracks])
+    position, velocity = (
+        np.searchsorted(np.quantile(x, np.linspace(0, 1, BINS + 1)[1:-1]), x) for x in (u, v)
+    )
+    shares = []
+    for bins in (position, velocity, 2 * position + (v > 0)):
+        count, total = np.bincount(bins), np.bincount(bins, y)
+        left = np.var(y - (total / np.maximum(count, 1))[bins])
+        shares.append(float(1 - left / np.var(y)) if np.ptp(y) > 0 else 0.0)
+    return shares[0], shares[1], shares[2]
+
+
+def drift(loops: Sequence[Loop]) -> list[float]:
+    """Return the changes of the output from one closed cycle to the next between the same extremes."""
+    changes = []
+    for one, other in pairwise(loops):
+        follows = one.cycle.recording == other.cycle.recording and one.ends == other.begins
+        if follows and one.closed and other.closed and alike(one.cycle, other.cycle, CLOSED):
+            common = (one.levels >= other.levels[0]) & (one.levels <= other.levels[-1])
+            later = [np.interp(one.levels[common], other.levels, x) for x in (other.up, other.down)]
+            changes.append(float(np.mean(np.subtract(later, [one.up[common], one.down[common]]))))
+    return changes
+
+
+def alike(one: Cycle, other: Cycle, within: float) -> bool:
+    """Tell whether two cycles have the same extremes, within a share of the amplitude."""
+    limit = within * one.amplitude
+    return abs(one.low - other.low) <= limit and abs(one.high - other.high) <= limit
+
+
+def _half(scale: Scale, amplitude: float) -> float:
+    """Return how near samples make a curve: over several steps of a coarse sensor."""
+    steps = max(scale.u_step / scale.u_span, scale.y_step / scale.y_span)
+    return max(WINDOW * amplitude, min(2 * steps, 0.25) * scale.u_span)
+
+
+def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
+    tolerance = STILL * scale.u_span
+    u, y = track.u[piece], track.y[piece]
+    top = int(np.argmax(u))
+    rise, fall = np.arange(top + 1), np.arange(top, u.size)
+    rise = rise[u[rise] >= np.maximum.accumulate(u[rise]) - tolerance]
+    fall = fall[u[fall] <= np.minimum.accumulate(u[fall]) + tolerance]
+    if min(rise.size, fall.size) < FEWEST:
+        return None
+    low, high = float(max(u[0], u[-1])), float(u[top])
+    levels, half = low + SHARES * (high - low), _half(scale, high - low)
+    up, down = curve(u[rise], y[rise], levels, half), curve(u[fall], y[fall], levels, half)
+    covered = u >= low
+    span = float(np.ptp(y[covered]))
+    if span == 0 or not np.isfinite(up + down).all():
+        return None
+    rate = None
+    if track.sample_time is not None:
+        rate = float((2 * u[top] - u[0] - u[-1]) / (track.sample_time * (u.size - 1)))
+    width = 100 * float(abs(down[MIDDLE] - up[MIDDLE])) / span
+    cycle = Cycle(number, low, high, rate, width)
+    closed = bool(abs(u[-1] - u[0]) <= CLOSED * (high - low))
+    area = loop_area(u[covered], y[covered])
+    first = piece.start <= track.major_turns[1] and not track.periodic
+    ends = piece.stop - 1
+    return Loop(cycle, levels, up, down, span, area, piece.start, ends, closed, first)
+
+
+def _sums(q: Array, first: NDArray[np.intp], stop: NDArray[np.intp]) -> Array:
+    total = np.concatenate([[0.0], np.cumsum(q)])
+    return np.asarray(total[stop] - total[first])

@@ -14,7 +14,7 @@ from mckibben import registry
 SOURCE = Path(mckibben.__file__).parent
 
 PARTS = (
-    *("recording", "signals", "metrics", "characterization", "files", "rigs", "environments"),
+    *("recording", "signals", "metrics", "diagnosis", "files", "rigs", "environments"),
     *("blocks", "estimators", "control", "comparison", "excitation", "validation", "muscles"),
     *("papers", "report", "studying", "export", "stream", "link", "simulators", "ros"),
     *("bands", "measured", "example", "errors"),

@@ -21,10 +21,10 @@ from .blocks.memoryless import Affine as Affine
 from .blocks.memoryless import PiecewiseLinear as PiecewiseLinear
 from .blocks.memoryless import Polynomial as Polynomial
 from .blocks.saving import load as load
-from .characterization import characterize as characterize
 from .comparison.calibrating import calibrate as calibrate
 from .comparison.orders import identify as identify
 from .comparison.ranking import compare as compare
+from .diagnosis import characterize as characterize
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning
 from .errors import MckibbenError as MckibbenError

@@ -15,7 +15,7 @@ SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
     {"errors", "arrays", "registry", "presets", "numerals", "version", "example", "system"},
-    {"recording", "signals", "metrics", "statistics", "characterization"},
+    {"recording", "signals", "metrics", "statistics"},
     {"files"},
     {"rigs"},
     {"blocks"},
@@ -25,7 +25,7 @@ LAYERS = (
     {"environments"},
     {"bands"},
     {"comparison"},
-    {"validation", "excitation"},
+    {"validation", "excitation", "diagnosis"},
     {"studying"},
     {"papers", "measured"},
     {"report"},

@@ -111,10 +111,11 @@ def study(
 
 def _say(study: Study, folder: Path) -> None:
     """Print what the muscle and a loop do, before any model is fitted."""
+    from mckibben.report import words
     from mckibben.studying.refitting import Refit
 
     if study.characterization is not None:
-        for sentence in study.characterization.sentences:
+        for sentence in words.characterization_sentences(study.characterization):
             say(sentence)
     for gap in study.untold:
         say(f"- {gap}")

@@ -29,11 +29,11 @@ from mckibben.diagnosis.loops import (
     p_of_slopes,
 )
 from mckibben.diagnosis.memory import dead_zones, minor_loop_errors
-from mckibben.diagnosis.time_effects import creep, rate_dependence, shortest_hold
-from mckibben.diagnosis.tracks import Range, Scale, Track, interval, median, prepare
+from mckibben.diagnosis.time_effects import creep, rate_dependence
+from mckibben.diagnosis.tracks import Range, Scale, interval, median, prepare
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
-from mckibben.signals.holds import holds
+from mckibben.signals.holds import holds, shortest_hold
 from mckibben.signals.reversals import whole_cycles
 from mckibben.system.showing import DrawsItself
 
@@ -365,15 +365,14 @@ def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any
 
 def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characterization:
     """Return what is found in recordings in which nothing else moves, whatever their zeros."""
-    if len(runs) > 1 and all(given in run and wanted in run for run in runs):
-        runs = levelled(runs, given, wanted)
-    scale, tracks = prepare(runs, given, wanted)
+    several = len(runs) > 1 and all(given in run and wanted in run for run in runs)
+    scale, tracks = prepare(levelled(runs, given, wanted) if several else runs, given, wanted)
     units = tuple(_unit(runs, channel) for channel in (given, wanted))
     loops, branches = loops_of(tracks, scale), branches_of(tracks, scale)
     largest, gaps = largest_of(loops), gaps_of(branches, scale.sign)
     curve, rate = mean_curve(branches, largest, scale), rate_dependence(loops)
     upper, lower = dead_zones(tracks, scale)
-    crept = _crept(runs, given, wanted, tracks, scale)
+    crept = _crept(runs, given, wanted, scale)
     areas = [loop.area for loop in largest]
     repeated: dict[str, Sequence[float | None]] = {
         "loop_width": [loop.cycle.width for loop in largest],
@@ -395,6 +394,7 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     values = {name: [x for x in each if x is not None] for name, each in repeated.items()}
     limits = {name: interval(each) for name, each in values.items() if name != "creep_time"}
     limits |= {"gain": curve.gain_limits, "branch_gap": gaps.limits, "rate_dependence": rate.limits}
+    figures: dict[str, Any] = {name: median(each) for name, each in values.items()}
     position, direction, both = explained(tracks)
     found = Characterization(
         input=given,
@@ -407,7 +407,7 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
         input_noise=None if np.isnan(scale.u_noise) else scale.u_noise,
         output_noise=None if np.isnan(scale.y_noise) else scale.y_noise,
         cycles=tuple(loop.cycle for loop in loops),
-        **{name: median(each) for name, each in values.items()},
+        **figures,
         gain=curve.gain,
         onset=curve.onset,
         saturation=curve.saturation,
@@ -438,14 +438,14 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
 
 
 def _crept(
-    runs: Sequence[Recording], given: str, wanted: str, tracks: Sequence[Track], scale: Scale
+    runs: Sequence[Recording], given: str, wanted: str, scale: Scale
 ) -> list[tuple[float, float]]:
     """Return the times [s] and creep of the holds at least half as long as the longest."""
     found = []
-    for run, track in zip(runs, tracks, strict=True):
+    for run in runs:
         if run.sample_time is not None:
             u, y, span = run[given], run[wanted], scale.u_span
-            held = holds(u[:, np.newaxis], [span], shortest_hold(u, span, track.window))
+            held = holds(u[:, np.newaxis], [span], shortest_hold(u, span))
             found += [(run.sample_time * n, scale.sign * x) for n, x in creep(u, y, held, span)]
     longest = max((time for time, _ in found), default=0.0)
     return [(time, moved) for time, moved in found if time >= 0.5 * longest]

@@ -11,7 +11,7 @@ from mckibben.arrays import Array
 from mckibben.diagnosis.tracks import FEWEST, Range
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording
-from mckibben.signals.holds import STILL, holds
+from mckibben.signals.holds import STILL, holds, moves
 from mckibben.statistics import correlation_length
 
 ALIKE = 0.02
@@ -75,14 +75,8 @@ def others_of(
         *(n for n in schedules(recordings) if n in seen),
         *(n for n in seen if all(np.ptp(one[n]) == 0 for one in recordings)),
     ]
-    return [n for n in dict.fromkeys(told) if n not in (given, wanted) and _moves(recordings, n)]
-
-
-def _moves(recordings: Sequence[Recording], name: str) -> bool:
-    """Tell whether a channel moves, in or between recordings, by more than white noise does."""
-    seen = [one[name] for one in recordings]
-    steps = np.concatenate([np.diff(one) for one in seen])
-    return float(np.mean(steps**2)) < float(np.concatenate(seen).var())  # of noise it is twice that
+    named = [n for n in dict.fromkeys(told) if n not in (given, wanted)]
+    return [n for n in named if moves([one[n] for one in recordings])]
 
 
 Group = tuple[tuple[float, ...], list[tuple[int, Recording]]]

@@ -12,9 +12,6 @@ from mckibben.diagnosis.loops import Loop, alike
 from mckibben.diagnosis.tracks import Range
 from mckibben.signals.holds import STILL
 
-HELD_TRAVEL = 0.5
-"""A hold lasts at least as long as the input, when it moves, takes for this share of its range."""
-
 SETTLED = 0.1
 """Share of a hold that is left out at its start, so that the lag of a jump is not taken for creep."""
 
@@ -31,19 +28,8 @@ LEAST = 1.0
 """Loop width that changes are compared with where there is hardly a loop [% of output range]."""
 
 
-def shortest_hold(u: Array, span: float, window: int) -> int:
-    """Return how many samples the input, when it moves, takes for half of its range; at least ten.
-
-    The mean speed is weighted with the way covered, so that holds and slow turns do not count.
-    """
-    steps = np.abs(np.diff(u[::window]))
-    speed = float(np.sum(steps**2) / np.sum(steps)) / window if steps.any() else 0.0
-    return max(10, int(np.ceil(HELD_TRAVEL * span / speed))) if speed else u.size + 1
-
-
 def creep(u: Array, y: Array, held: Sequence[slice], span: float) -> list[tuple[int, float]]:
-    """Return how many samples the output creeps in each hold, and how far: positive as the input
-    went.
+    """Return for how many samples the output creeps in each hold, and how far the way of the input.
 
     The first tenth of a hold is left out; the means over the second tenth and the last are compared.
     Holds into which the input did not move are left out.

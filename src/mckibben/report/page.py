@@ -19,6 +19,7 @@ from mckibben.report import (
     subjects,
     templating,
     wording,
+    words,
 )
 from mckibben.report.answers import answers
 from mckibben.report.commands import Typed, commands
@@ -105,6 +106,7 @@ def page(study: Study, typed: Typed | None = None) -> str:
         reading=notes_by_file(measured),
         notes=[note for note in study.notes if note not in reading_notes(measured)],
         wording=wording,
+        words=words,
         typed=typed or Typed(),
         commands=commands(study, typed),
         answers=answers(study),

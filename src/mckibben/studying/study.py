@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.characterization import Characterization, characterize
 from mckibben.comparison.channels import Names
 from mckibben.comparison.planning import Settings, plan_of
 from mckibben.comparison.ranking import ranked
@@ -19,6 +18,7 @@ from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.standing import Standing
 from mckibben.control import Tracked
 from mckibben.control.twin import COMMAND
+from mckibben.diagnosis import Characterization, characterize
 from mckibben.errors import DataError
 from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording, listed
@@ -250,7 +250,8 @@ def study(
             check=check_on_test(block, split, on_test, names),
             description=describe(block, split.train, fitted=True),
         )
-    so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
+    if so_far.characterization is None or not so_far.characterization.follows_direction:
+        so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
     undone = so_far.inverse
     if not channels.single and undone is not None:
         try:

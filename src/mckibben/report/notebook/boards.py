@@ -9,7 +9,7 @@ from mckibben.comparison.results import CHOICES, Leaderboard
 from mckibben.comparison.row import Row
 from mckibben.errors import ModelError
 from mckibben.numerals import numeral
-from mckibben.report import figures, model_subjects
+from mckibben.report import figures, model_subjects, words
 from mckibben.report.drawing import Drawing
 from mckibben.report.notebook.card import Card
 from mckibben.report.notebook.face import Draw, Face
@@ -109,7 +109,7 @@ class StudyFace(Face):
             notes.append(f"Inverted: {study.inverse.model}.")
         return Card(
             f"Study, {study.input} to {study.output}",
-            () if known is None else known.sentences,
+            () if known is None else words.characterization_sentences(known),
             board.headings,
             board.rows,
             board.marked,

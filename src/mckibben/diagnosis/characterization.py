@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,8 +28,7 @@ from mckibben.diagnosis.loops import (
     mean_curve,
     p_of_slopes,
 )
-from mckibben.diagnosis.memory import dead_zones, minor_loop_errors
-from mckibben.diagnosis.time_effects import creep, rate_dependence
+from mckibben.diagnosis.memory import creep, dead_zones, minor_loop_errors, rate_dependence
 from mckibben.diagnosis.tracks import Range, Scale, interval, median, prepare
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
@@ -66,15 +65,7 @@ SHAPE = (
 
 @dataclass(frozen=True)
 class Level:
-    """What is found where other inputs stand still at a level.
-
-    Parameters
-    ----------
-    held : tuple of (str, float, str)
-        Their channels, at which level each, and its unit.
-    found : Characterization
-        Of the recordings, or their stretches, that hold them there.
-    """
+    """What is found where other inputs stand still: their channels, levels and units in ``held``."""
 
     held: tuple[tuple[str, float, str], ...]
     found: Characterization
@@ -85,52 +76,39 @@ class Characterization(DrawsItself):
     """What a muscle does, from recordings alone; None for what they do not show.
 
     Units are those of the channels; percentages are of the output range. Figures are medians over
-    repeats.
+    repeats; ``intervals`` has the 95 % intervals of those with three repeats or more, by field.
 
     Parameters
     ----------
-    input, output, input_unit, output_unit : str
-        Channels, and their units.
-    n_recordings, n_samples, n_cycles, n_reversals : int
+    n_cycles, n_reversals : int
         Whole cycles run from minimum to minimum of the input and over at least a tenth of its
         range; reversals are where it turns, minor loops included.
     duration, sample_time : float or None
         All recordings together [s]; the sample time that they share [s].
-    input_range, output_range : (float, float)
-        Lowest and highest value.
     input_noise, output_noise : float or None
         Standard deviation of a sample.
-    cycles : tuple of Cycle
-        Those with enough samples to measure a width.
     loop_width, mid_width : float or None
         Distance of the largest cycles' branches at mid input: e_w [%] and [output unit].
-    asymmetry : float or None
-        How far the loop is from its own image, turned by half a turn [%].
-    width_centroid : float or None
-        Where it is wide, from -1 (low input) to 1 (high input).
-    loop_area, loop_area_share : float or None
-        Area that it encloses [input unit x output unit], and that over the rectangle round it [%].
-    loss_per_area : float or None
-        The area as work lost a cycle and effective area [J/m²], for pressure over displacement.
+    asymmetry, width_centroid : float or None
+        How far the loop is from its own image, turned by half a turn [%]; where it is wide, from -1
+        (low input) to 1 (high input).
+    loop_area, loop_area_share, loss_per_area : float or None
+        Area that it encloses [input unit x output unit], that over the rectangle round it [%], and that
+        as work lost a cycle and effective area [J/m²], for pressure over displacement.
     dead_zone_upper, dead_zone_lower : float or None
         Change of the input after upper and lower reversals before the output moves [input unit].
-    gain : float or None
-        Slope of the mean of both branches at mid input [output unit/input unit].
-    onset, saturation : float or None
-        Input below, and above, which that slope stays under a fifth of its maximum [input unit].
+    gain, onset, saturation : float or None
+        Slope of the mean of both branches at mid input [output unit/input unit], and the inputs below
+        and above which it stays under a fifth of its maximum.
     branch_gap : float or None
         Mean distance of falling and rising output at the same input, positive where the output
         lags [output unit].
-    creep, creep_time : float or None
-        Change of the output in a hold of all inputs [output unit], and over what time [s].
-    drift : float or None
-        Change of the output from one cycle to the next between the same extremes [output unit].
-    rate_dependence : float or None
-        Growth of e_w at twice the speed [%].
-    rate_verdict : str
-        "none", "weak", "strong" or "unknown".
-    speeds : (float, float) or None
-        Mean speeds between which that is found [input unit/s].
+    creep, creep_time, drift : float or None
+        Change of the output in a hold of all inputs [output unit], over what time [s]; and from one
+        cycle to the next between the same extremes.
+    rate_dependence, speeds
+        Growth of e_w at twice the speed [%], and the mean speeds between which it is found [input
+        unit/s].
     closure_error : float or None
         Return-point memory: output after a minor loop against that before it [%].
     position_share, direction_share, loop_share : float
@@ -140,21 +118,15 @@ class Characterization(DrawsItself):
         Probability of as consistent slopes along branches, and gaps between them, of an output without
         dependence, and without a loop; None of too few branches.
     drift_excluded : bool
-        Whether every branch is compared with one before and one after it, so that drift cancels.
+        Whether branches are compared with those before and after, so that drift cancels.
     n_stretches : int or None
         Stretches in which other inputs stand still; None where nothing else moves.
-    falls : bool
-        Whether the output falls as the input rises.
     effects : tuple of Effect
-        What other inputs do.
-    adjusted : bool
-        Whether the effects are taken away, as other inputs stand still nowhere: gain and branch gap
-        alone are measured then.
+        What other inputs do; ``adjusted`` where it is taken away, as they stand still nowhere:
+        gain and branch gap alone are measured then.
     levels : tuple of Level
         Those at which other inputs stand still. What is found of the loop is that of the one at which
         the output moves most.
-    intervals : mapping of str to (float, float)
-        95 % intervals of figures, by their field; of those with three repeats or more.
     """
 
     face: ClassVar[str] = "characterization"
@@ -191,7 +163,6 @@ class Characterization(DrawsItself):
     creep_time: float | None = None
     drift: float | None = None
     rate_dependence: float | None = None
-    rate_verdict: str = "unknown"
     speeds: Range | None = None
     closure_error: float | None = None
     position_share: float = 0.0
@@ -243,17 +214,7 @@ class Characterization(DrawsItself):
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON holds it, with None for what could not be measured."""
-        found = {each.name: _plain(getattr(self, each.name)) for each in fields(self)}
-        found["cycles"] = [asdict(cycle) | {"amplitude": cycle.amplitude} for cycle in self.cycles]
-        found["effects"] = [
-            {name: _plain(value) for name, value in asdict(effect).items()}
-            for effect in self.effects
-        ]
-        found["levels"] = [
-            {"held": {name: at for name, at, _ in one.held}} | one.found.to_dict()
-            for one in self.levels
-        ]
-        found["intervals"] = {name: _plain(limits) for name, limits in self.intervals.items()}
+        found: dict[str, Any] = _plain(asdict(self))
         return found | {"follows_direction": self.follows_direction}
 
 
@@ -266,9 +227,8 @@ def characterize(
 ) -> Characterization:
     """Measure what a muscle does: width and shape of its loop, memory, creep, dependence on rate.
 
-    Sensor noise is averaged away first, over samples within which the input moves by no more than
-    half a percent of its range. Ranges are those of all recordings together. What the recordings do
-    not show is None.
+    Sensor noise is averaged away first, over samples within which the input moves by 1 % of its range.
+    Ranges are those of all recordings together. What the recordings do not show is None.
 
     Other inputs, such as pressures of other muscles, loads or lengths, are looked at beside: where
     they stand still, every level of theirs has a loop of its own, and the one at which the output moves
@@ -331,7 +291,7 @@ def characterize(
     elif moved:
         found = _measured(without(runs, input, output, moved), input, output)
         blank = dict.fromkeys({*SHAPE, *BY_POSITION} - {"gain", "branch_gap"})
-        found = replace(found, cycles=(), rate_verdict="unknown", adjusted=True, **blank)  # type: ignore[arg-type]
+        found = replace(found, cycles=(), adjusted=True, **blank)  # type: ignore[arg-type]
     else:
         raise DataError(
             f"it never moves while {', '.join(others)} stand still, so its effect cannot be identified",
@@ -370,7 +330,8 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     units = tuple(_unit(runs, channel) for channel in (given, wanted))
     loops, branches = loops_of(tracks, scale), branches_of(tracks, scale)
     largest, gaps = largest_of(loops), gaps_of(branches, scale.sign)
-    curve, rate = mean_curve(branches, largest, scale), rate_dependence(loops)
+    curve = mean_curve(branches, largest, scale)
+    growth, growth_limits, speeds = rate_dependence(loops) or (None, None, None)
     upper, lower = dead_zones(tracks, scale)
     crept = _crept(runs, given, wanted, scale)
     areas = [loop.area for loop in largest]
@@ -393,7 +354,11 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     }
     values = {name: [x for x in each if x is not None] for name, each in repeated.items()}
     limits = {name: interval(each) for name, each in values.items() if name != "creep_time"}
-    limits |= {"gain": curve.gain_limits, "branch_gap": gaps.limits, "rate_dependence": rate.limits}
+    limits |= {
+        "gain": curve.gain_limits,
+        "branch_gap": gaps.limits,
+        "rate_dependence": growth_limits,
+    }
     figures: dict[str, Any] = {name: median(each) for name, each in values.items()}
     position, direction, both = explained(tracks)
     found = Characterization(
@@ -412,9 +377,8 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
         onset=curve.onset,
         saturation=curve.saturation,
         branch_gap=gaps.gap,
-        rate_dependence=rate.growth,
-        rate_verdict=rate.verdict,
-        speeds=rate.speeds,
+        rate_dependence=growth,
+        speeds=speeds,
         position_share=position,
         direction_share=direction,
         loop_share=both,
@@ -432,9 +396,8 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
         absent |= set(SHAPE)
     kept = {name: limits for name, limits in found.intervals.items() if name not in absent}
     cycles = () if "loop_width" in absent else found.cycles
-    verdict = "unknown" if "rate_dependence" in absent else found.rate_verdict
     blank: dict[str, Any] = dict.fromkeys(absent)
-    return replace(found, cycles=cycles, rate_verdict=verdict, intervals=kept, **blank)
+    return replace(found, cycles=cycles, intervals=kept, **blank)
 
 
 def _crept(
@@ -463,6 +426,8 @@ def _unit(runs: Sequence[Recording], channel: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, tuple):
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
         return [_plain(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

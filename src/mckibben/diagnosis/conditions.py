@@ -31,22 +31,10 @@ NORMAL_95 = 1.96
 
 @dataclass(frozen=True)
 class Effect:
-    """How far another input moves the output at equal input, and changes its slope.
+    """How far another input that goes from ``low`` to ``high`` moves the output at equal input.
 
-    Parameters
-    ----------
-    channel, unit : str
-        The other input and its unit.
-    low, high : float
-        Between which it goes.
-    change : float
-        Of the output from low to high, by one straight line [output unit].
-    limits : (float, float)
-        95 % interval of that.
-    gain_change : float
-        Of the slope over the input from low to high [output unit/input unit].
-    gain_limits : (float, float)
-        95 % interval of that.
+    By straight lines: the ``change`` of the output and that of its slope, ``gain_change``, each with its
+    95 % interval.
     """
 
     channel: str

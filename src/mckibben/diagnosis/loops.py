@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.diagnosis.tracks import STILL, Range, Scale, Track, interval, median
+from mckibben.diagnosis.tracks import Range, Scale, Track, interval, median
 from mckibben.metrics import loop_area
+from mckibben.signals.holds import STILL
 from mckibben.signals.reversals import whole_cycles
 
 SHARES = np.linspace(0.02, 0.98, 49)
@@ -25,15 +25,11 @@ WINDOW = 0.025
 FEWEST = 8
 """Samples that a branch must have for its shape to be measured."""
 
-EQUAL = 0.98
-"""Amplitudes from this share of the largest on are as large."""
+LARGE = 0.9
+"""Amplitudes from this share of the largest on are as large, or cover the input range."""
 
-AS_HIGH, VENTED = 0.05, 0.7
-"""Shares of the amplitude within which repeats turn, and that they have at least."""
-
-CLOSED, ENOUGH = 0.02, 0.8
-"""Shares of the amplitude within which a closed loop ends where it began, and which a closed loop has
-at least to be preferred to one that is not."""
+CLOSED = 0.02
+"""Share of the amplitude within which a closed loop ends where it began."""
 
 PART = 0.5
 """Share of the other branch that a branch at either end of a recording must have to make a loop."""
@@ -56,19 +52,9 @@ BINS = 12
 class Cycle:
     """One cycle of the input, minimum to minimum, of at least a tenth of the input range.
 
-    The first and the last of a recording may lack half of a branch; what is measured is between the
-    levels that both branches cover.
-
-    Parameters
-    ----------
-    recording : int
-        Number of its recording, or of its stretch of one, from 0.
-    low, high : float
-        The input levels that both branches cover.
-    rate : float or None
-        Mean speed of the input, up and down [input unit/s]; None without time.
-    width : float
-        Loop width e_w [% of the cycle's output range].
+    ``recording`` counts recordings, or stretches, from 0; ``low`` and ``high`` are the levels that both
+    branches cover; ``rate`` is the mean speed of the input [input unit/s], None without time; ``width``
+    is the loop width e_w [% of the cycle's output range].
     """
 
     recording: int
@@ -140,66 +126,36 @@ def loops_of(tracks: Sequence[Track], scale: Scale) -> list[Loop]:
 
 
 def largest_of(loops: Sequence[Loop]) -> list[Loop]:
-    """Return the largest loops and their repeats, as high, from the narrowest to the widest.
+    """Return the largest loops, closed ones where there are any.
 
-    The first of a recording is left out where others follow: it starts from an unknown memory.
+    The first of a recording, which starts from an unknown memory, counts where there is no other.
     """
     most = max((loop.cycle.amplitude for loop in loops), default=0.0)
-    closed = [loop for loop in loops if loop.closed]
-    if any(loop.cycle.amplitude >= ENOUGH * most for loop in closed):
-        loops = closed
-    found: list[Loop] = []
-    for number in {loop.cycle.recording for loop in loops}:
-        own = [loop for loop in loops if loop.cycle.recording == number]
-        limit = EQUAL * max(loop.cycle.amplitude for loop in own)
-        large = [loop for loop in own if loop.cycle.amplitude >= limit]
-        found += [loop for loop in large if not loop.first] or large
-    if not found:
-        return []
-    largest = max((loop.cycle for loop in found), key=lambda cycle: cycle.amplitude)
-    repeats = (
-        loop
-        for loop in found
-        if loop.cycle.amplitude >= VENTED * largest.amplitude
-        and abs(loop.cycle.high - largest.high) <= AS_HIGH * largest.amplitude
-    )
-    return sorted(repeats, key=lambda loop: loop.cycle.width)
+    large = [loop for loop in loops if loop.cycle.amplitude >= LARGE * most]
+    closed = [loop for loop in large if loop.closed]
+    return [loop for loop in closed if not loop.first] or closed or large
 
 
 def curve(u: Array, y: Array, levels: Array, half: float) -> Array:
-    """Return the output at input levels: a line fitted to the samples near each level.
+    """Return the output (k,) at input levels (k,), of samples (n,) in any order; NaN beyond them.
 
-    Between samples further apart than that it is interpolated; beyond them it is NaN.
-
-    Parameters
-    ----------
-    u, y : array, shape (n,)
-        Samples in any order, n at least 1.
-    levels : array, shape (k,)
-    half : float
-        Samples at most this far from a level are near.
+    Means over the samples within ``half`` of a level, interpolated from the mean inputs there.
     """
     order = np.argsort(u, kind="stable")
     x, z = u[order], y[order]
     first = np.searchsorted(x, levels - half)
-    stop = np.searchsorted(x, levels + half, side="right")
-    centre, middle = 0.5 * (x[0] + x[-1]), float(z.mean())
-    v, w = x - centre, z - middle
-    count = stop - first
-    sums = [_sums(q, first, stop) / np.maximum(count, 1) for q in (v, w, v * v, v * w)]
-    mean_v, mean_w, mean_vv, mean_vw = sums
-    spread = mean_vv - mean_v**2
-    # A line needs samples on some length of input; the mean is all that a cluster gives.
-    wide = spread > (0.1 * half) ** 2
-    slope = np.where(wide, mean_vw - mean_v * mean_w, 0.0) / np.where(wide, spread, 1.0)
-    fitted = middle + mean_w + slope * (levels - centre - mean_v)
-    # no line is drawn on beyond its samples: what is near may be one cluster, far to one side
-    last = x.size - 1
-    amid = (x[np.minimum(first, last)] <= levels) & (levels <= x[np.clip(stop - 1, 0, last)])
-    near = (count >= 3) & wide & amid
-    found = np.where(near, fitted, np.interp(levels, x, z))
-    found[(levels < x[0]) | (levels > x[-1])] = np.nan
-    return np.asarray(found)
+    count = np.searchsorted(x, levels + half, side="right") - first
+    near = count > 2
+    if not near.any():
+        return np.interp(levels, x, z, left=np.nan, right=np.nan)
+    places, heights = (
+        (total[first + count] - total[first])[near] / count[near]
+        for total in (np.concatenate([[0.0], np.cumsum(q)]) for q in (x, z))
+    )
+    # the ends as they are, so that nothing is cut off within half a window of them
+    places, which = np.unique(np.concatenate([places, x[[0, -1]]]), return_index=True)
+    heights = np.concatenate([heights, z[[0, -1]]])[which]
+    return np.interp(levels, places, heights, left=np.nan, right=np.nan)
 
 
 @dataclass(frozen=True)
@@ -301,7 +257,7 @@ def mean_curve(found: Branches, loops: Sequence[Loop], scale: Scale) -> MeanCurv
     curves = [
         (loop.levels, 0.5 * (loop.up + loop.down))
         for loop in loops
-        if loop.cycle.amplitude >= ENOUGH * scale.u_span
+        if loop.cycle.amplitude >= LARGE * scale.u_span
     ] or [(found.levels, 0.5 * (found.mean(1.0) + found.mean(-1.0)))]
     each = [
         _curve_of(u[known], y[known], scale) for u, y in curves if (known := np.isfinite(y)).any()
@@ -406,12 +362,11 @@ def _half(scale: Scale, amplitude: float) -> float:
 
 
 def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
-    tolerance = STILL * scale.u_span
-    u, y = track.u[piece], track.y[piece]
+    u, y, still = track.u[piece], track.y[piece], 0.5 * STILL * scale.u_span
     top = int(np.argmax(u))
     rise, fall = np.arange(top + 1), np.arange(top, u.size)
-    rise = rise[u[rise] >= np.maximum.accumulate(u[rise]) - tolerance]
-    fall = fall[u[fall] <= np.minimum.accumulate(u[fall]) + tolerance]
+    rise = rise[u[rise] >= np.maximum.accumulate(u[rise]) - still]
+    fall = fall[u[fall] <= np.minimum.accumulate(u[fall]) + still]
     if min(rise.size, fall.size) < FEWEST:
         return None
     low, high = float(max(u[0], u[-1])), float(u[top])
@@ -431,8 +386,3 @@ def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
     first = piece.start <= track.major_turns[1] and not track.periodic
     ends = piece.stop - 1
     return Loop(cycle, levels, up, down, span, area, piece.start, ends, closed, first)
-
-
-def _sums(q: Array, first: NDArray[np.intp], stop: NDArray[np.intp]) -> Array:
-    total = np.concatenate([[0.0], np.cumsum(q)])
-    return np.asarray(total[stop] - total[first])

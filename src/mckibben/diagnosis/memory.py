@@ -1,4 +1,4 @@
-"""Memory: what the output does after a reversal, and after a minor loop."""
+"""Memory and time: dead zones, minor loops, creep in holds, dependence of the loop width on speed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.diagnosis.tracks import Scale, Track
+from mckibben.diagnosis.loops import Loop, alike
+from mckibben.diagnosis.tracks import Range, Scale, Track
+from mckibben.signals.holds import STILL
 
 MOVED = 0.02
 """Output change, as a share of its range, from which the output is taken to have moved."""
@@ -21,6 +23,15 @@ HUNTED = 0.05
 DENSE = 8
 """Samples that a branch must have for the output on it to be read between samples."""
 
+SETTLED = 0.1
+"""Share of a hold that is left out at its start, so that the lag of a jump is not taken for creep."""
+
+ALIKE = 0.05
+"""Share of the amplitude by which the extremes of two cycles may differ for these to be compared."""
+
+SPEED_RATIO = 1.5
+"""Ratio of speeds from which on dependence on rate is judged."""
+
 
 def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list[float]]:
     """Return the dead zones after upper and after lower reversals [input unit].
@@ -32,9 +43,8 @@ def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list
     """
     upper: list[float] = []
     lower: list[float] = []
-    coarse = 2 * scale.y_step if scale.y_step > 1e-3 * scale.y_span else 0.0
     for track in tracks:
-        threshold = max(MOVED * scale.y_span, 6 * track.y_noise, coarse)
+        threshold = max(MOVED * scale.y_span, 6 * track.y_noise, 2 * scale.y_step)
         turns, heights = track.turns, track.heights
         for k in range(1, turns.size - 1):
             if turns[k + 1] - turns[k] < DENSE:
@@ -50,17 +60,10 @@ def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list
 
 
 def minor_loops(heights: Array, tolerance: float) -> Iterator[tuple[int, int]]:
-    """Yield the minor loops between turning points, inner ones before those around them.
+    """Yield the minor loops between turning points at such heights, inner ones before outer ones.
 
-    Of each the turning point where the input went away from a level, and the one from which it came
-    back to it.
-
-    Parameters
-    ----------
-    heights : array, shape (m,)
-        Input at the turning points.
-    tolerance : float
-        A level is passed when the input goes further than this beyond it.
+    Of each the numbers of the turning point where the input went away from a level, and of the one from
+    which it came back to it: it went beyond by more than a tolerance.
     """
     open_turns: list[int] = [0]
     for k in range(1, heights.size):
@@ -112,3 +115,55 @@ def _first_reach(wanted: Array, x: Array, limit: float) -> float | None:
         return float(wanted[0])
     share = (limit - x[i - 1]) / (x[i] - x[i - 1])
     return float(wanted[i - 1] + share * (wanted[i] - wanted[i - 1]))
+
+
+def creep(u: Array, y: Array, held: Sequence[slice], span: float) -> list[tuple[int, float]]:
+    """Return for how many samples the output creeps in each hold, and how far the way of the input.
+
+    The first tenth of a hold is left out; the means over the second tenth and the last are compared.
+    Holds into which the input did not move are left out.
+    """
+    found = []
+    for hold in held:
+        lasts = hold.stop - hold.start
+        before = u[max(0, hold.start - lasts) : hold.start]
+        if before.size == 0 or np.ptp(before) < 2 * STILL * span:
+            continue
+        way = np.sign(u[hold.start] - before[np.argmax(np.abs(before - u[hold.start]))])
+        part = max(1, round(SETTLED * lasts))
+        early, late = (y[at : at + part].mean() for at in (hold.start + part, hold.stop - part))
+        found.append((lasts - 2 * part, float(way * (late - early))))
+    return found
+
+
+Growth = tuple[float, Range, Range]
+"""How much wider the loop is at twice the speed [%], its 95 % interval, and between which speeds."""
+
+
+def rate_dependence(loops: Sequence[Loop]) -> Growth | None:
+    """Return how the loop width depends on the logarithm of the mean speed, by a straight line.
+
+    Of three or more closed cycles between like extremes that differ most in speed; the first of a
+    recording, which starts from an unknown memory, apart.
+    """
+    from scipy.special import stdtrit
+
+    timed = [
+        loop.cycle
+        for loop in loops
+        if loop.cycle.rate is not None and loop.closed and not loop.first
+    ]
+    # Any cycle may be the one to compare with; of very many, fifty will do.
+    wanted = timed[:: max(1, len(timed) // 50)]
+    groups = [[cycle for cycle in timed if alike(one, cycle, ALIKE)] for one in wanted]
+    rates = [np.log2([cycle.rate or 0.0 for cycle in group]) for group in groups]
+    widest = int(np.argmax([np.ptp(rate) for rate in rates])) if rates else 0
+    if not rates or rates[widest].size < 3 or np.ptp(rates[widest]) < np.log2(SPEED_RATIO):
+        return None
+    speed, widths = rates[widest], np.array([cycle.width for cycle in groups[widest]])
+    growth, offset = (float(x) for x in np.polyfit(speed, widths, 1))
+    left, freedom = widths - (offset + growth * speed), speed.size - 2
+    error = float(np.sqrt(left @ left / freedom / np.sum((speed - speed.mean()) ** 2)))
+    half = error * float(stdtrit(freedom, 0.975))
+    ends = float(2 ** speed.min()), float(2 ** speed.max())
+    return growth, (growth - half, growth + half), ends

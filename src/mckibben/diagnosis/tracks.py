@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import NARROWEST, Array
 from mckibben.errors import DataError
 from mckibben.recording import Recording
+from mckibben.signals.holds import shortest_hold
 from mckibben.signals.reversals import noise_level, reversals, swing_threshold
 
 Indices = NDArray[np.int64]
@@ -19,14 +20,8 @@ Range = tuple[float, float]
 QUIET = 1e-3
 """Noise below this share of the range is not averaged away."""
 
-STILL = 0.005
-"""Share of its range that the input may move while samples are averaged."""
-
 ROUNDING = 1e-12
 """Noise below this share of the range is rounding."""
-
-SAMPLED = 20_000
-"""Windows of samples, at most, by which the width of the averaging is chosen."""
 
 MAJOR = 0.1
 """Swings of the input below this share of its range do not separate cycles."""
@@ -40,18 +35,10 @@ REPEATS = 3
 
 @dataclass(frozen=True)
 class Scale:
-    """Ranges, noise and resolution over all recordings.
+    """Extremes of input and output over all recordings, and what their sensors add.
 
-    Parameters
-    ----------
-    u_low, u_high, y_low, y_high : float
-        Extremes of input and output, with their noise.
-    u_noise, y_noise : float
-        Standard deviation of a sample's noise; NaN for unknown.
-    u_step, y_step : float
-        Least distance between two readings: the resolution of a coarse sensor.
-    sign : float
-        1 if the output grows with the input, -1 if it falls.
+    Noise is the standard deviation of a sample, NaN for unknown; a step is the least distance between
+    two readings. The sign is 1 if the output grows with the input, -1 if it falls.
     """
 
     u_low: float
@@ -77,24 +64,11 @@ class Scale:
 
 @dataclass(frozen=True)
 class Track:
-    """One recording, ready to be measured.
+    """One recording: input and output, (n,) each, as moving averages over ``window`` samples.
 
-    Parameters
-    ----------
-    u, y : array, shape (n,)
-        Input and output, moving averages over ``window`` samples.
-    sample_time : float or None
-        [s].
-    window : int
-        Odd; 1 where nothing is averaged.
-    u_noise, y_noise : float
-        Standard deviation of the noise that is left; 0 where it is not known.
-    turns : array of int
-        First sample, turning points of the input, last sample.
-    major_turns : array of int
-        The same without swings below a tenth of the input range.
-    periodic : bool
-        Whether the recording ends as it begins: it then starts at its lowest input.
+    ``u_noise`` and ``y_noise`` are the noise that is left, 0 where unknown. ``turns`` are the first
+    sample, the turning points of the input and the last sample, ``major_turns`` the same without swings
+    below a tenth of the input range. A ``periodic`` recording starts at its lowest input.
     """
 
     u: Array
@@ -215,7 +189,8 @@ def _track(u: Array, y: Array, sample_time: float | None, scale: Scale) -> Track
         start = int(np.argmin(u))
         u, y = (np.append(np.roll(x, -start), x[start]) for x in (u, y))
     noisy = scale.u_noise > QUIET * scale.u_span or scale.y_noise > QUIET * scale.y_span
-    window = _still_window(u, STILL * scale.u_span) if noisy else 1
+    # so many samples take the input over 1 % of its range
+    window = max(1, shortest_hold(u, scale.u_span) // 50 - 1) | 1 if noisy else 1
     if window > 1:
         from scipy.ndimage import uniform_filter1d
 
@@ -232,28 +207,3 @@ def _closes(x: Array, noise: float) -> bool:
     """Tell whether a signal goes from its end to its beginning as from one sample to the next."""
     usual = float(np.quantile(np.abs(np.diff(x)), 0.99)) if x.size > FEWEST else 0.0
     return bool(abs(x[0] - x[-1]) <= max(1.5 * usual, 4 * np.nan_to_num(noise)))
-
-
-def _still_window(u: Array, limit: float) -> int:
-    """Return the longest odd window, by doubling, in which the input moves no more than a limit.
-
-    Means of neighbouring windows are compared, so that noise is not taken for movement; one pair in
-    twenty may differ by more, because jumps are short. Where noise hides even that, the window with
-    the smallest differences.
-    """
-    sums = np.concatenate([[0.0], np.cumsum(u - u[0])])
-    moved = {}
-    window = 1
-    while 8 * window < u.size:
-        stride = max(1, window // 2, u.size // SAMPLED)
-        means = [
-            (sums[start + window :: stride] - sums[start : -window or None : stride]) / window
-            for start in (0, window)
-        ]
-        before = means[0][: means[1].size]
-        moved[window] = float(np.quantile(np.abs(means[1] - before), 0.95))
-        window *= 2
-    if not moved:
-        return 1
-    still = [size for size, way in moved.items() if way <= limit]
-    return max(1, max(still, default=min(moved, key=lambda size: moved[size])) - 1)

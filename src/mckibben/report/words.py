@@ -63,13 +63,12 @@ def _loop(found: Characterization) -> Iterator[str]:
         yield f"Mean gap between branches: {_figure(found, 'branch_gap', y)}{shown}."
     if found.branch_gap is not None and not found.drift_excluded:
         yield "No recording has four branches: drift would part rising and falling output as well."
-    if found.rate_dependence is not None and found.rate_verdict != "unknown" and found.speeds:
+    if found.rate_dependence is not None and found.speeds is not None:
         unit = f"{found.input_unit}/s".lstrip("/")
         speeds = " to ".join(numeral(speed, 2) for speed in found.speeds)
         yield (
-            f"Dependence of the loop on speed is {found.rate_verdict}: at twice the speed its width "
-            f"grows by {_figure(found, 'rate_dependence', '%')} of the output range, between "
-            f"{speeds} {unit}."
+            f"At twice the speed loop width grows by {_figure(found, 'rate_dependence', '%')} of the "
+            f"output range, from cycles at {speeds} {unit}."
         )
     if found.closure_error is not None and found.loop_width is not None:
         yield f"Minor loops close within {_figure(found, 'closure_error', '%')} of the output range."
@@ -187,7 +186,6 @@ def characterization_rows(found: Characterization) -> list[Row]:
         row("drift", "drift", y, "from one cycle to the next between the same extremes"),
         row("rate dependence", "rate_dependence", "%", "growth of e_w at twice the speed"),
         *ends("speed compared", "speeds", speed, "mean speed of the input in cycles alike"),
-        row("rate verdict", "rate_verdict", "", "from cycles alike at different speed"),
         row("closure error", "closure_error", "%", "output after a minor loop against that before"),
         *(
             (

@@ -72,7 +72,6 @@ def test_every_number_of_a_parallelogram(gain: float, gap: float) -> None:
     assert [cycle.amplitude for cycle in found.cycles] == pytest.approx([4.0] * 5)
     assert [cycle.rate for cycle in found.cycles] == pytest.approx([0.4] * 5)
     assert found.loop_area == pytest.approx(4 * gap, rel=0.01)
-    assert found.loss_per_area == pytest.approx(400 * gap, rel=0.01)
     assert found.branch_gap == pytest.approx(gap, rel=0.01)
     assert found.gain == pytest.approx(gain)
     assert found.asymmetry == pytest.approx(0.0, abs=1e-6)

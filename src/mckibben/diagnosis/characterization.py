@@ -20,12 +20,12 @@ from mckibben.diagnosis.conditions import (
 from mckibben.diagnosis.loops import (
     Cycle,
     branches_of,
+    curves_of,
     drift,
     explained,
     gaps_of,
     largest_of,
     loops_of,
-    mean_curve,
     p_of_slopes,
 )
 from mckibben.diagnosis.memory import creep, dead_zones, minor_loop_errors, rate_dependence
@@ -46,9 +46,6 @@ EXPLAINED, POSITION = 0.5, 0.1
 """Share of the output's variance that velocity explains at least, and the input at most, where the
 output follows direction; and that branches explain at least whose shape is measured."""
 
-JOULE_PER_SQUARE_METRE = 100.0
-"""1 bar mm is 1e5 Pa times 1e-3 m."""
-
 BY_POSITION = (
     *("gain", "onset", "saturation", "asymmetry", "width_centroid", "drift", "branch_gap"),
     *("dead_zone_upper", "dead_zone_lower", "creep", "creep_time", "closure_error"),
@@ -56,7 +53,7 @@ BY_POSITION = (
 """What has no meaning where the output follows direction."""
 
 SHAPE = (
-    *("loop_width", "mid_width", "loop_area", "loop_area_share", "loss_per_area"),
+    *("loop_width", "mid_width", "loop_area", "loop_area_share"),
     *("asymmetry", "width_centroid", "dead_zone_upper", "dead_zone_lower", "closure_error"),
     *("rate_dependence", "speeds"),
 )
@@ -92,9 +89,8 @@ class Characterization(DrawsItself):
     asymmetry, width_centroid : float or None
         How far the loop is from its own image, turned by half a turn [%]; where it is wide, from -1
         (low input) to 1 (high input).
-    loop_area, loop_area_share, loss_per_area : float or None
-        Area that it encloses [input unit x output unit], that over the rectangle round it [%], and that
-        as work lost a cycle and effective area [J/m²], for pressure over displacement.
+    loop_area, loop_area_share : float or None
+        Area that it encloses [input unit x output unit], and that over the rectangle round it [%].
     dead_zone_upper, dead_zone_lower : float or None
         Change of the input after upper and lower reversals before the output moves [input unit].
     gain, onset, saturation : float or None
@@ -152,7 +148,6 @@ class Characterization(DrawsItself):
     width_centroid: float | None = None
     loop_area: float | None = None
     loop_area_share: float | None = None
-    loss_per_area: float | None = None
     dead_zone_upper: float | None = None
     dead_zone_lower: float | None = None
     gain: float | None = None
@@ -330,21 +325,21 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     units = tuple(_unit(runs, channel) for channel in (given, wanted))
     loops, branches = loops_of(tracks, scale), branches_of(tracks, scale)
     largest, gaps = largest_of(loops), gaps_of(branches, scale.sign)
-    curve = mean_curve(branches, largest, scale)
     growth, growth_limits, speeds = rate_dependence(loops) or (None, None, None)
     upper, lower = dead_zones(tracks, scale)
     crept = _crept(runs, given, wanted, scale)
-    areas = [loop.area for loop in largest]
+    curves = curves_of(branches, largest, scale)
+    gains, onsets, saturations = ([curve[k] for curve in curves] for k in range(3))
     repeated: dict[str, Sequence[float | None]] = {
         "loop_width": [loop.cycle.width for loop in largest],
         "mid_width": [loop.mid_width for loop in largest],
         "asymmetry": [loop.asymmetry for loop in largest],
         "width_centroid": [loop.width_centroid for loop in largest],
-        "loop_area": areas,
-        "loop_area_share": [
-            100 * loop.area / (loop.cycle.amplitude * loop.span) for loop in largest
-        ],
-        "loss_per_area": [JOULE_PER_SQUARE_METRE * a for a in areas if units == ("bar", "mm")],
+        "loop_area": [loop.area for loop in largest],
+        "loop_area_share": [loop.area_share for loop in largest],
+        "gain": gains,
+        "onset": () if None in onsets else onsets,
+        "saturation": () if None in saturations else saturations,
         "dead_zone_upper": upper,
         "dead_zone_lower": lower,
         "creep": [moved for _, moved in crept],
@@ -354,11 +349,7 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     }
     values = {name: [x for x in each if x is not None] for name, each in repeated.items()}
     limits = {name: interval(each) for name, each in values.items() if name != "creep_time"}
-    limits |= {
-        "gain": curve.gain_limits,
-        "branch_gap": gaps.limits,
-        "rate_dependence": growth_limits,
-    }
+    limits |= {"branch_gap": gaps.limits, "rate_dependence": growth_limits}
     figures: dict[str, Any] = {name: median(each) for name, each in values.items()}
     position, direction, both = explained(tracks)
     found = Characterization(
@@ -373,9 +364,6 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
         output_noise=None if np.isnan(scale.y_noise) else scale.y_noise,
         cycles=tuple(loop.cycle for loop in loops),
         **figures,
-        gain=curve.gain,
-        onset=curve.onset,
-        saturation=curve.saturation,
         branch_gap=gaps.gap,
         rate_dependence=growth,
         speeds=speeds,

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.diagnosis.tracks import Range, Scale, Track, interval, median
+from mckibben.diagnosis.tracks import Range, Scale, Track
 from mckibben.metrics import loop_area
 from mckibben.signals.holds import STILL
 from mckibben.signals.reversals import whole_cycles
@@ -34,8 +34,8 @@ CLOSED = 0.02
 PART = 0.5
 """Share of the other branch that a branch at either end of a recording must have to make a loop."""
 
-SLIGHT = 1.0
-"""Loop width below which a loop has no shape worth measuring [% of the output range]."""
+SLIGHT = 0.005
+"""Mean width over the output range below which it is not measured where a loop is wide."""
 
 FLAT, REACH = 0.2, 2
 """Share of the steepest slope below which the output hardly follows the input; levels on either side
@@ -74,41 +74,25 @@ class Loop:
     """The curves of one cycle: output ``up`` and ``down`` at input ``levels``, each of shape (49,).
 
     ``begins`` and ``ends`` are its first and last sample, ``first`` whether its recording begins with
-    it, ``closed`` whether the input returns to where it began.
+    it, ``closed`` whether the input returns to where it began. ``asymmetry`` is the standard deviation
+    of up(mid + s) + down(mid - s) over the levels [% of the output range], 0 for every loop of a
+    classical Prandtl-Ishlinskii model; ``width_centroid`` is that of the width over the input, -1 low, 0
+    mid, 1 high, None for a slight loop.
     """
 
     cycle: Cycle
     levels: Array
     up: Array
     down: Array
-    span: float
+    mid_width: float
+    asymmetry: float | None
+    width_centroid: float | None
     area: float
+    area_share: float
     begins: int
     ends: int
     closed: bool
     first: bool
-
-    @property
-    def mid_width(self) -> float:
-        """Distance of the branches at mid input [output unit]."""
-        return float(abs(self.down[MIDDLE] - self.up[MIDDLE]))
-
-    @property
-    def asymmetry(self) -> float | None:
-        """How far a closed loop is from its own image, turned by half a turn [% of the output range].
-
-        Standard deviation over the levels of up(mid + s) + down(mid - s). Zero for every loop of a
-        classical Prandtl-Ishlinskii model; a bent or saturating loop has more.
-        """
-        return 100 * float(np.std(self.up + self.down[::-1])) / self.span if self.closed else None
-
-    @property
-    def width_centroid(self) -> float | None:
-        """Centroid of the width over the input, -1 low, 0 mid, 1 high; None for a slight loop."""
-        widths = np.abs(self.down - self.up)
-        if 100 * widths.mean() < SLIGHT / 2 * self.span:
-            return None
-        return float(np.sum((2 * SHARES - 1) * widths) / np.sum(widths))
 
 
 def loops_of(tracks: Sequence[Track], scale: Scale) -> list[Loop]:
@@ -116,13 +100,12 @@ def loops_of(tracks: Sequence[Track], scale: Scale) -> list[Loop]:
 
     Minor loops within a branch are left out of it.
     """
-    found = []
-    for number, track in enumerate(tracks):
-        for piece in whole_cycles(track.u, track.major_turns, PART):
-            loop = _loop(number, track, piece, scale)
-            if loop is not None:
-                found.append(loop)
-    return found
+    pieces = (
+        (number, track, piece)
+        for number, track in enumerate(tracks)
+        for piece in whole_cycles(track.u, track.major_turns, PART)
+    )
+    return [loop for each in pieces if (loop := _loop(*each, scale)) is not None]
 
 
 def largest_of(loops: Sequence[Loop]) -> list[Loop]:
@@ -235,61 +218,41 @@ def _mean(apart: Array) -> list[float]:
     return [float(known.mean())] if known.size else []
 
 
-@dataclass(frozen=True)
-class MeanCurve:
-    """The output over the input without its hysteresis; None where the recordings do not show it.
-
-    ``gain`` is the slope at mid input over a fifth of the range; below ``onset`` and above
-    ``saturation`` the slope stays under a fifth of its maximum.
-    """
-
-    gain: float | None = None
-    gain_limits: Range | None = None
-    onset: float | None = None
-    saturation: float | None = None
+Curve = tuple[float | None, float | None, float | None]
+"""Gain, onset and saturation of a curve."""
 
 
-def mean_curve(found: Branches, loops: Sequence[Loop], scale: Scale) -> MeanCurve:
-    """Return gain, onset and saturation of the mean of rising and falling output.
+def curves_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[Curve]:
+    """Return gain, onset and saturation of the means of rising and falling output, where they show.
 
-    Of the largest loops where they cover the input range, else of all branches.
+    Of the largest loops where they cover the input range, else of all branches. The gain is the slope
+    at mid input over a fifth of the range; below the onset and above the saturation the slope stays
+    under a fifth of its maximum.
     """
     curves = [
         (loop.levels, 0.5 * (loop.up + loop.down))
         for loop in loops
         if loop.cycle.amplitude >= LARGE * scale.u_span
     ] or [(found.levels, 0.5 * (found.mean(1.0) + found.mean(-1.0)))]
-    each = [
+    return [
         _curve_of(u[known], y[known], scale) for u, y in curves if (known := np.isfinite(y)).any()
     ]
-    gains = [one.gain for one in each if one.gain is not None]
-    onsets = [one.onset for one in each]
-    saturations = [one.saturation for one in each]
-    return MeanCurve(
-        median(gains),
-        interval(gains),
-        median([x for x in onsets if x is not None]) if None not in onsets else None,
-        median([x for x in saturations if x is not None]) if None not in saturations else None,
-    )
 
 
-def _curve_of(u: Array, mean: Array, scale: Scale) -> MeanCurve:
+def _curve_of(u: Array, mean: Array, scale: Scale) -> Curve:
     centre, fifth = 0.5 * (scale.u_low + scale.u_high), 0.1 * scale.u_span
-    gain = None
+    gain = onset = saturation = None
     if u[0] <= centre - fifth and u[-1] >= centre + fifth:
         low, high = np.interp([centre - fifth, centre + fifth], u, mean)
         gain = float(high - low) / (2 * fifth)
-    if u.size < 4 * REACH:
-        return MeanCurve(gain)
-    rises = scale.sign * (mean[2 * REACH :] - mean[: -2 * REACH])
-    slopes, at = rises / (u[2 * REACH :] - u[: -2 * REACH]), u[REACH:-REACH]
-    steep = np.flatnonzero(slopes >= FLAT * slopes.max()) if slopes.max() > 0 else np.arange(0)
-    if not steep.size:
-        return MeanCurve(gain)
-    # A flat end counts when more than one slope is flat there, so that noise makes none.
-    onset = float(at[steep[0]]) if steep[0] > 1 else None
-    saturation = float(at[steep[-1]]) if steep[-1] < at.size - 2 else None
-    return MeanCurve(gain, None, onset, saturation)
+    if u.size >= 4 * REACH:
+        rises = scale.sign * (mean[2 * REACH :] - mean[: -2 * REACH])
+        slopes, at = rises / (u[2 * REACH :] - u[: -2 * REACH]), u[REACH:-REACH]
+        steep = np.flatnonzero(slopes >= max(FLAT * slopes.max(), 0.0))
+        # A flat end counts when more than one slope is flat there, so that noise makes none.
+        onset = float(at[steep[0]]) if steep.size and steep[0] > 1 else None
+        saturation = float(at[steep[-1]]) if steep.size and steep[-1] < at.size - 2 else None
+    return gain, onset, saturation
 
 
 def p_of_slopes(tracks: Sequence[Track], scale: Scale) -> float | None:
@@ -376,13 +339,17 @@ def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
     span = float(np.ptp(y[covered]))
     if span == 0 or not np.isfinite(up + down).all():
         return None
-    rate = None
-    if track.sample_time is not None:
-        rate = float((2 * u[top] - u[0] - u[-1]) / (track.sample_time * (u.size - 1)))
-    width = 100 * float(abs(down[MIDDLE] - up[MIDDLE])) / span
-    cycle = Cycle(number, low, high, rate, width)
-    closed = bool(abs(u[-1] - u[0]) <= CLOSED * (high - low))
-    area = loop_area(u[covered], y[covered])
-    first = piece.start <= track.major_turns[1] and not track.periodic
-    ends = piece.stop - 1
-    return Loop(cycle, levels, up, down, span, area, piece.start, ends, closed, first)
+    amplitude, widths = high - low, np.abs(down - up)
+    mid, closed = float(widths[MIDDLE]), bool(abs(u[-1] - u[0]) <= CLOSED * amplitude)
+    seconds = None if track.sample_time is None else track.sample_time * (u.size - 1)
+    rate = None if seconds is None else float((2 * u[top] - u[0] - u[-1]) / seconds)
+    area, wide = loop_area(u[covered], y[covered]), widths.mean() >= SLIGHT * span
+    return Loop(
+        Cycle(number, low, high, rate, 100 * mid / span),
+        *(levels, up, down, mid),
+        100 * float(np.std(up + down[::-1])) / span if closed else None,
+        float(np.sum((2 * SHARES - 1) * widths) / np.sum(widths)) if wide else None,
+        *(area, 100 * area / (amplitude * span)),
+        *(piece.start, piece.stop - 1, closed),
+        first=piece.start <= track.major_turns[1] and not track.periodic,
+    )

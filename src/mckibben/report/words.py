@@ -170,9 +170,6 @@ def characterization_rows(found: Characterization) -> list[Row]:
         row(
             "loop area share", "loop_area_share", "%", "of the rectangle round it: a relay has 100"
         ),
-        row(
-            "loss per effective area", "loss_per_area", "J/m²", "loop area as work lost in a cycle"
-        ),
         row("mean branch gap", "branch_gap", y, "falling less rising output, free of steady drift"),
         row(
             "dead zone after upper reversals", "dead_zone_upper", u, "before the output moves back"

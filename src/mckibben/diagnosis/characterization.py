@@ -95,7 +95,7 @@ class Characterization(DrawsItself):
         Change of the input after upper and lower reversals before the output moves [input unit].
     gain, onset, saturation : float or None
         Slope of the mean of both branches at mid input [output unit/input unit], and the inputs below
-        and above which it stays under a fifth of its maximum.
+        and above which it stays under a fifth of its mean.
     branch_gap : float or None
         Mean distance of falling and rising output at the same input, positive where the output
         lags [output unit].

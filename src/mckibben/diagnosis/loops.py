@@ -38,7 +38,7 @@ SLIGHT = 0.005
 """Mean width over the output range below which it is not measured where a loop is wide."""
 
 FLAT, REACH = 0.2, 2
-"""Share of the steepest slope below which the output hardly follows the input; levels on either side
+"""Share of the mean slope below which the output hardly follows the input; levels on either side
 over which a slope is taken."""
 
 COVERS = 0.3
@@ -227,7 +227,7 @@ def curves_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[Curv
 
     Of the largest loops where they cover the input range, else of all branches. The gain is the slope
     at mid input over a fifth of the range; below the onset and above the saturation the slope stays
-    under a fifth of its maximum.
+    under a fifth of its mean.
     """
     curves = [
         (loop.levels, 0.5 * (loop.up + loop.down))
@@ -248,7 +248,7 @@ def _curve_of(u: Array, mean: Array, scale: Scale) -> Curve:
     if u.size >= 4 * REACH:
         rises = scale.sign * (mean[2 * REACH :] - mean[: -2 * REACH])
         slopes, at = rises / (u[2 * REACH :] - u[: -2 * REACH]), u[REACH:-REACH]
-        steep = np.flatnonzero(slopes >= max(FLAT * slopes.max(), 0.0))
+        steep = np.flatnonzero(slopes >= max(FLAT * slopes.mean(), 0.0))
         # A flat end counts when more than one slope is flat there, so that noise makes none.
         onset = float(at[steep[0]]) if steep.size and steep[0] > 1 else None
         saturation = float(at[steep[-1]]) if steep.size and steep[-1] < at.size - 2 else None

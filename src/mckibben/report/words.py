@@ -84,7 +84,7 @@ def _motion(found: Characterization) -> Iterator[str]:
         )
     for name, side in (("onset", "Below"), ("saturation", "Above")):
         if getattr(found, name) is not None:
-            yield f"{side} {_figure(found, name, u)} the slope is under a fifth of its maximum."
+            yield f"{side} {_figure(found, name, u)} the slope is under a fifth of its mean."
     if _certain(found, "creep") and found.creep_time is not None:
         time = numeral(found.creep_time, 2)
         yield f"In holds {found.output} creeps by {_figure(found, 'creep', y)} over {time} s."
@@ -176,8 +176,8 @@ def characterization_rows(found: Characterization) -> list[Row]:
         ),
         row("dead zone after lower reversals", "dead_zone_lower", u, "the same from below"),
         row("gain", "gain", gain, "slope of the mean of both branches at mid input"),
-        row("onset", "onset", u, "below it the slope is under a fifth of its maximum"),
-        row("saturation", "saturation", u, "above it the slope is under a fifth of its maximum"),
+        row("onset", "onset", u, "below it the slope is under a fifth of its mean"),
+        row("saturation", "saturation", u, "above it the slope is under a fifth of its mean"),
         row("creep", "creep", y, "in a hold of all inputs; positive: on as it was going"),
         row("creep time", "creep_time", "s", "the time over which it crept so far"),
         row("drift", "drift", y, "from one cycle to the next between the same extremes"),

@@ -14,17 +14,8 @@ from mckibben import registry
 SOURCE = Path(mckibben.__file__).parent
 
 PARTS = (
-    *("recording", "signals", "metrics", "characterization", "files", "rigs", "environments"),
-    *(
-        "blocks",
-        "estimators",
-        "control",
-        "comparison",
-        "diagnosis",
-        "planning",
-        "validation",
-        "muscles",
-    ),
+    *("recording", "signals", "metrics", "diagnosis", "files", "rigs", "environments"),
+    *("blocks", "estimators", "control", "comparison", "planning", "validation", "muscles"),
     *("papers", "report", "studying", "export", "stream", "link", "simulators", "ros"),
     *("bands", "measured", "example", "errors"),
 )

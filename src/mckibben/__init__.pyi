@@ -21,10 +21,10 @@ from .blocks.memoryless import Affine as Affine
 from .blocks.memoryless import PiecewiseLinear as PiecewiseLinear
 from .blocks.memoryless import Polynomial as Polynomial
 from .blocks.saving import load as load
-from .characterization import characterize as characterize
 from .comparison.calibrating import calibrate as calibrate
 from .comparison.identifying import identify as identify
 from .comparison.ranking import compare as compare
+from .diagnosis.characterization import characterize as characterize
 from .diagnosis.data_gaps import data_gaps as data_gaps
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning

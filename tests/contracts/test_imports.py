@@ -15,7 +15,7 @@ SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
     {"errors", "arrays", "registry", "presets", "numerals", "version", "example", "system"},
-    {"recording", "signals", "metrics", "statistics", "characterization"},
+    {"recording", "signals", "metrics", "statistics"},
     {"files"},
     {"rigs"},
     {"blocks"},

@@ -79,7 +79,11 @@ def test_a_load_that_is_told_is_no_loop_of_the_muscles(
     found = study(runs, load="force", models=["pi"], jobs=1).characterization
     assert plain is not None
     assert found is not None
-    assert found.loop_width == pytest.approx(plain.loop_width, rel=0.1)
+    if loads == (None,):  # where the load never stands still, no width is measured
+        assert found.adjusted
+        assert found.loop_width is None
+    else:
+        assert found.loop_width == pytest.approx(plain.loop_width, rel=0.1)
     assert found.effects[0].change == pytest.approx(-10.0, rel=0.1)
 
 

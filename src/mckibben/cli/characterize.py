@@ -37,19 +37,24 @@ def characterize(
     """Say what the muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
     others = beside or []
     recordings, given, moved = reading.read_one(files, input, output, others)
-    from mckibben.characterization import characterize as find
+    from mckibben.diagnosis import characterize as find
     from mckibben.recording import notes_by_file, reading_notes
+    from mckibben.report import words
 
     found = find(recordings, given, moved, beside=others)
     if as_json:
         print_json(found.to_dict() | {"notes": notes_by_file(recordings)})
         return
-    for sentence in found.sentences:
+    for sentence in words.characterization_sentences(found):
         say(sentence)
     say()
     print_table(
-        ["quantity", "value", "unit"],
-        [[str(name), _shown(value), str(units)] for name, value, units, _ in found.table()],
+        ["quantity", "value", "95 % interval", "unit"],
+        [
+            [name, _shown(value), " to ".join(map(_shown, limits or ())), unit]
+            for name, value, limits, unit, _ in words.characterization_rows(found)
+            if value is not None
+        ],
     )
     for note in reading_notes(recordings):
         say(f"Note: {note}")

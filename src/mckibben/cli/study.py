@@ -111,14 +111,14 @@ def study(
 
 def _say(study: Study, folder: Path) -> None:
     """Print what the muscle and a loop do, before any model is fitted."""
-    from mckibben.report.words import gap_run, gap_sentence
+    from mckibben.report import words
     from mckibben.studying.refitting import Refit
 
     if study.characterization is not None:
-        for sentence in study.characterization.sentences:
+        for sentence in words.characterization_sentences(study.characterization):
             say(sentence)
     for gap in study.untold:
-        say(f"- {gap_sentence(gap)} {gap_run(gap)}")
+        say(f"- {words.gap_sentence(gap)} {words.gap_run(gap)}")
     if study.review is not None:
         say()
         say(str(study.review))

@@ -6,7 +6,8 @@ a room, so that all of it can be read, counted and tested on plants where it is 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mckibben.numerals import numeral
@@ -15,6 +16,7 @@ from mckibben.recording import standard_unit
 if TYPE_CHECKING:
     from mckibben.comparison.choosing import Against
     from mckibben.comparison.leaderboard import Leaderboard
+    from mckibben.diagnosis.characterization import Characterization, Level
     from mckibben.diagnosis.data_gaps import Gap
 
 # --- Comparison -------------------------------------------------------------------------------------
@@ -117,6 +119,238 @@ def not_validated(board: Leaderboard) -> list[str]:
 
 
 # --- What the muscle does ---------------------------------------------------------------------------
+
+LEVELS = 5
+"""Levels of other inputs that sentences name; the table has all."""
+
+Row = tuple[str, float | int | str | None, tuple[float, float] | None, str, str]
+"""Quantity, value, 95 % interval, unit and meaning."""
+
+
+def characterization_sentences(found: Characterization) -> list[str]:
+    """Return what a muscle does, most important first: figures with their 95 % intervals."""
+    u, y = found.input, found.output
+    ends = found.output_range[::-1] if found.falls else found.output_range
+    said = [
+        f"{y} covers {_spanning(ends, found.output_unit)} while {u} covers "
+        f"{_spanning(found.input_range, found.input_unit)}{_gain(found)}."
+    ]
+    if not found.depends:
+        p = "" if found.p_dependence is None else f"p = {numeral(found.p_dependence, 2)}, "
+        said.append(
+            f"No dependence of {y} on {u} is visible: {p}{u} and its direction explain "
+            f"{_share(found.loop_share)} of its variance."
+        )
+    elif found.follows_direction:
+        said.append(
+            f"{y} follows the direction of {u}, as friction does, and has no inverse by {u}: velocity "
+            f"explains {_share(found.direction_share)} of its variance, {u} "
+            f"{_share(found.position_share)}."
+        )
+    said += [*_loop(found), *_motion(found), *_coupling(found)]
+    return [f"{sentence[0].upper()}{sentence[1:]}" for sentence in said]
+
+
+def _loop(found: Characterization) -> Iterator[str]:
+    y = found.output_unit
+    if found.loop_width is not None:
+        shape = "" if found.asymmetry is None else f"; asymmetry {numeral(found.asymmetry, 2)} %"
+        yield (
+            f"Loop width at mid {found.input}: {_figure(found, 'loop_width', '%')} of the output range, "
+            f"{_figure(found, 'mid_width', y)}{shape}."
+        )
+    elif found.branch_gap is not None and found.has_loop is False:
+        yield f"No loop: the mean gap between branches is {_figure(found, 'branch_gap', y)}."
+    elif found.branch_gap is not None:
+        shown = "" if found.has_loop else "; a loop is not shown by it"
+        yield f"Mean gap between branches: {_figure(found, 'branch_gap', y)}{shown}."
+    if found.branch_gap is not None and not found.drift_excluded:
+        yield "No recording has four branches: drift would part rising and falling output as well."
+    if found.rate_dependence is not None and found.speeds is not None:
+        unit = f"{found.input_unit}/s".lstrip("/")
+        speeds = " to ".join(numeral(speed, 2) for speed in found.speeds)
+        yield (
+            f"At twice the speed loop width grows by {_figure(found, 'rate_dependence', '%')} of the "
+            f"output range, from cycles at {speeds} {unit}."
+        )
+    if found.closure_error is not None and found.loop_width is not None:
+        yield f"Minor loops close within {_figure(found, 'closure_error', '%')} of the output range."
+
+
+def _motion(found: Characterization) -> Iterator[str]:
+    u, y = found.input_unit, found.output_unit
+    if found.dead_zone_upper is not None and found.dead_zone_lower is not None:
+        yield (
+            f"After a reversal {found.input} changes by {_figure(found, 'dead_zone_upper', u)} from "
+            f"above and {_figure(found, 'dead_zone_lower', u)} from below before {found.output} moves "
+            "back."
+        )
+    for name, side in (("onset", "Below"), ("saturation", "Above")):
+        if getattr(found, name) is not None:
+            yield f"{side} {_figure(found, name, u)} the slope is under a fifth of its mean."
+    if _certain(found, "creep") and found.creep_time is not None:
+        time = numeral(found.creep_time, 2)
+        yield f"In holds {found.output} creeps by {_figure(found, 'creep', y)} over {time} s."
+    if _certain(found, "drift"):
+        yield f"From cycle to cycle {found.output} drifts by {_figure(found, 'drift', y)}."
+
+
+def _coupling(found: Characterization) -> Iterator[str]:
+    if found.adjusted:
+        names = " and ".join(effect.channel for effect in found.effects)
+        yield (
+            f"{found.input} covers no half of its range while {names} stand still: straight-line "
+            "effects of these are taken away, and loop width is not measured."
+        )
+    for effect in found.effects:
+        limits = _limits(effect.limits)
+        yield (
+            f"At equal {found.input}, {found.output} changes by {numeral(effect.change, 2)} "
+            f"{found.output_unit} {limits} as {effect.channel} goes "
+            f"{_spanning((effect.low, effect.high), effect.unit)}."
+        )
+    for level in found.levels[:: max(1, -(-len(found.levels) // LEVELS))]:
+        at = _at(level)
+        width, y = level.found.loop_width, level.found.output_unit
+        loop = "" if width is None else f", loop width {_figure(level.found, 'loop_width', '%')}"
+        yield f"With {at}: span {numeral(level.found.output_span, 2)} {y}{_gain(level.found)}{loop}."
+
+
+def characterization_rows(found: Characterization) -> list[Row]:
+    """Return every figure with its 95 % interval, unit and meaning."""
+    u, y = found.input_unit, found.output_unit
+    area, gain = " ".join(part for part in (u, y) if part), f"{y}/{u}" if u else y
+    speed = f"{u}/s".lstrip("/")
+
+    def row(name: str, field: str, unit: str, meaning: str) -> Row:
+        return (name, getattr(found, field), found.intervals.get(field), unit, meaning)
+
+    def ends(name: str, field: str, unit: str, meaning: str) -> list[Row]:
+        low, high = getattr(found, field) or (None, None)
+        return [
+            (f"lowest {name}", low, None, unit, meaning),
+            (f"highest {name}", high, None, unit, meaning),
+        ]
+
+    return [
+        row("recordings", "n_recordings", "", "files or segments looked at"),
+        row("stretches", "n_stretches", "", "of them, those in which all other inputs stand still"),
+        row("samples", "n_samples", "", "in all"),
+        row("duration", "duration", "s", "in all; none without time"),
+        row("sample time", "sample_time", "s", "none where unknown or not the same everywhere"),
+        row("cycles", "n_cycles", "", "whole ones over at least a tenth of the input range"),
+        row(
+            "reversals", "n_reversals", "", "where the input turns back by 1 % of its range or more"
+        ),
+        *ends(found.input, "input_range", u, "input range"),
+        *ends(found.output, "output_range", y, "output range"),
+        row(f"noise of {found.input}", "input_noise", u, "standard deviation of a sample"),
+        row(f"noise of {found.output}", "output_noise", y, "standard deviation of a sample"),
+        row(
+            "variance by input", "position_share", "", "share that a function of the input explains"
+        ),
+        row(
+            "variance by velocity",
+            "direction_share",
+            "",
+            "share that the input's velocity explains",
+        ),
+        row(
+            "variance by branch",
+            "loop_share",
+            "",
+            "share that input and direction explain together",
+        ),
+        row("p of dependence", "p_dependence", "", "probability of such slopes without dependence"),
+        row("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
+        row("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
+        row("loop width at mid input", "mid_width", y, "the same in the unit of the output"),
+        row(
+            "asymmetry", "asymmetry", "%", "from its image turned by half a turn; PI models have 0"
+        ),
+        row("centre of width", "width_centroid", "", "-1 at low, 0 at mid, 1 at high input"),
+        row("loop area", "loop_area", area, "enclosed by the largest cycles"),
+        row(
+            "loop area share", "loop_area_share", "%", "of the rectangle round it: a relay has 100"
+        ),
+        row("mean branch gap", "branch_gap", y, "falling less rising output, free of steady drift"),
+        row(
+            "dead zone after upper reversals", "dead_zone_upper", u, "before the output moves back"
+        ),
+        row("dead zone after lower reversals", "dead_zone_lower", u, "the same from below"),
+        row("gain", "gain", gain, "slope of the mean of both branches at mid input"),
+        row("onset", "onset", u, "below it the slope is under a fifth of its mean"),
+        row("saturation", "saturation", u, "above it the slope is under a fifth of its mean"),
+        row("creep", "creep", y, "in a hold of all inputs; positive: on as it was going"),
+        row("creep time", "creep_time", "s", "the time over which it crept so far"),
+        row("drift", "drift", y, "from one cycle to the next between the same extremes"),
+        row("rate dependence", "rate_dependence", "%", "growth of e_w at twice the speed"),
+        *ends("speed compared", "speeds", speed, "mean speed of the input in cycles alike"),
+        row("closure error", "closure_error", "%", "output after a minor loop against that before"),
+        *(
+            (
+                *(f"effect of {one.channel}", one.change, one.limits, y),
+                f"on the output at equal input, {_spanning((one.low, one.high), one.unit)}",
+            )
+            for one in found.effects
+        ),
+        *(
+            (
+                *(f"effect of {one.channel} on the slope", one.gain_change, one.gain_limits, gain),
+                f"by one straight line, {_spanning((one.low, one.high), one.unit)}",
+            )
+            for one in found.effects
+        ),
+        *(
+            (f"{name} with {_at(level)}", value, level.found.intervals.get(field), unit, meaning)
+            for level in found.levels
+            for name, field, unit, meaning in (
+                ("loop width", "loop_width", "%", "e_w of the largest cycles there"),
+                ("gain", "gain", gain, "slope at mid input there"),
+            )
+            if (value := getattr(level.found, field)) is not None
+        ),
+    ]
+
+
+def _gain(found: Characterization) -> str:
+    unit = f"{found.output_unit}/{found.input_unit}".rstrip("/")
+    return (
+        "" if found.gain is None else f", slope {_figure(found, 'gain', unit)} at mid {found.input}"
+    )
+
+
+def _at(level: Level) -> str:
+    return " and ".join(f"{name} at {numeral(x)} {unit}".rstrip() for name, x, unit in level.held)
+
+
+def _figure(found: Characterization, field: str, unit: str) -> str:
+    """Return a figure with its unit and its interval."""
+    limits = found.intervals.get(field)
+    shown = f"{numeral(getattr(found, field), 2)} {unit}".rstrip()
+    return shown if limits is None else f"{shown} {_limits(limits)}"
+
+
+def _limits(limits: tuple[float, float]) -> str:
+    return f"({numeral(limits[0], 2)} to {numeral(limits[1], 2)})"
+
+
+def _certain(found: Characterization, field: str) -> bool:
+    """Tell whether the interval of a figure leaves zero out."""
+    low, high = found.intervals.get(field, (0.0, 0.0))
+    return low > 0 or high < 0
+
+
+def _share(share: float) -> str:
+    return f"{100 * share:.0f} %"
+
+
+def _spanning(limits: tuple[float, float], unit: str) -> str:
+    """Return limits to about a percent of their distance, so that noise at 0 is not spelled out."""
+    digits = 2 - math.floor(math.log10(abs(limits[1] - limits[0])))
+    low, high = (f"{round(limit, digits) + 0.0:.6g}" for limit in limits)
+    return f"{low} to {high} {unit}".rstrip()
+
 
 # --- Residual check ---------------------------------------------------------------------------------
 

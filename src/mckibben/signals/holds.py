@@ -12,6 +12,9 @@ from mckibben.signals.reversals import NOISE_SHARE, noise_level, swing_threshold
 STILL = 0.01
 """Share of its range within which a signal stands still, unless noise or resolution is wider."""
 
+CLEAR = 20.0
+"""A step this many times the noise shows movement."""
+
 ALTERNATING = 0.1
 """Share of the smallest steps that turn straight back, from which on they are a sensor's resolution."""
 
@@ -71,6 +74,28 @@ def holds(columns: Array, spans: Sequence[float] | None = None, shortest: int = 
             found.append(stretch)
             taken[stretch] = True
     return sorted(found, key=lambda stretch: int(stretch.start))
+
+
+def shortest_hold(x: Array, span: float) -> int:
+    """Return how many samples a signal, when it moves, takes for half of its range; at least ten.
+
+    A turning point lasts less, so that it is no hold. The mean speed is weighted with the way covered,
+    and taken over steps that are long enough to stand out of the noise.
+    """
+    noise, stride = np.nan_to_num(noise_level(x, span)) if x.size > 1 else 0.0, 1
+    while True:
+        steps = np.abs(np.diff(x[::stride]))
+        step = float(np.sum(steps**2) / np.sum(steps)) if steps.any() else 0.0
+        if step > CLEAR * noise or 16 * stride > x.size:
+            return max(10, int(np.ceil(0.5 * span * stride / step))) if step else x.size + 1
+        stride *= 2
+
+
+def moves(signals: Sequence[Array]) -> bool:
+    """Tell whether a channel moves, within its pieces or between them, by more than white noise does."""
+    steps = np.concatenate([np.diff(x) for x in signals])
+    # of white noise it is twice the variance
+    return float(np.mean(steps**2)) < float(np.concatenate(signals).var())
 
 
 def _band(x: Array, span: float) -> float:

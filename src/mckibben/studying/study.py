@@ -10,13 +10,13 @@ from typing import Any, ClassVar
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.characterization import Characterization, characterize
 from mckibben.comparison.channels import Names, moved_by
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import Settings, plan_of
 from mckibben.comparison.ranking import Standing, ranked
 from mckibben.control import Tracked
 from mckibben.control.twin import COMMAND
+from mckibben.diagnosis import Characterization, characterize
 from mckibben.diagnosis.data_gaps import Gap, data_gaps
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
@@ -247,7 +247,8 @@ def study(
             check=check_on_test(block, split, on_test, names),
             description=describe(block, split.train, fitted=True),
         )
-    so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
+    if so_far.characterization is None or not so_far.characterization.follows_direction:
+        so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
     undone = so_far.inverse
     if not channels.single and undone is not None:
         try:

@@ -149,7 +149,7 @@ def _small(
 
 
 def _plots(desk: Desk, recording: Recording, given: str, wanted: str) -> None:
-    from mckibben.characterization.tracks import MAJOR
+    from mckibben.diagnosis.tracks import MAJOR
     from mckibben.signals import cycles
 
     found = cycles(recording[given], MAJOR * float(np.ptp(recording[given])))
@@ -220,7 +220,8 @@ def _by_rate(recording: Recording, given: str, wanted: str) -> plots.Json:
 
 
 def _words(desk: Desk, given: str, wanted: str) -> None:
-    from mckibben.characterization import characterize
+    from mckibben.diagnosis import characterize
+    from mckibben.report import words
 
     what = f": {wanted}" if len(desk.outputs) > 1 else ""
     ui.label(f"What the muscle does{what}").classes("text-lg")
@@ -246,7 +247,7 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
             return
         place.clear()
         with place:
-            for sentence in found.sentences:
+            for sentence in words.characterization_sentences(found):
                 ui.label(typeset_within(said(sentence)))
             if len(recordings) > 1:
                 ui.label(f"Over all {len(recordings)} recordings:").classes("text-sm opacity-70")
@@ -254,10 +255,11 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
                 {
                     "what": name,
                     "value": wording.number(value) if isinstance(value, float) else value,
+                    "limits": " to ".join(map(wording.number, limits or ())),
                     "unit": unit,
                     "note": note,
                 }
-                for name, value, unit, note in found.table()
+                for name, value, limits, unit, note in words.characterization_rows(found)
                 if value is not None
             ]
             columns = [
@@ -265,6 +267,7 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
                 for key, label, align in (
                     ("what", "Quantity", "left"),
                     ("value", "Value", "right"),
+                    ("limits", "95 % interval", "right"),
                     ("unit", "Unit", "left"),
                 )
             ]

@@ -108,7 +108,7 @@ class StudyFace(Face):
             notes.append(f"Inverted: {study.inverse.model}.")
         return Card(
             f"Study, {study.input} to {study.output}",
-            () if known is None else known.sentences,
+            () if known is None else words.characterization_sentences(known),
             board.headings,
             board.rows,
             board.marked,

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.characterization.results import Characterization
 from mckibben.control.loop import Tracked
+from mckibben.diagnosis.characterization import Characterization
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
-from mckibben.report import model_subjects, review_subjects
+from mckibben.report import model_subjects, review_subjects, words
 from mckibben.report.drawing import Curve, Drawing, Panel, axis_label
 from mckibben.report.notebook.card import Card
 from mckibben.report.notebook.face import Draw, Face
@@ -36,11 +36,11 @@ class CharacterizationFace(Face):
         found = self.found
         rows = [
             (name, numeral(value, 3) if isinstance(value, float) else str(value), unit)
-            for name, value, unit, _ in found.table()
+            for name, value, _, unit, _ in words.characterization_rows(found)
             if name in QUANTITIES and value is not None
         ]
         title = f"Characterization, {found.input} to {found.output}"
-        return Card(title, found.sentences, rows=rows)
+        return Card(title, words.characterization_sentences(found), rows=rows)
 
     def drawings(self, choices: Mapping[str, Any]) -> Mapping[str, Draw]:
         """Return the widths of its cycles."""

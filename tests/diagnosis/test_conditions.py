@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mckibben import PI, DataError, Recording
-from mckibben.characterization import characterize
+from mckibben.diagnosis import characterize
+from mckibben.signals import staircase
 
 STEP = 0.01
 TIME = np.arange(3000) * STEP
@@ -27,7 +28,6 @@ def test_zeros_of_recordings_change_no_verdict(zeros: tuple[float, ...]) -> None
     assert moved.has_loop
     for name in ("loop_width", "gain", "dead_zone_upper", "branch_gap"):
         assert getattr(moved, name) == pytest.approx(getattr(same, name), rel=0.05, abs=0.02), name
-    assert not same.assumed
 
 
 def two(other: np.ndarray) -> Recording:
@@ -42,16 +42,40 @@ def test_what_another_input_does_is_not_taken_for_the_own() -> None:
     still = two(np.zeros(4000))
     ramps = np.concatenate([np.zeros(3000), np.linspace(0, 4, 500), np.full(500, 4.0)])
     clean = characterize(still, "pressure_1", "displacement")
-    mixed = characterize(two(ramps), "pressure_1", "displacement")
+    told = characterize(two(ramps), "pressure_1", "displacement")
     apart = characterize(two(ramps), "pressure_1", "displacement", beside=["pressure_2"])
-    assert mixed.creep is not None
-    assert abs(mixed.creep) > 5.0  # which is the other input's
+    assert told == apart  # channels of one quantity are inputs all
     assert apart.creep is None or abs(apart.creep) < 0.1
     assert apart.loop_width == pytest.approx(clean.loop_width, rel=0.02)
-    assert (mixed.n_recordings, mixed.n_stretches) == (1, None)
     assert apart.n_recordings == 1
     assert apart.n_stretches is not None
-    assert apart.n_stretches > 1
+    assert apart.n_stretches >= 1
+
+
+def test_a_step_of_payload_is_no_creep() -> None:
+    u = staircase(TIME, [0.0, 3.0, 1.0, 4.0], hold=7.0, ramp=0.5)
+    payload = np.where(TIME % 7.5 > 3.0, 20.0, 5.0)
+    run = Recording({"pressure": u, "displacement": u - 0.1 * payload, "force": payload}, STEP)
+    found = characterize(run)
+    assert found.creep is None
+    (effect,) = found.effects
+    assert effect.change == pytest.approx(-1.5, rel=0.01)
+
+
+@pytest.mark.parametrize("torque", [-4.0, 4.0])
+def test_a_torque_that_moves_with_the_pressure_does_not_turn_its_sign(torque: float) -> None:
+    rng = np.random.default_rng(5)
+    load = SLOW / 5.0 + 0.3 * np.sin(TIME * 1.7)
+    angle = MUSCLE.simulate(SLOW) + 10 * torque * load + 0.01 * rng.standard_normal(TIME.size)
+    run = Recording({"pressure": SLOW, "torque": load, "angle": angle}, STEP)
+    found = characterize(run, output="angle")
+    assert found.adjusted
+    assert not found.falls
+    assert found.gain is not None
+    assert found.gain > 0
+    low, high = found.effects[0].limits
+    assert low < 10 * torque * float(np.ptp(load)) < high
+    assert found.loop_width is None  # of what straight lines leave, no width is that of the muscle
 
 
 def test_inputs_that_move_as_one_are_refused() -> None:
@@ -92,7 +116,7 @@ def test_every_held_length_has_its_loop_and_its_gain(asked: tuple[str, ...]) -> 
         found.levels[0].found.loop_width,
     )
     assert (found.n_recordings, found.n_samples) == (6, 6 * TIME.size)
-    assert [cycle.recording for cycle in found.cycles] == sorted(3 * list(range(6)))
+    assert sorted(cycle.recording for cycle in found.cycles) == sorted(3 * list(range(6)))
     (effect,) = found.effects
     assert effect.channel == "displacement"
     assert effect.change == pytest.approx(-5 * 20 - 130 * 2.5, rel=0.1)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import PI, DataError, Recording
-from mckibben.characterization import characterize
+from mckibben.diagnosis import characterize
 from mckibben.signals import irregular_triangle, sine, staircase, triangle
 
 Array = NDArray[np.float64]
@@ -72,7 +72,6 @@ def test_every_number_of_a_parallelogram(gain: float, gap: float) -> None:
     assert [cycle.amplitude for cycle in found.cycles] == pytest.approx([4.0] * 5)
     assert [cycle.rate for cycle in found.cycles] == pytest.approx([0.4] * 5)
     assert found.loop_area == pytest.approx(4 * gap, rel=0.01)
-    assert found.loss_per_area == pytest.approx(400 * gap, rel=0.01)
     assert found.branch_gap == pytest.approx(gap, rel=0.01)
     assert found.gain == pytest.approx(gain)
     assert found.asymmetry == pytest.approx(0.0, abs=1e-6)
@@ -91,22 +90,19 @@ def test_dead_zone_of_a_play_operator_is_twice_its_radius(radius: float, noise: 
     assert found.dead_zone_upper == pytest.approx(2 * radius, abs=tolerance * 4)
     assert found.dead_zone_lower == pytest.approx(2 * radius, abs=tolerance * 4)
     assert found.mid_width == pytest.approx(2 * radius, abs=1e-9 + 4 * noise)
-    assert found.rate_verdict == "unknown"
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.003, 0.01])
 @pytest.mark.parametrize("seed", range(2))
-def test_prandtl_ishlinskii_loops_close_and_are_wiped_out(noise: float, seed: int) -> None:
+def test_prandtl_ishlinskii_minor_loops_close(noise: float, seed: int) -> None:
     model = PI(thresholds=(0.0, 0.2, 0.5, 1.0), weights=(3.0, 2.0, 1.0, 1.0))
     u = np.concatenate(
         [triangle(TIME[:4000], 10.0, 5.0), irregular_triangle(TIME, 60, 5.0, seed=seed)]
     )
     found = characterize(noisy(run(u, model.simulate(u)), noise, seed))
     assert found.closure_error is not None
-    assert found.wiping_out_error is not None
     # Turns fall between samples, so that even clean loops close to within a step only.
     assert found.closure_error < 0.1 + 150 * noise
-    assert found.wiping_out_error < 0.1 + 150 * noise
     assert found.asymmetry is not None
     assert found.asymmetry < 0.5 + 30 * noise
 
@@ -154,11 +150,10 @@ def test_drift_between_cycles() -> None:
 def test_dependence_on_rate() -> None:
     u = np.concatenate([sine(TIME[:4000], 20.0, 4.0), sine(TIME[:1001], 5.0, 4.0)])
     fast = characterize(run(u, lag(u, 0.3)))
-    assert fast.rate_verdict == "strong"
+    assert fast.intervals["rate_dependence"][0] > 5
     # The width of a lag is near 2 sin(phase), and the phase grows with the frequency.
     assert fast.rate_dependence == pytest.approx((33.5 - 9.4) / 2, rel=0.1)
     same = characterize(run(u, play(u, 0.3)))
-    assert same.rate_verdict == "none"
     assert same.rate_dependence == pytest.approx(0.0, abs=1.0)
     assert same.speeds == pytest.approx((0.4, 1.6), rel=0.05)
 
@@ -167,7 +162,6 @@ def test_without_time_what_needs_time_is_none() -> None:
     u = triangle(TIME, 10.0, 5.0)
     found = characterize(run(u, play(u, 0.3), None))
     assert found.duration is found.sample_time is found.creep is found.rate_dependence is None
-    assert found.rate_verdict == "unknown"
     assert [cycle.rate for cycle in found.cycles] == [None] * 10
     assert found.loop_width is not None
     assert found.drift == pytest.approx(0.0, abs=1e-9)
@@ -203,8 +197,9 @@ def test_where_noise_would_hide_a_loop_none_is_denied(seed: int) -> None:
     found = characterize(noisy(run(u, u, 10 * STEP), 0.1, seed))
     assert found.depends
     assert found.has_loop is None
-    assert found.widest_gap is not None
-    assert found.widest_gap > 0.04
+    low, high = found.intervals["branch_gap"]
+    assert low < 0 < high
+    assert found.loop_width is None
 
 
 @pytest.mark.parametrize(
@@ -244,3 +239,87 @@ def test_any_recording_is_described_or_refused(channels: tuple[list[int], list[i
         assert min(np.ptp(u), np.ptp(y)) == 0
         return
     json.dumps(found.to_dict(), allow_nan=False)
+
+
+@pytest.mark.parametrize("periods", [1, 2, 5])
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_a_closed_loop_has_one_width_wherever_its_record_begins(periods: int, noise: float) -> None:
+    n = 1000 * periods
+    phase = 2 * np.pi * np.arange(2 * n) * periods / n
+    u = 2.5 - 2.5 * np.cos(phase)
+    y = PI(thresholds=(0.0, 0.4), weights=(1.0, 2.0)).simulate(u)[n:]  # it is periodic by then
+    once = noisy(run(u[:n], y), noise)
+    first = characterize(once)
+    for shift in (1, 137, 500, 503, 862):
+        rolled = {name: np.roll(x, shift) for name, x in once.channels.items()}
+        found = characterize(Recording(rolled, STEP))
+        for name in ("loop_width", "asymmetry", "loop_area", "branch_gap"):
+            value = getattr(first, name)
+            assert getattr(found, name) == pytest.approx(value, rel=0.001 + 4 * noise), name
+        assert found.n_cycles == periods
+
+
+@pytest.mark.parametrize("codes", [20, 100, 500])
+def test_a_coarse_sensor_sees_the_loop(codes: int) -> None:
+    u = sine(TIME, 20.0, 5.0)
+    y = play(u, 0.15)
+    step = np.ptp(y) / codes
+    found = characterize(run(u, step * np.round(y / step)))
+    assert found.has_loop
+    assert found.loop_width == pytest.approx(100 * 0.3 / 4.7, abs=40 / codes)
+
+
+def damper(seed: int, switch: float) -> Recording:
+    """Return a force that follows the sign of speed, over wandering strokes."""
+    rng = np.random.default_rng(seed)
+    size = np.interp(TIME, np.arange(0, 102, 2), rng.uniform(3, 9, 51))
+    x = 8 + size * np.sin(2 * np.pi * 0.3 * TIME)
+    force = 800 * np.tanh(np.gradient(x, STEP) / switch) + 95 + 5 * rng.standard_normal(x.size)
+    return Recording({"displacement": x, "force": force}, STEP)
+
+
+@pytest.mark.parametrize("switch", [0.1, 2.0, 15.0])
+def test_friction_follows_direction_and_has_no_onset_trend_or_memory(switch: float) -> None:
+    found = characterize(damper(0, switch), "displacement", "force")
+    assert found.follows_direction
+    assert found.direction_share > 0.8
+    assert found.position_share < 0.05
+    assert found.onset is found.saturation is found.gain is found.creep is None
+    assert found.dead_zone_upper is found.closure_error is None
+
+
+@pytest.mark.parametrize("radius", [0.1, 1.0, 1.8])
+def test_a_muscle_does_not_follow_direction_however_wide_its_loop(radius: float) -> None:
+    u = irregular_triangle(TIME, 40, 5.0, seed=1)
+    assert not characterize(run(u, play(u, radius))).follows_direction
+    assert not characterize(run(u, lag(u, 0.3))).follows_direction
+
+
+WANDERING = ("white", "slow", "random walk", "drift")
+
+
+def unrelated(kind: str, seed: int) -> Array:
+    """Return noise of a kind, of unit size."""
+    rng = np.random.default_rng(seed)
+    white = rng.standard_normal(4000)
+    if kind == "slow":
+        x = lag(white, 3.0)
+        return x / x.std()
+    if kind == "random walk":
+        return np.cumsum(white) / 60
+    return np.linspace(0, 5, 4000) + 0.1 * white if kind == "drift" else white
+
+
+@pytest.mark.parametrize("kind", WANDERING)
+def test_noise_that_wanders_and_drift_are_no_loop(kind: str) -> None:
+    """Of 60 recordings at a level of 1 %, four or more have a probability of 0.3 %."""
+    looped = dependent = 0
+    for seed in range(60):
+        u = triangle(TIME[:4000], 40 / (3 + seed % 4), 5.0)
+        noise = unrelated(kind, seed)
+        bent = characterize(run(u, u + 0.05 * u**2 + 0.2 * noise))
+        looped += bent.has_loop is True
+        assert bent.depends
+        dependent += characterize(run(u, noise)).depends
+    assert looped < 4
+    assert dependent < 5

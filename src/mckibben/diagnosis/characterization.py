@@ -1,0 +1,421 @@
+"""Loop, dead zones, memory, creep, rate and coupling from recordings alone: numbers with intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mckibben.diagnosis.conditions import (
+    Effect,
+    effects,
+    levelled,
+    others_of,
+    standing,
+    without,
+)
+from mckibben.diagnosis.loops import (
+    Cycle,
+    branches_of,
+    curves_of,
+    drift,
+    explained,
+    gaps_of,
+    largest_of,
+    loops_of,
+    p_of_slopes,
+)
+from mckibben.diagnosis.memory import creep, dead_zones, minor_loop_errors, rate_dependence
+from mckibben.diagnosis.tracks import Range, Scale, interval, median, prepare
+from mckibben.errors import DataError
+from mckibben.recording import Recording, listed
+from mckibben.signals.holds import holds, shortest_hold
+from mckibben.signals.reversals import whole_cycles
+from mckibben.system.showing import DrawsItself
+
+LEVEL = 0.01
+"""Of the tests for dependence and for a loop."""
+
+NO_GAP = 0.01
+"""Branches whose mean gap is surely below this share of the output range are no loop."""
+
+EXPLAINED, POSITION = 0.5, 0.1
+"""Share of the output's variance that velocity explains at least, and the input at most, where the
+output follows direction; and that branches explain at least whose shape is measured."""
+
+BY_POSITION = (
+    *("gain", "onset", "saturation", "asymmetry", "width_centroid", "drift", "branch_gap"),
+    *("dead_zone_upper", "dead_zone_lower", "creep", "creep_time", "closure_error"),
+)
+"""What has no meaning where the output follows direction."""
+
+SHAPE = (
+    *("loop_width", "mid_width", "loop_area", "loop_area_share"),
+    *("asymmetry", "width_centroid", "dead_zone_upper", "dead_zone_lower", "closure_error"),
+    *("rate_dependence", "speeds"),
+)
+"""What is measured of a loop."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """What is found where other inputs stand still: their channels, levels and units in ``held``."""
+
+    held: tuple[tuple[str, float, str], ...]
+    found: Characterization
+
+
+@dataclass(frozen=True, kw_only=True)
+class Characterization(DrawsItself):
+    """What a muscle does, from recordings alone; None for what they do not show.
+
+    Units are those of the channels; percentages are of the output range. Figures are medians over
+    repeats; ``intervals`` has the 95 % intervals of those with three repeats or more, by field.
+
+    Parameters
+    ----------
+    n_cycles, n_reversals : int
+        Whole cycles run from minimum to minimum of the input and over at least a tenth of its
+        range; reversals are where it turns, minor loops included.
+    duration, sample_time : float or None
+        All recordings together [s]; the sample time that they share [s].
+    input_noise, output_noise : float or None
+        Standard deviation of a sample.
+    loop_width, mid_width : float or None
+        Distance of the largest cycles' branches at mid input: e_w [%] and [output unit].
+    asymmetry, width_centroid : float or None
+        How far the loop is from its own image, turned by half a turn [%]; where it is wide, from -1
+        (low input) to 1 (high input).
+    loop_area, loop_area_share : float or None
+        Area that it encloses [input unit x output unit], and that over the rectangle round it [%].
+    dead_zone_upper, dead_zone_lower : float or None
+        Change of the input after upper and lower reversals before the output moves [input unit].
+    gain, onset, saturation : float or None
+        Slope of the mean of both branches at mid input [output unit/input unit], and the inputs below
+        and above which it stays under a fifth of its mean.
+    branch_gap : float or None
+        Mean distance of falling and rising output at the same input, positive where the output
+        lags [output unit].
+    creep, creep_time, drift : float or None
+        Change of the output in a hold of all inputs [output unit], over what time [s]; and from one
+        cycle to the next between the same extremes.
+    rate_dependence, speeds
+        Growth of e_w at twice the speed [%], and the mean speeds between which it is found [input
+        unit/s].
+    closure_error : float or None
+        Return-point memory: output after a minor loop against that before it [%].
+    position_share, direction_share, loop_share : float
+        Share of the output's variance that functions of the input alone, of its velocity alone, and of
+        the input and its direction together explain.
+    p_dependence, p_loop : float or None
+        Probability of as consistent slopes along branches, and gaps between them, of an output without
+        dependence, and without a loop; None of too few branches.
+    drift_excluded : bool
+        Whether branches are compared with those before and after, so that drift cancels.
+    n_stretches : int or None
+        Stretches in which other inputs stand still; None where nothing else moves.
+    effects : tuple of Effect
+        What other inputs do; ``adjusted`` where it is taken away, as they stand still nowhere:
+        gain and branch gap alone are measured then.
+    levels : tuple of Level
+        Those at which other inputs stand still. What is found of the loop is that of the one at which
+        the output moves most.
+    """
+
+    face: ClassVar[str] = "characterization"
+
+    input: str
+    output: str
+    input_unit: str
+    output_unit: str
+    n_recordings: int
+    n_samples: int
+    n_cycles: int
+    n_reversals: int
+    duration: float | None
+    sample_time: float | None
+    input_range: Range
+    output_range: Range
+    input_noise: float | None
+    output_noise: float | None
+    cycles: tuple[Cycle, ...]
+    loop_width: float | None = None
+    mid_width: float | None = None
+    asymmetry: float | None = None
+    width_centroid: float | None = None
+    loop_area: float | None = None
+    loop_area_share: float | None = None
+    dead_zone_upper: float | None = None
+    dead_zone_lower: float | None = None
+    gain: float | None = None
+    onset: float | None = None
+    saturation: float | None = None
+    branch_gap: float | None = None
+    creep: float | None = None
+    creep_time: float | None = None
+    drift: float | None = None
+    rate_dependence: float | None = None
+    speeds: Range | None = None
+    closure_error: float | None = None
+    position_share: float = 0.0
+    direction_share: float = 0.0
+    loop_share: float = 0.0
+    p_dependence: float | None = None
+    p_loop: float | None = None
+    drift_excluded: bool = True
+    n_stretches: int | None = None
+    falls: bool = False
+    effects: tuple[Effect, ...] = ()
+    adjusted: bool = False
+    levels: tuple[Level, ...] = ()
+    intervals: dict[str, Range] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    @property
+    def output_span(self) -> float:
+        """Range of the output."""
+        return self.output_range[1] - self.output_range[0]
+
+    @property
+    def has_loop(self) -> bool | None:
+        """Whether branches are apart; False only where they surely are by less than 1 % of the range.
+
+        None where too few branches, or too much noise, leave it open.
+        """
+        if self.p_loop is not None and self.p_loop <= LEVEL:
+            return True
+        limits = self.intervals.get("branch_gap")
+        small = limits is not None and max(map(abs, limits)) <= NO_GAP * self.output_span
+        return False if small else None
+
+    @property
+    def depends(self) -> bool:
+        """Whether the output depends on the input, its direction included."""
+        shown = self.p_dependence is not None and self.p_dependence <= LEVEL
+        return shown or self.has_loop is True or self.loop_share >= EXPLAINED
+
+    @property
+    def follows_direction(self) -> bool:
+        """Whether the output follows the direction of motion, as friction does, and not position.
+
+        Such an output has no onset and no trend over the input, and no inverse by position.
+        """
+        return self.direction_share >= EXPLAINED and self.position_share <= POSITION
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as JSON holds it, with None for what could not be measured."""
+        found: dict[str, Any] = _plain(asdict(self))
+        return found | {"follows_direction": self.follows_direction}
+
+
+def characterize(
+    recordings: Recording | Sequence[Recording],
+    input: str = "pressure",  # noqa: A002
+    output: str = "displacement",
+    *,
+    beside: Sequence[str] = (),
+) -> Characterization:
+    """Measure what a muscle does: width and shape of its loop, memory, creep, dependence on rate.
+
+    Sensor noise is averaged away first, over samples within which the input moves by 1 % of its range.
+    Ranges are those of all recordings together. What the recordings do not show is None.
+
+    Other inputs, such as pressures of other muscles, loads or lengths, are looked at beside: where
+    they stand still, every level of theirs has a loop of its own, and the one at which the output moves
+    most is reported. Where they never do while the input moves, their effect by straight lines is taken
+    away, and gain and mean gap of the branches alone are measured.
+
+    Parameters
+    ----------
+    recordings : Recording or sequence of Recording
+        One muscle; every recording starts with unknown memory.
+    input, output : str
+        Channels.
+    beside : sequence of str
+        Other inputs that move the output. Channels of the input's quantity, loads, and channels that
+        every recording holds, not all of them alike, are among them anyway.
+
+    Returns
+    -------
+    Characterization
+
+    Raises
+    ------
+    DataError
+        On no recordings, a missing or constant channel, units that differ between recordings, fewer
+        than ten samples, or an input that moves only together with others.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mckibben import Recording
+    >>> from mckibben.signals import triangle
+    >>> pressure = triangle(np.arange(401) / 100, period=2.0, peaks=4.0)
+    >>> lag = 0.5 * np.sign(np.gradient(pressure))
+    >>> run = Recording({"pressure": pressure, "displacement": pressure - lag}, 0.01)
+    >>> found = characterize(run)
+    >>> found.n_cycles, round(found.mid_width, 6)
+    (2, 1.0)
+    """
+    runs = listed(recordings)
+    others = others_of(runs, input, output, beside) if runs else []
+    if not others:
+        return _measured(runs, input, output)
+    moved = effects(runs, input, output, others)
+    levels = []
+    for at, parts in standing(runs, input, others):
+        held = tuple((name, x, runs[0].units[name]) for name, x in zip(others, at, strict=True))
+        stretches = [part for _, part in parts]
+        if any(np.ptp(part[output]) > 0 for part in stretches):
+            found = _measured(stretches, input, output)
+            whole = any(len(part) == len(runs[place]) for place, part in parts)
+            if found.loop_width is not None or (whole and found.branch_gap is not None):
+                cycles = tuple(replace(c, recording=parts[c.recording][0]) for c in found.cycles)
+                levels.append(Level(held, replace(found, cycles=cycles)))
+    if levels:
+        most = max(levels, key=_moves_most).found
+        cycles = tuple(cycle for level in levels for cycle in level.found.cycles)
+        n_stretches = sum(level.found.n_recordings for level in levels)
+        levels = levels if len(levels) > 1 else []
+        found = replace(most, cycles=cycles, n_stretches=n_stretches, levels=tuple(levels))
+    elif moved:
+        found = _measured(without(runs, input, output, moved), input, output)
+        blank = dict.fromkeys({*SHAPE, *BY_POSITION} - {"gain", "branch_gap"})
+        found = replace(found, cycles=(), adjusted=True, **blank)  # type: ignore[arg-type]
+    else:
+        raise DataError(
+            f"it never moves while {', '.join(others)} stand still, so its effect cannot be identified",
+            file=runs[0].source,
+            channel=input,
+            remedy="record one in which it moves alone; models of several inputs need no such recording",
+        )
+    return replace(found, effects=moved, **_counts(runs, input, output))
+
+
+def _moves_most(level: Level) -> tuple[bool, float]:
+    return level.found.loop_width is not None, level.found.output_span
+
+
+def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any]:
+    """Return what is known of recordings without looking at loops."""
+    durations, steps = [run.duration for run in runs], {run.sample_time for run in runs}
+    ends = [
+        (float(min(one[name].min() for one in runs)), float(max(one[name].max() for one in runs)))
+        for name in (given, wanted)
+    ]
+    return {
+        "n_recordings": len(runs),
+        "n_samples": sum(map(len, runs)),
+        "duration": None if None in durations else float(sum(d or 0.0 for d in durations)),
+        "sample_time": steps.pop() if len(steps) == 1 else None,
+        "input_range": ends[0],
+        "output_range": ends[1],
+    }
+
+
+def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characterization:
+    """Return what is found in recordings in which nothing else moves, whatever their zeros."""
+    several = len(runs) > 1 and all(given in run and wanted in run for run in runs)
+    scale, tracks = prepare(levelled(runs, given, wanted) if several else runs, given, wanted)
+    units = tuple(_unit(runs, channel) for channel in (given, wanted))
+    loops, branches = loops_of(tracks, scale), branches_of(tracks, scale)
+    largest, gaps = largest_of(loops), gaps_of(branches, scale.sign)
+    growth, growth_limits, speeds = rate_dependence(loops) or (None, None, None)
+    upper, lower = dead_zones(tracks, scale)
+    crept = _crept(runs, given, wanted, scale)
+    curves = curves_of(branches, largest, scale)
+    gains, onsets, saturations = ([curve[k] for curve in curves] for k in range(3))
+    repeated: dict[str, Sequence[float | None]] = {
+        "loop_width": [loop.cycle.width for loop in largest],
+        "mid_width": [loop.mid_width for loop in largest],
+        "asymmetry": [loop.asymmetry for loop in largest],
+        "width_centroid": [loop.width_centroid for loop in largest],
+        "loop_area": [loop.area for loop in largest],
+        "loop_area_share": [loop.area_share for loop in largest],
+        "gain": gains,
+        "onset": () if None in onsets else onsets,
+        "saturation": () if None in saturations else saturations,
+        "dead_zone_upper": upper,
+        "dead_zone_lower": lower,
+        "creep": [moved for _, moved in crept],
+        "creep_time": [time for time, _ in crept],
+        "drift": drift(loops),
+        "closure_error": minor_loop_errors(tracks, scale),
+    }
+    values = {name: [x for x in each if x is not None] for name, each in repeated.items()}
+    limits = {name: interval(each) for name, each in values.items() if name != "creep_time"}
+    limits |= {"branch_gap": gaps.limits, "rate_dependence": growth_limits}
+    figures: dict[str, Any] = {name: median(each) for name, each in values.items()}
+    position, direction, both = explained(tracks)
+    found = Characterization(
+        input=given,
+        output=wanted,
+        input_unit=units[0],
+        output_unit=units[1],
+        **_counts(runs, given, wanted),
+        n_cycles=sum(len(whole_cycles(track.u, track.major_turns)) for track in tracks),
+        n_reversals=sum(track.turns.size - 2 for track in tracks),
+        input_noise=None if np.isnan(scale.u_noise) else scale.u_noise,
+        output_noise=None if np.isnan(scale.y_noise) else scale.y_noise,
+        cycles=tuple(loop.cycle for loop in loops),
+        **figures,
+        branch_gap=gaps.gap,
+        rate_dependence=growth,
+        speeds=speeds,
+        position_share=position,
+        direction_share=direction,
+        loop_share=both,
+        p_dependence=p_of_slopes(tracks, scale),
+        p_loop=gaps.p,
+        drift_excluded=gaps.p is not None,
+        falls=scale.sign < 0,
+        intervals={name: found for name, found in limits.items() if found is not None},
+    )
+    followed = found.depends and found.loop_share >= EXPLAINED
+    absent = set() if followed else {*SHAPE, *BY_POSITION} - {"branch_gap"}
+    if found.follows_direction:
+        absent |= set(BY_POSITION)
+    if found.has_loop is False or (found.has_loop is None and found.p_loop is not None):
+        absent |= set(SHAPE)
+    kept = {name: limits for name, limits in found.intervals.items() if name not in absent}
+    cycles = () if "loop_width" in absent else found.cycles
+    blank: dict[str, Any] = dict.fromkeys(absent)
+    return replace(found, cycles=cycles, intervals=kept, **blank)
+
+
+def _crept(
+    runs: Sequence[Recording], given: str, wanted: str, scale: Scale
+) -> list[tuple[float, float]]:
+    """Return the times [s] and creep of the holds at least half as long as the longest."""
+    found = []
+    for run in runs:
+        if run.sample_time is not None:
+            u, y, span = run[given], run[wanted], scale.u_span
+            held = holds(u[:, np.newaxis], [span], shortest_hold(u, span))
+            found += [(run.sample_time * n, scale.sign * x) for n, x in creep(u, y, held, span)]
+    longest = max((time for time, _ in found), default=0.0)
+    return [(time, moved) for time, moved in found if time >= 0.5 * longest]
+
+
+def _unit(runs: Sequence[Recording], channel: str) -> str:
+    units = {run.units[channel] for run in runs}
+    if len(units) > 1:
+        raise DataError(
+            f"recordings have it in different units: {', '.join(sorted(units))}",
+            channel=channel,
+            remedy="convert them, or read the files with --unit",
+        )
+    return units.pop()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,177 @@
+"""Other inputs, such as loads and lengths: where they stand still, and what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.diagnosis.tracks import FEWEST, Range
+from mckibben.estimators.coupled.base import schedules
+from mckibben.recording import Recording
+from mckibben.signals.holds import STILL, holds, moves
+from mckibben.statistics import correlation_length
+
+ALIKE = 0.02
+"""Share of all that another input does within which levels are one."""
+
+COVERS = 0.5
+"""Share of the input range over which the input moves in a stretch that is measured."""
+
+MOST = 2000
+"""Samples of a recording by which effects are found."""
+
+KNOTS = 12
+"""Of the curve of the input beside which other inputs have an effect."""
+
+NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True)
+class Effect:
+    """How far another input that goes from ``low`` to ``high`` moves the output at equal input.
+
+    By straight lines: the ``change`` of the output and that of its slope, ``gain_change``, each with its
+    95 % interval.
+    """
+
+    channel: str
+    low: float
+    high: float
+    unit: str
+    change: float
+    limits: Range
+    gain_change: float
+    gain_limits: Range
+
+
+def others_of(
+    recordings: Sequence[Recording], given: str, wanted: str, asked: Sequence[str]
+) -> list[str]:
+    """Return other inputs that move in or between recordings.
+
+    Those asked for, other channels of the input's quantity, what schedules models, and channels that
+    every recording holds.
+    """
+    quantity = given.rstrip("0123456789")
+    seen = [name for name in recordings[0].channels if all(name in one for one in recordings)]
+    told = [
+        *asked,
+        *(n for n in seen if given != quantity and n.rstrip("0123456789") == quantity),
+        *(n for n in schedules(recordings) if n in seen),
+        *(n for n in seen if all(np.ptp(one[n]) == 0 for one in recordings)),
+    ]
+    named = [n for n in dict.fromkeys(told) if n not in (given, wanted)]
+    return [n for n in named if moves([one[n] for one in recordings])]
+
+
+Group = tuple[tuple[float, ...], list[tuple[int, Recording]]]
+"""Levels at which other inputs stand still, and the stretches where they do with their recordings."""
+
+
+def standing(recordings: Sequence[Recording], given: str, others: Sequence[str]) -> list[Group]:
+    """Return stretches in which all other inputs stand still and the input moves, by level."""
+    span = max(float(np.ptp(one[given])) for one in recordings)
+    ranges = _spans(recordings, others)
+    found: list[tuple[Array, int, Recording]] = []
+    for place, one in enumerate(recordings):
+        columns = one.matrix(others)
+        whole = bool(np.all(np.ptp(columns, axis=0) <= STILL * ranges))
+        for hold in [slice(0, len(one))] if whole else holds(columns, ranges.tolist(), FEWEST):
+            part = one.slice(hold.start, hold.stop)
+            if np.ptp(part[given]) > COVERS * span:
+                found.append((columns[hold].mean(axis=0), place, part))
+    groups: list[Group] = []
+    for level, place, part in sorted(found, key=lambda each: tuple(each[0])):
+        for at, parts in groups:
+            if np.all(np.abs(level - at) <= ALIKE * ranges):
+                parts.append((place, part))
+                break
+        else:
+            groups.append((tuple(level.tolist()), [(place, part)]))
+    return groups
+
+
+def levelled(recordings: Sequence[Recording], given: str, wanted: str) -> list[Recording]:
+    """Return recordings whose outputs are one curve of the input as nearly as offsets make them."""
+    seen = [one.matrix((given, wanted))[:: -(-len(one) // MOST)] for one in recordings]
+    own = np.repeat(np.eye(len(seen)), [len(part) for part in seen], axis=0)
+    x, y = np.concatenate(seen).T
+    offsets = np.linalg.lstsq(np.column_stack([own, _hats(x)]), y, rcond=None)[0][: len(seen)]
+    offsets -= offsets @ own.mean(axis=0)
+    return [
+        one.with_channels({wanted: one.units[wanted]}, **{wanted: one[wanted] - offset})
+        for one, offset in zip(recordings, offsets.tolist(), strict=True)
+    ]
+
+
+def _hats(x: Array) -> Array:
+    """Return piecewise-linear functions between levels with as many samples between them."""
+    knots = np.unique(np.quantile(x, np.linspace(0, 1, KNOTS)))
+    return np.column_stack([np.interp(x, knots, row) for row in np.eye(knots.size)])
+
+
+def effects(
+    recordings: Sequence[Recording], given: str, wanted: str, others: Sequence[str]
+) -> tuple[Effect, ...]:
+    """Return how far other inputs move an output at equal input; none where some move together.
+
+    By least squares beside a curve of the input, each with a straight line, and that times the input.
+    """
+    parts = [one.matrix((given, wanted, *others))[:: -(-len(one) // MOST)] for one in recordings]
+    seen = np.concatenate(parts)
+    x, y = seen[:, 0], seen[:, 1]
+    lows, highs = seen[:, 2:].min(axis=0), seen[:, 2:].max(axis=0)
+    shares = (seen[:, 2:] - lows) / (highs - lows) - 0.5
+    k, middle = len(others), 0.5 * (x.min() + x.max())
+    columns = np.column_stack([shares, shares * (x - middle)[:, np.newaxis], _hats(x)])
+    for terms in (
+        columns,
+        np.delete(columns, slice(k, 2 * k), axis=1),
+    ):  # slopes are not always told
+        slopes, _, rank, _ = np.linalg.lstsq(terms, y, rcond=None)
+        if rank == terms.shape[1]:
+            break
+    else:
+        return ()
+    left = y - terms @ slopes
+    pieces = np.split(left, np.cumsum([len(part) for part in parts])[:-1])
+    variance = float(np.mean(left**2)) * correlation_length(pieces)
+    spread = NORMAL_95 * np.sqrt(variance * np.diag(np.linalg.inv(terms.T @ terms)))
+    found = []
+    for j, name in enumerate(others):
+        two = [(float(slopes[i]), float(spread[i])) for i in (j, j + k)]
+        (change, half), (gain, gain_half) = (
+            two if terms is columns else (two[0], (0.0, float("inf")))
+        )
+        found.append(
+            Effect(
+                *(name, float(lows[j]), float(highs[j]), recordings[0].units[name], change),
+                (change - half, change + half),
+                gain,
+                (gain - gain_half, gain + gain_half),
+            )
+        )
+    return tuple(found)
+
+
+def without(
+    recordings: Sequence[Recording], given: str, wanted: str, moved: Sequence[Effect]
+) -> list[Recording]:
+    """Return recordings whose output is what it would be with other inputs amid their ranges."""
+    ends = [float(end(one[given])) for one in recordings for end in (np.min, np.max)]
+    middle, found = 0.5 * (min(ends) + max(ends)), []
+    for one in recordings:
+        output = one[wanted]
+        for effect in moved:
+            share = (one[effect.channel] - effect.low) / (effect.high - effect.low) - 0.5
+            output = output - share * (effect.change + effect.gain_change * (one[given] - middle))
+        found.append(one.with_channels({wanted: one.units[wanted]}, **{wanted: output}))
+    return found
+
+
+def _spans(recordings: Sequence[Recording], names: Sequence[str]) -> Array:
+    seen = np.concatenate([one.matrix(names) for one in recordings])
+    return np.asarray(np.ptp(seen, axis=0))

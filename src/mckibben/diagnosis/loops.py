@@ -1,0 +1,355 @@
+"""Loops: output over input along rising and falling branches, and what can be read off them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.diagnosis.tracks import Range, Scale, Track
+from mckibben.metrics import loop_area
+from mckibben.signals.holds import STILL
+from mckibben.signals.reversals import whole_cycles
+
+SHARES = np.linspace(0.02, 0.98, 49)
+"""Input levels of a curve, as shares of its range; the middle one is mid input."""
+
+MIDDLE = SHARES.size // 2
+
+WINDOW = 0.025
+"""Samples this close to a level, as a share of the range, make the curve there."""
+
+FEWEST = 8
+"""Samples that a branch must have for its shape to be measured."""
+
+LARGE = 0.9
+"""Amplitudes from this share of the largest on are as large, or cover the input range."""
+
+CLOSED = 0.02
+"""Share of the amplitude within which a closed loop ends where it began."""
+
+PART = 0.5
+"""Share of the other branch that a branch at either end of a recording must have to make a loop."""
+
+SLIGHT = 0.005
+"""Mean width over the output range below which it is not measured where a loop is wide."""
+
+FLAT, REACH = 0.2, 2
+"""Share of the mean slope below which the output hardly follows the input; levels on either side
+over which a slope is taken."""
+
+COVERS = 0.3
+"""Share of the input range that a branch covers whose slope counts."""
+
+BINS = 12
+"""Of input or velocity, by which variance is explained."""
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One cycle of the input, minimum to minimum, of at least a tenth of the input range.
+
+    ``recording`` counts recordings, or stretches, from 0; ``low`` and ``high`` are the levels that both
+    branches cover; ``rate`` is the mean speed of the input [input unit/s], None without time; ``width``
+    is the loop width e_w [% of the cycle's output range].
+    """
+
+    recording: int
+    low: float
+    high: float
+    rate: float | None
+    width: float
+
+    @property
+    def amplitude(self) -> float:
+        """High less low."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The curves of one cycle: output ``up`` and ``down`` at input ``levels``, each of shape (49,).
+
+    ``begins`` and ``ends`` are its first and last sample, ``first`` whether its recording begins with
+    it, ``closed`` whether the input returns to where it began. ``asymmetry`` is the standard deviation
+    of up(mid + s) + down(mid - s) over the levels [% of the output range], 0 for every loop of a
+    classical Prandtl-Ishlinskii model; ``width_centroid`` is that of the width over the input, -1 low, 0
+    mid, 1 high, None for a slight loop.
+    """
+
+    cycle: Cycle
+    levels: Array
+    up: Array
+    down: Array
+    mid_width: float
+    asymmetry: float | None
+    width_centroid: float | None
+    area: float
+    area_share: float
+    begins: int
+    ends: int
+    closed: bool
+    first: bool
+
+
+def loops_of(tracks: Sequence[Track], scale: Scale) -> list[Loop]:
+    """Return the cycles with at least eight samples on each branch, in order of time.
+
+    Minor loops within a branch are left out of it.
+    """
+    pieces = (
+        (number, track, piece)
+        for number, track in enumerate(tracks)
+        for piece in whole_cycles(track.u, track.major_turns, PART)
+    )
+    return [loop for each in pieces if (loop := _loop(*each, scale)) is not None]
+
+
+def largest_of(loops: Sequence[Loop]) -> list[Loop]:
+    """Return the largest loops, closed ones where there are any.
+
+    The first of a recording, which starts from an unknown memory, counts where there is no other.
+    """
+    most = max((loop.cycle.amplitude for loop in loops), default=0.0)
+    large = [loop for loop in loops if loop.cycle.amplitude >= LARGE * most]
+    closed = [loop for loop in large if loop.closed]
+    return [loop for loop in closed if not loop.first] or closed or large
+
+
+def curve(u: Array, y: Array, levels: Array, half: float) -> Array:
+    """Return the output (k,) at input levels (k,), of samples (n,) in any order; NaN beyond them.
+
+    Means over the samples within ``half`` of a level, interpolated from the mean inputs there.
+    """
+    order = np.argsort(u, kind="stable")
+    x, z = u[order], y[order]
+    first = np.searchsorted(x, levels - half)
+    count = np.searchsorted(x, levels + half, side="right") - first
+    near = count > 2
+    if not near.any():
+        return np.interp(levels, x, z, left=np.nan, right=np.nan)
+    places, heights = (
+        (total[first + count] - total[first])[near] / count[near]
+        for total in (np.concatenate([[0.0], np.cumsum(q)]) for q in (x, z))
+    )
+    # the ends as they are, so that nothing is cut off within half a window of them
+    places, which = np.unique(np.concatenate([places, x[[0, -1]]]), return_index=True)
+    heights = np.concatenate([heights, z[[0, -1]]])[which]
+    return np.interp(levels, places, heights, left=np.nan, right=np.nan)
+
+
+@dataclass(frozen=True)
+class Branches:
+    """All major branches: curves (m, 49) at common levels, directions (m,), recordings (m,)."""
+
+    levels: Array
+    curves: Array
+    ways: Array
+    owners: Array
+
+    def mean(self, way: float) -> Array:
+        """Return the mean curve of one direction, NaN at levels that no such branch covers."""
+        chosen = self.curves[self.ways == way]
+        known = np.isfinite(chosen)
+        total, count = np.where(known, chosen, 0.0).sum(axis=0), known.sum(axis=0)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
+    """Return the curves of all major branches of three samples or more."""
+    levels = scale.u_low + SHARES * scale.u_span
+    half = _half(scale, scale.u_span)
+    found = [
+        (curve(track.u[part], track.y[part], levels, half), way, number)
+        for number, track in enumerate(tracks)
+        for part, way in track.branches
+        if part.stop - part.start >= 3
+    ]
+    curves, ways, owners = zip(*found, strict=True) if found else ((), (), ())
+    shape = (len(found), levels.size)
+    return Branches(levels, np.reshape(curves, shape), np.array(ways), np.array(owners))
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Distance of falling from rising branches, positive where the output lags [output unit].
+
+    ``gap`` is None where no two branches cover a level. Of fewer than four branches, which drift would
+    part as well, there are no ``limits`` (95 %) and no ``p``, the probability of as large a gap without
+    a loop.
+    """
+
+    gap: float | None = None
+    limits: Range | None = None
+    p: float | None = None
+
+
+def gaps_of(found: Branches, sign: float) -> Gaps:
+    """Return how far branches are from the mean of those before and after, so that drift cancels.
+
+    The error is that of branches which differ as much as those of one direction do: a t-test.
+    """
+    from scipy.special import fdtrc, stdtrit
+
+    gaps, repeats, pairs = [], [], []
+    for k in range(found.ways.size - 1):
+        if found.owners[k] == found.owners[k + 1]:
+            pairs += _mean(found.ways[k + 1] * (found.curves[k] - found.curves[k + 1]))
+            if k and found.owners[k - 1] == found.owners[k]:
+                before, here, after = found.curves[k - 1 : k + 2]
+                gaps += _mean(found.ways[k] * (0.5 * (before + after) - here))
+                repeats += _mean(np.where(np.isfinite(here), after - before, np.nan))
+    gap, n = sign * float(np.mean(gaps or pairs or [np.nan])), len(gaps)
+    if n < 2:
+        return Gaps(gap if gaps or pairs else None)
+    # of independent branches, gaps vary by 3/2, their mean by 4/n and repeats by 2 times their variance
+    error, freedom = float(np.sqrt(2 * np.mean(np.square(repeats)) / n)), max(n / 1.5, 1.0)
+    half = error * float(stdtrit(freedom, 0.975))
+    p = float(fdtrc(1.0, freedom, (gap / error) ** 2)) if error > 0 else float(gap == 0)
+    return Gaps(gap, (gap - half, gap + half), p)
+
+
+def _mean(apart: Array) -> list[float]:
+    """Return the mean over the levels that are known, if there are any."""
+    known = apart[np.isfinite(apart)]
+    return [float(known.mean())] if known.size else []
+
+
+Curve = tuple[float | None, float | None, float | None]
+"""Gain, onset and saturation of a curve."""
+
+
+def curves_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[Curve]:
+    """Return gain, onset and saturation of the means of rising and falling output, where they show.
+
+    Of the largest loops where they cover the input range, else of all branches. The gain is the slope
+    at mid input over a fifth of the range; below the onset and above the saturation the slope stays
+    under a fifth of its mean.
+    """
+    curves = [
+        (loop.levels, 0.5 * (loop.up + loop.down))
+        for loop in loops
+        if loop.cycle.amplitude >= LARGE * scale.u_span
+    ] or [(found.levels, 0.5 * (found.mean(1.0) + found.mean(-1.0)))]
+    return [
+        _curve_of(u[known], y[known], scale) for u, y in curves if (known := np.isfinite(y)).any()
+    ]
+
+
+def _curve_of(u: Array, mean: Array, scale: Scale) -> Curve:
+    centre, fifth = 0.5 * (scale.u_low + scale.u_high), 0.1 * scale.u_span
+    gain = onset = saturation = None
+    if u[0] <= centre - fifth and u[-1] >= centre + fifth:
+        low, high = np.interp([centre - fifth, centre + fifth], u, mean)
+        gain = float(high - low) / (2 * fifth)
+    if u.size >= 4 * REACH:
+        rises = scale.sign * (mean[2 * REACH :] - mean[: -2 * REACH])
+        slopes, at = rises / (u[2 * REACH :] - u[: -2 * REACH]), u[REACH:-REACH]
+        steep = np.flatnonzero(slopes >= max(FLAT * slopes.mean(), 0.0))
+        # A flat end counts when more than one slope is flat there, so that noise makes none.
+        onset = float(at[steep[0]]) if steep.size and steep[0] > 1 else None
+        saturation = float(at[steep[-1]]) if steep.size and steep[-1] < at.size - 2 else None
+    return gain, onset, saturation
+
+
+def p_of_slopes(tracks: Sequence[Track], scale: Scale) -> float | None:
+    """Return the probability of as consistent slopes along branches of an unrelated output.
+
+    Slope and curvature of every branch, its mean apart, by Hotelling's T² over branches; None of fewer
+    than three.
+    """
+    from scipy.special import fdtrc
+
+    found = []
+    for track in tracks:
+        for part, _ in track.branches:
+            x = 2 * (track.u[part] - scale.u_low) / scale.u_span - 1
+            if x.size >= FEWEST and np.ptp(x) >= 2 * COVERS:
+                columns = np.column_stack([np.ones(x.size), x, x * x])
+                found.append(np.linalg.lstsq(columns, track.y[part], rcond=None)[0][1:])
+    m = len(found)
+    if m < 3:
+        return None
+    terms = 2 if m > 4 else 1
+    slopes = np.array(found)[:, :terms]
+    mean, scatter = slopes.mean(axis=0), np.cov(slopes.T, ddof=1).reshape(terms, terms)
+    spread = m * float(mean @ np.linalg.pinv(scatter) @ mean)
+    if not scatter.any():
+        return 0.0 if mean.any() else 1.0
+    return float(fdtrc(terms, m - terms, spread * (m - terms) / (terms * (m - 1))))
+
+
+def explained(tracks: Sequence[Track]) -> tuple[float, float, float]:
+    """Return the shares of the output's variance that input, velocity, and input with direction explain.
+
+    Velocity is the change of the input from sample to sample. By means over bins with as many samples.
+    """
+    u, y = (np.concatenate([getattr(track, name) for track in tracks]) for name in "uy")
+    v = np.concatenate([np.gradient(track.u) for track in tracks])
+    position, velocity = (
+        np.searchsorted(np.quantile(x, np.linspace(0, 1, BINS + 1)[1:-1]), x) for x in (u, v)
+    )
+    shares = []
+    for bins in (position, velocity, 2 * position + (v > 0)):
+        count, total = np.bincount(bins), np.bincount(bins, y)
+        left = np.var(y - (total / np.maximum(count, 1))[bins])
+        shares.append(float(1 - left / np.var(y)) if np.ptp(y) > 0 else 0.0)
+    return shares[0], shares[1], shares[2]
+
+
+def drift(loops: Sequence[Loop]) -> list[float]:
+    """Return the changes of the output from one closed cycle to the next between the same extremes."""
+    changes = []
+    for one, other in pairwise(loops):
+        follows = one.cycle.recording == other.cycle.recording and one.ends == other.begins
+        if follows and one.closed and other.closed and alike(one.cycle, other.cycle, CLOSED):
+            common = (one.levels >= other.levels[0]) & (one.levels <= other.levels[-1])
+            later = [np.interp(one.levels[common], other.levels, x) for x in (other.up, other.down)]
+            changes.append(float(np.mean(np.subtract(later, [one.up[common], one.down[common]]))))
+    return changes
+
+
+def alike(one: Cycle, other: Cycle, within: float) -> bool:
+    """Tell whether two cycles have the same extremes, within a share of the amplitude."""
+    limit = within * one.amplitude
+    return abs(one.low - other.low) <= limit and abs(one.high - other.high) <= limit
+
+
+def _half(scale: Scale, amplitude: float) -> float:
+    """Return how near samples make a curve: over several steps of a coarse sensor."""
+    steps = max(scale.u_step / scale.u_span, scale.y_step / scale.y_span)
+    return max(WINDOW * amplitude, min(2 * steps, 0.25) * scale.u_span)
+
+
+def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
+    u, y, still = track.u[piece], track.y[piece], 0.5 * STILL * scale.u_span
+    top = int(np.argmax(u))
+    rise, fall = np.arange(top + 1), np.arange(top, u.size)
+    rise = rise[u[rise] >= np.maximum.accumulate(u[rise]) - still]
+    fall = fall[u[fall] <= np.minimum.accumulate(u[fall]) + still]
+    if min(rise.size, fall.size) < FEWEST:
+        return None
+    low, high = float(max(u[0], u[-1])), float(u[top])
+    levels, half = low + SHARES * (high - low), _half(scale, high - low)
+    up, down = curve(u[rise], y[rise], levels, half), curve(u[fall], y[fall], levels, half)
+    covered = u >= low
+    span = float(np.ptp(y[covered]))
+    if span == 0 or not np.isfinite(up + down).all():
+        return None
+    amplitude, widths = high - low, np.abs(down - up)
+    mid, closed = float(widths[MIDDLE]), bool(abs(u[-1] - u[0]) <= CLOSED * amplitude)
+    seconds = None if track.sample_time is None else track.sample_time * (u.size - 1)
+    rate = None if seconds is None else float((2 * u[top] - u[0] - u[-1]) / seconds)
+    area, wide = loop_area(u[covered], y[covered]), widths.mean() >= SLIGHT * span
+    return Loop(
+        Cycle(number, low, high, rate, 100 * mid / span),
+        *(levels, up, down, mid),
+        100 * float(np.std(up + down[::-1])) / span if closed else None,
+        float(np.sum((2 * SHARES - 1) * widths) / np.sum(widths)) if wide else None,
+        *(area, 100 * area / (amplitude * span)),
+        *(piece.start, piece.stop - 1, closed),
+        first=piece.start <= track.major_turns[1] and not track.periodic,
+    )

@@ -153,7 +153,11 @@ def data_gaps(
     >>> [gap.what for gap in data_gaps(run)]
     ['rate', 'minor loops', 'creep']
     """
-    known = excitation(recordings, inputs, outputs, tests)
+    return gaps_of(excitation(recordings, inputs, outputs, tests))
+
+
+def gaps_of(known: Excitation) -> tuple[Gap, ...]:
+    """Return the gaps of what recordings contain, most important first."""
     found = [gap for rule in RULES if known.timed or not rule.timed for gap in _gaps(rule, known)]
     return tuple(sorted(found, key=lambda gap: -gap.severity))
 
@@ -368,10 +372,13 @@ def _repeated_cycles(known: Excitation) -> Found:
             follows = one.recording == other.recording and one.last == other.first
             if follows and min(one.travel, other.travel) > large:
                 recording = known.recordings[one.recording]
-                at = np.linspace(one.first, other.last, CYCLE_POINTS).round().astype(int)
-                path = [recording[u][at] / known.span(u) / REPEATED for u in known.moving]
-                seconds = (other.last - one.first) * (recording.sample_time or 1.0)
-                cycles.append([*np.concatenate(path), np.log(seconds) / np.log(LASTING)])
+                # from the middle of one branch to that of the next: turning points are flat
+                first, last = (branch.middle(recording[name]) for branch in (one, other))
+                at = np.linspace(first, last, CYCLE_POINTS).round().astype(int)
+                path = [recording[u][at] / known.span(u) for u in known.moving]
+                ends = np.array([one.start, other.start, other.end]) / known.span(name)
+                lasts = np.log((last - first) * (recording.sample_time or 1.0)) / np.log(LASTING)
+                cycles.append([*np.concatenate([ends, *path]) / REPEATED, lasts])
         pairs += len(cKDTree(cycles).query_pairs(1.0, p=np.inf)) if cycles else 0
     if known.swinging:
         yield pairs, known.swinging

@@ -173,7 +173,12 @@ def excitation(
     if not every:
         raise DataError("there are no recordings to judge", remedy="give at least one")
     found = channels_of(every, inputs, outputs, None)
-    names = (*found.inputs, *found.outputs)
+    driven = found.inputs
+    if inputs is None and found.outputs == ("force",) and "pressure" in every[0]:
+        driven = tuple(
+            dict.fromkeys(("pressure", *driven))
+        )  # which models of force find themselves
+    names = (*driven, *found.outputs)
     for recording in every:
         if len(recording) < FEWEST_SAMPLES:
             raise DataError(
@@ -190,8 +195,8 @@ def excitation(
             )
     told = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
     loads = [name for name in told if all(name in recording for recording in every)]
-    kept = without_copies(every, found.inputs, found.outputs)
-    return Excitation(tuple(kept), tuple(tests), found.inputs, tuple(loads), found.outputs)
+    kept = without_copies(every, driven, found.outputs)
+    return Excitation(tuple(kept), tuple(tests), driven, tuple(loads), found.outputs)
 
 
 def _gaps(rule: Rule, known: Excitation) -> Iterator[Gap]:

@@ -137,8 +137,8 @@ def check_possible(limits: Limits, seconds: float, rig: Rig | None) -> None:
         if limit.crossing > SHARE_OF_WAYS * seconds:
             needed = math.ceil(limit.crossing / SHARE_OF_WAYS / 6) / 10
             raise DataError(
-                f"at {limit.rate:.3g} {unit}/s, it takes {limit.crossing:.3g} s from end to end, which "
-                f"is too much of {seconds:g} s",
+                f"at {limit.rate:.3g} {unit}/s, it takes {limit.crossing:.3g} s of {seconds:g} s from "
+                "end to end",
                 channel=name,
                 remedy=f"give --minutes {needed:g} or more, a higher rate, or limits closer together",
             )

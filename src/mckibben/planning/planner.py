@@ -83,7 +83,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Step:
-    """A part of a plan: from and to when [s], kind of motion, and the data gaps that it closes."""
+    """A part of a plan: from and to when [s], kind of motion, and the data gaps it closes."""
 
     start: float
     stop: float
@@ -100,9 +100,8 @@ class Plan:
     recording : Recording
         The commands, with time.
     steps : tuple of Step
-        Which part is for what.
     parameters : tuple of Parameter
-        Of the model, with the standard errors that are expected; empty without a model.
+        Of the model; empty without one.
     gaps : tuple of Gap
         What the recordings so far cannot identify.
     extrapolated : tuple of str
@@ -153,17 +152,15 @@ def plan(
     minutes : float
         How long to record.
     limits : mapping of str to sequence of float, optional
-        By channel its lowest and highest command and, in its unit a second, its rate; None for what
-        stays as it is. Default those of the rig, or those of the recordings.
+        By channel its lowest and highest command and its rate a second; None for what stays as it is.
+        Default those of the rig, or those of the recordings.
     seed : int
         Of the random motion.
 
     Raises
     ------
-    DataError
-        On limits in which nothing moves, or recordings that fit neither rig nor model.
-    ModelError
-        On models that do not run free within the limits.
+    DataError, ModelError
+        On limits in which nothing moves, or what does not fit together or run free.
     """
     recorded, seconds = listed(recordings), 60 * minutes
     if (muscle is not None and recorded) or not (recorded or rig is not None or muscle is not None):
@@ -174,9 +171,7 @@ def plan(
     if muscle is not None and model is not None:
         raise DataError("a muscle is a model itself", remedy="leave --model out")
     if not 0 < minutes <= MOST_MINUTES:
-        raise DataError(
-            f"{minutes:g} minutes are impossible", remedy="give --minutes 3, or up to 60"
-        )
+        raise DataError(f"{minutes:g} minutes are impossible", remedy="give --minutes 3, or 60")
     generator(seed)  # refuses what is no seed
     plant = rig if isinstance(rig, Rig) or rig is None else load_rig(rig)
     block = inside(model) if isinstance(model, Block) else None
@@ -189,7 +184,7 @@ def plan(
     if recorded:
         known = _known(recorded, plant, block)
         gaps, recorded_limits = gaps_of(known), limits_of_recordings(known)
-        own, wanted = own or recorded_limits, {gap.run for gap in gaps}
+        own, wanted = recorded_limits | own, {gap.run for gap in gaps}
         step = max(step if plant else 0.0, min(one.sample_time or step for one in recorded))
     elif muscle is not None:
         block, own = _of_muscle(muscle, plant)
@@ -201,14 +196,11 @@ def plan(
         parts = motion(within, seconds, step, wanted, np.random.default_rng(seed))
         commands = np.concatenate([part for _, part in parts])
         planned = Recording(dict(zip(within, commands.T, strict=True)), step)
-        if block is None and recorded:
-            block = _fitted(excitation(recorded), name, seed)
-        if block is not None:
-            parameters = _parameters(block, recorded, planned)
-        elif plant is not None and not recorded:
+        if plant is not None and block is None and not recorded:
             parameters = _of_twin(plant, name, planned, seed)
         else:
-            parameters = ()
+            block = block or _fitted(_known(recorded, plant, None), name, seed)
+            parameters = () if block is None else _parameters(block, recorded, planned)
     return Plan(
         planned if plant is None else planned.select(plant.inputs),
         _steps(parts, step, gaps),
@@ -252,17 +244,18 @@ def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) ->
                 file=recording.source,
                 remedy="give recordings of this rig and model, or leave --rig or --model out",
             )
-    if block is not None:
-        driven = [one.name for one in block.inputs if one.name not in block.scheduling]
-        return excitation(recordings, driven, [one.name for one in block.outputs])
-    return excitation(recordings)
+    if block is None:
+        return excitation(recordings, None if rig is None else rig.inputs)
+    driven = [one.name for one in block.inputs]
+    known = excitation(recordings, driven, [one.name for one in block.outputs])
+    return replace(known, loads=tuple(name for name in known.loads if name in driven))
 
 
 def _of_twin(rig: Rig, model: str | None, planned: Recording, seed: int) -> tuple[Parameter, ...]:
     """Return the parameters of a model fitted to the plan as a rig would record it, nothing before."""
     resting = rig.changed({f"start.{name}": float(u[0]) for name, u in planned.channels.items()})
     recorded = [resting.run(planned, seed)]
-    block = _fitted(excitation(recorded), model, seed)
+    block = _fitted(_known(recorded, rig, None), model, seed)
     found = () if block is None else _parameters(block, recorded, planned)
     return tuple(replace(one, now=None, after=one.now) for one in found)
 

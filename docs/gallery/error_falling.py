@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 
 import mckibben
 from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.excitation.planning import plan
 from mckibben.signals import random_wave, triangle
 
 STEP = 0.05
@@ -27,7 +26,7 @@ figure = Figure(figsize=(7, 3.8), layout="constrained")
 axis = figure.subplots()
 for place, name in enumerate(names):
     if place:
-        planned = plan(runs, rig=rig, minutes=1, seed=place).recording
+        planned = mckibben.plan(runs, rig=rig, minutes=1, seed=place).recording
         runs.append(rig.run(planned, seed=10 + place))
     model = BalanceEstimator().fit(runs).model_
     error = (model.simulate(new)["displacement"] - new["displacement"])[100:]

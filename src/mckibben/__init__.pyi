@@ -35,9 +35,9 @@ from .estimators.hysteresis.eupi import EUPIEstimator as EUPIEstimator
 from .estimators.hysteresis.gpi import GPIEstimator as GPIEstimator
 from .estimators.hysteresis.mpi import MPIEstimator as MPIEstimator
 from .estimators.hysteresis.pi import PIEstimator as PIEstimator
-from .excitation.planning import plan as plan
 from .files import read as read
 from .files import write as write
+from .planning.planner import plan as plan
 from .recording import Recording as Recording
 from .report import write_report as write_report
 from .rigs import Rig as Rig

@@ -98,7 +98,6 @@ BAD = [
     (f"{PLAN} --limits pressure", "CHANNEL=LOW:HIGH"),
     (f"{PLAN} --limits force=0:5", "force"),
     (f"{PLAN} --minutes 0.01", "--minutes"),
-    (f"{PLAN} --for nonsense", "nonsense"),
     (f"{PLAN} --rig rail", "voltage"),
     (f"{PLAN} --muscle rail", "--muscle"),
     # Rigs

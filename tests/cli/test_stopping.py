@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import GPI, Recording, read, write
+from mckibben import GPI, Recording, write
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.excitation import search
 from mckibben.signals import irregular_triangle, triangle
 from tests.cli.conftest import Cli
 
@@ -140,15 +139,3 @@ def test_a_stopped_fit_keeps_the_best_so_far(
     assert result.code == 0, result.err
     assert json.loads(result.out)["interrupted"] is True
     assert out.exists()
-
-
-def test_a_stopped_plan_is_written(
-    cli: Cli, files: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    place, out = tmp_path / "model.json", tmp_path / "next.csv"
-    GPI.example().save(place)
-    monkeypatch.setattr(search, "stretches", stop_at(3, vars(search)["stretches"]))
-    told = cli("plan", files[0], "--model", place, "--minutes", "0.5", "-o", out)
-    assert told.code == 0, told.err
-    (found,) = read(out, channels=["pressure"], informative=False)
-    assert np.ptp(found["pressure"]) > 1.0

@@ -25,7 +25,7 @@ LAYERS = (
     {"environments"},
     {"bands"},
     {"comparison"},
-    {"validation", "diagnosis", "excitation"},
+    {"validation", "diagnosis"},
     {"planning"},
     {"studying"},
     {"papers"},

@@ -127,8 +127,9 @@ def check(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
 
 def plan(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Plan what to record next, and write it as a file of inputs over time."""
-    from mckibben.excitation.planning import plan as planned
     from mckibben.files import write
+    from mckibben.planning.planner import plan as planned
+    from mckibben.report.words import plan_sentences
 
     name = str(given.get("name") or "")
     found = planned(
@@ -136,10 +137,10 @@ def plan(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         model=workspace.model(name) if name else None,
         minutes=float(given.get("minutes", 3.0)),
         seed=int(given.get("seed", 0)),
-        progress=lambda share, _: tell(share, float("nan")),
     )
+    tell(1.0, float("nan"))
     write(found.recording, workspace.new_path("takeaway", str(given["file"])))
-    return " ".join([found.sentence, *found.notes])
+    return " ".join(plan_sentences(found))
 
 
 def record(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from mckibben.cli.grouping import spread
 from mckibben.cli.options import Force, Json, Reading, Seed
-from mckibben.cli.output import print_json, print_table, progress_bar, say
+from mckibben.cli.output import print_json, print_table, say
+from mckibben.numerals import numeral
+from mckibben.recording import Recording
 
 MOST = 12
 """Parameters in the table; --json has all."""
@@ -36,7 +38,8 @@ def plan(
         typer.Option(
             "--model",
             metavar="NAME|FILE",
-            help="Model to fit, or a saved one (.json). Default: balance; of forces multistate.",
+            help="Model of the standard errors, to fit, or saved (.json). Default: balance, or "
+            "multistate of forces.",
         ),
     ] = None,
     minutes: Annotated[float, typer.Option("--minutes", help="How long to record.")] = 3.0,
@@ -49,70 +52,64 @@ def plan(
             "of the files.",
         ),
     ] = None,
-    goal: Annotated[
-        str | None,
-        typer.Option(
-            "--for",
-            metavar="TEXT,...",
-            help="Parameters that are to be known, by parts of their names. Default: predictions.",
-        ),
-    ] = None,
     seed: Seed = 0,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Find the motion that tells most of what is not known yet, to be recorded next.
+    """Write the motion to record next: random motion within limits, and what closes data gaps.
 
-    It starts and ends at rest. Record it, and plan again with all files: that goes for other things.
+    It starts and ends at rest. Expected standard errors of a model's parameters stand beside it.
     """
     from mckibben.blocks.saving import load
-    from mckibben.excitation.limits import parsed
-    from mckibben.excitation.planning import plan as planned
     from mckibben.files import write
     from mckibben.outputs import claim_recording
+    from mckibben.planning.limits import parsed
+    from mckibben.planning.planner import plan as planned
+    from mckibben.report.words import plan_sentences
 
     saved = model is not None and model.endswith(".json")
     named = [Path(name) for name in (rig, muscle, model if saved else None) if name is not None]
-    read = [*(files or []), *named]
-    claim_recording(out, inputs=read, force=force)
+    claim_recording(out, inputs=[*(files or []), *named], force=force)
     within = parsed(limits or [])
-    recordings = reading.read(files, None, informative=False) if files else []
-    with progress_bar("planning") as tell:
-        found = planned(
-            recordings,
-            rig=rig,
-            muscle=muscle,
-            model=load(model) if saved and model is not None else model,
-            minutes=minutes,
-            limits=within,
-            goal=goal,
-            seed=seed,
-            progress=tell,
-        )
+    found = planned(
+        reading.read(files, None, informative=False) if files else [],
+        rig=rig,
+        muscle=muscle,
+        model=load(model) if saved and model is not None else model,
+        minutes=minutes,
+        limits=within,
+        seed=seed,
+    )
     write(found.recording, out)
     if as_json:
         print_json({"file": str(out), **found.to_dict()})
         return
-    say(found.sentence)
-    if found.interrupted:
-        say("Stopped: this is the best plan until then.")
     print_table(
-        ["seconds", "what", "tells most of"],
-        [[f"{one.start:.0f} to {one.stop:.0f}", one.what, one.why] for one in found.steps],
-    )
-    print_table(
-        ["parameter", "value", "expected error now", "after"],
+        ["seconds", "what", "closes"],
         [
-            [one.name, f"{one.value:.4g}", f"{100 * one.now:.3g} %", f"{100 * one.after:.3g} %"]
-            for one in found.learned[:MOST]
+            [f"{one.start:.0f} to {one.stop:.0f}", one.what, ", ".join(one.gaps) or "-"]
+            for one in found.steps
         ],
     )
-    for note in found.notes:
-        say(f"Note: {note}")
-    say(f"Written: {out}{_how_to_record(found, rig, out)}")
+    shown = sorted(found.parameters, key=lambda one: one.after or 0.0, reverse=True)[:MOST]
+    if shown:
+        print_table(
+            ["parameter", "value", "standard error now", "with the plan"],
+            [
+                [one.name, f"{one.value:.4g}", *(_percent(x) for x in (one.now, one.after))]
+                for one in shown
+            ],
+        )
+    for sentence in plan_sentences(found):
+        say(sentence)
+    say(f"Written: {out}{_how_to_record(found.recording, rig, out)}")
 
 
-def _how_to_record(found: Any, rig: str | None, out: Path) -> str:
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{numeral(100 * share, 2)} %"
+
+
+def _how_to_record(planned: Recording, rig: str | None, out: Path) -> str:
     """Return the command that records it on a virtual rig, started where the plan starts."""
     if rig is None:
         return ""
@@ -121,7 +118,7 @@ def _how_to_record(found: Any, rig: str | None, out: Path) -> str:
     resting = dict(zip(load_rig(rig).inputs, load_rig(rig).resting[0].tolist(), strict=True))
     moved = [
         f" --set start.{name}={samples[0]:g}"
-        for name, samples in found.recording.channels.items()
+        for name, samples in planned.channels.items()
         if abs(samples[0] - resting[name]) > 0
     ]
     return (

@@ -238,7 +238,7 @@ def _plant(rig: str | None, twin: Path | None, limits: list[str]) -> Plant:
     """Return what the loop is closed on."""
     from mckibben.blocks.saving import load
     from mckibben.control import Twin
-    from mckibben.excitation.limits import parsed
+    from mckibben.planning.limits import parsed
     from mckibben.rigs import load_rig
 
     if (rig is None) == (twin is None):

@@ -153,7 +153,11 @@ def data_gaps(
     >>> [gap.what for gap in data_gaps(run)]
     ['rate', 'minor loops', 'creep']
     """
-    known = excitation(recordings, inputs, outputs, tests)
+    return gaps_of(excitation(recordings, inputs, outputs, tests))
+
+
+def gaps_of(known: Excitation) -> tuple[Gap, ...]:
+    """Return the gaps of what recordings contain, most important first."""
     found = [gap for rule in RULES if known.timed or not rule.timed for gap in _gaps(rule, known)]
     return tuple(sorted(found, key=lambda gap: -gap.severity))
 
@@ -169,7 +173,12 @@ def excitation(
     if not every:
         raise DataError("there are no recordings to judge", remedy="give at least one")
     found = channels_of(every, inputs, outputs, None)
-    names = (*found.inputs, *found.outputs)
+    driven = found.inputs
+    if inputs is None and found.outputs == ("force",) and "pressure" in every[0]:
+        driven = tuple(
+            dict.fromkeys(("pressure", *driven))
+        )  # which models of force find themselves
+    names = (*driven, *found.outputs)
     for recording in every:
         if len(recording) < FEWEST_SAMPLES:
             raise DataError(
@@ -186,8 +195,8 @@ def excitation(
             )
     told = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
     loads = [name for name in told if all(name in recording for recording in every)]
-    kept = without_copies(every, found.inputs, found.outputs)
-    return Excitation(tuple(kept), tuple(tests), found.inputs, tuple(loads), found.outputs)
+    kept = without_copies(every, driven, found.outputs)
+    return Excitation(tuple(kept), tuple(tests), driven, tuple(loads), found.outputs)
 
 
 def _gaps(rule: Rule, known: Excitation) -> Iterator[Gap]:
@@ -368,10 +377,13 @@ def _repeated_cycles(known: Excitation) -> Found:
             follows = one.recording == other.recording and one.last == other.first
             if follows and min(one.travel, other.travel) > large:
                 recording = known.recordings[one.recording]
-                at = np.linspace(one.first, other.last, CYCLE_POINTS).round().astype(int)
-                path = [recording[u][at] / known.span(u) / REPEATED for u in known.moving]
-                seconds = (other.last - one.first) * (recording.sample_time or 1.0)
-                cycles.append([*np.concatenate(path), np.log(seconds) / np.log(LASTING)])
+                # from the middle of one branch to that of the next: turning points are flat
+                first, last = (branch.middle(recording[name]) for branch in (one, other))
+                at = np.linspace(first, last, CYCLE_POINTS).round().astype(int)
+                path = [recording[u][at] / known.span(u) for u in known.moving]
+                ends = np.array([one.start, other.start, other.end]) / known.span(name)
+                lasts = np.log((last - first) * (recording.sample_time or 1.0)) / np.log(LASTING)
+                cycles.append([*np.concatenate([ends, *path]) / REPEATED, lasts])
         pairs += len(cKDTree(cycles).query_pairs(1.0, p=np.inf)) if cycles else 0
     if known.swinging:
         yield pairs, known.swinging

@@ -54,6 +54,11 @@ class Branch:
         """How far it goes."""
         return abs(self.end - self.start)
 
+    def middle(self, u: Array) -> int:
+        """Return the sample of a channel at which it is half-way."""
+        gone = np.abs(u[self.first : self.last + 1] - self.start)
+        return self.first + int(np.argmax(gone >= 0.5 * self.travel))
+
 
 @dataclass(frozen=True)
 class Excitation:

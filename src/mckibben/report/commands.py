@@ -64,7 +64,7 @@ def commands(study: Study, typed: Typed | None = None) -> list[tuple[str, str]]:
                 ["fit", best.model, *train, *typed.reading, *channels, *seed, "-o", saved],
             ),
             (
-                f"Plan {MINUTES} minutes that tell most of what is not known yet",
+                f"Plan {MINUTES} minutes to record next",
                 ["plan", *train, *typed.reading, "--minutes", str(MINUTES), "-o", "next.csv"],
             ),
             (

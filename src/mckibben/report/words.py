@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.diagnosis.characterization import Characterization, Level
     from mckibben.diagnosis.data_gaps import Gap
+    from mckibben.planning.planner import Plan
 
 # --- Comparison -------------------------------------------------------------------------------------
 
@@ -382,6 +383,9 @@ GAPS = {
     "repeats": "Repeatability cannot be identified: {value} cycles of {channels} are recorded twice.",
 }
 GAPS["load"] = GAPS["resting"]
+PLAN = "{seconds} s: {parts}."
+LEFT_OPEN = "Not closed by this plan: {gap} {run}"
+EXTRAPOLATED = "{channel} goes beyond the recordings: errors there are extrapolated."
 RUN = "Record {what}."
 RUNS = {
     "random": "all inputs and loads moving at random over {levels}",
@@ -408,6 +412,17 @@ def gap_sentence(gap: Gap) -> str:
 def gap_run(gap: Gap) -> str:
     """Return the run that would identify it."""
     return RUN.format(what=RUNS[gap.run].format(levels=_levels(gap)))
+
+
+def plan_sentences(plan: Plan) -> list[str]:
+    """Return what a plan does, what it leaves open, and what of it is extrapolated."""
+    parts = {step.what for step in plan.steps}
+    open_gaps = [gap for gap in plan.gaps if not any(gap.what in one.gaps for one in plan.steps)]
+    return [
+        PLAN.format(seconds=f"{plan.recording.duration:.0f}", parts=listing(sorted(parts))),
+        *(LEFT_OPEN.format(gap=gap_sentence(gap), run=gap_run(gap)) for gap in open_gaps),
+        *(EXTRAPOLATED.format(channel=name) for name in plan.extrapolated),
+    ]
 
 
 def _levels(gap: Gap) -> str:

@@ -1,0 +1,170 @@
+"""Within what commands have to stay: their ends, how fast they may go, and where they rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from mckibben.diagnosis.excitation import Excitation
+from mckibben.errors import DataError
+from mckibben.recording import standard_unit
+from mckibben.rigs import Rig
+
+CROSSING = 2.0
+"""Time in which a channel crosses its range, where no rate is known [s]."""
+
+SHARE_OF_WAYS = 0.25
+"""Most of the time of a plan that crossing a range once may take."""
+
+BELOW_ZERO = 0.02
+"""Share of its range by which the noise of a pressure goes below zero."""
+
+BEYOND = 0.1
+"""Share of their range by which a command may go beyond recordings."""
+
+LOWEST, HIGHEST = -1.1, 50.0
+"""Pressures beyond which no muscle is driven [bar]."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Ends of a command in its unit, equal where it is held; its rate a second; where it rests."""
+
+    low: float
+    high: float
+    rate: float
+    rest: float
+
+    @property
+    def span(self) -> float:
+        """How far it is from end to end."""
+        return self.high - self.low
+
+    def beyond(self, recorded: Limit | None) -> bool:
+        """Return whether it goes further than recordings, by more than a tenth of their range."""
+        if recorded is None:
+            return False
+        further = max(recorded.low - self.low, self.high - recorded.high)
+        return further > BEYOND * recorded.span
+
+    @property
+    def crossing(self) -> float:
+        """Time from end to end [s]."""
+        return self.span / self.rate
+
+
+Limits = dict[str, Limit]
+
+
+def limits_of_rig(rig: Rig) -> Limits:
+    """Return what a rig's hardware permits, at a speed that crosses its range in 2 s."""
+    found = {}
+    for name, rest in zip(rig.inputs, rig.resting[0].tolist(), strict=True):
+        ends = rig.limits(name)
+        rate = (ends.high - ends.low) / CROSSING
+        if name == "length":
+            rate = min(rate, float(getattr(rig, "drive_speed", rate)))
+        found[name] = Limit(ends.low, ends.high, rate, rest)
+    return found
+
+
+def limits_of_recordings(known: Excitation) -> Limits:
+    """Return between what ends, and how fast, inputs and loads went; those held in each run stay."""
+    found = {}
+    for name in known.driven:
+        low, high = known.ranges[name]
+        if name.startswith("pressure") and -BELOW_ZERO * high < low < 0.0:
+            low = 0.0
+        rest = min(max(float(known.recordings[0][name][0]), low), high)
+        if known.branches.get(name):
+            rate = max(known.speed(name, branch) for branch in known.branches[name])
+            found[name] = Limit(low, high, rate, rest)
+        else:
+            found[name] = Limit(rest, rest, 1.0, rest)
+    return found
+
+
+def narrowed(limits: Limits, asked: Mapping[str, Iterable[float | None]]) -> Limits:
+    """Return limits of which some are given: by channel low, high and perhaps rate."""
+    found = dict(limits)
+    for name, given in asked.items():
+        if name not in limits:
+            raise DataError(
+                f"limits are given for {name!r}, which is not driven",
+                remedy=f"give them for {', '.join(limits)}",
+            )
+        own, unit = limits[name], standard_unit(name) or ""
+        low, high, rate = (*given, None, None, None)[:3]
+        low = own.low if low is None else low
+        high = own.high if high is None else high
+        if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+            raise DataError(
+                f"the limits {low:g} to {high:g} {unit} are not in order",
+                channel=name,
+                remedy=f"give the lower one first, for instance {name}={own.low:g}:{own.high:g}",
+            )
+        if unit == "bar" and not LOWEST <= low <= high <= HIGHEST:
+            raise DataError(
+                f"the limits {low:g} to {high:g} bar are no muscle's",
+                channel=name,
+                remedy=f"give what your valve and muscle bear, for instance {name}=0:6",
+            )
+        if rate is None:
+            rate = own.rate if own.span > 0 or high == low else (high - low) / CROSSING
+        if not 0 < rate < math.inf:
+            raise DataError(
+                f"nothing moves at {rate:g} {unit}/s",
+                channel=name,
+                remedy=f"give a positive rate, for instance {name}={low:g}:{high:g}:{own.rate:.3g}",
+            )
+        found[name] = Limit(low, high, rate, min(max(own.rest, low), high))
+    return found
+
+
+def check_possible(limits: Limits, seconds: float, rig: Rig | None) -> None:
+    """Refuse limits in which nothing moves, that take too long, or beyond what a rig permits."""
+    for name, limit in limits.items():
+        unit = standard_unit(name) or ""
+        ends = rig.limits(name) if rig is not None and name in rig.inputs else limit
+        if limit.low < ends.low or limit.high > ends.high:
+            raise DataError(
+                f"the limits {limit.low:g} to {limit.high:g} {unit} are beyond the {ends.low:g} to "
+                f"{ends.high:g} {unit} of the rig",
+                channel=name,
+                remedy="stay within these",
+            )
+        if limit.crossing > SHARE_OF_WAYS * seconds:
+            needed = math.ceil(limit.crossing / SHARE_OF_WAYS / 6) / 10
+            raise DataError(
+                f"at {limit.rate:.3g} {unit}/s, it takes {limit.crossing:.3g} s of {seconds:g} s from "
+                "end to end",
+                channel=name,
+                remedy=f"give --minutes {needed:g} or more, a higher rate, or limits closer together",
+            )
+    if not any(limit.span > 0 for limit in limits.values()):
+        raise DataError(
+            f"none of {', '.join(limits)} may move", remedy="give wider limits with --limits"
+        )
+
+
+def parsed(items: Iterable[str]) -> dict[str, list[float | None]]:
+    """Return limits from texts CHANNEL=LOW:HIGH[:RATE], of which numbers may be left out.
+
+    >>> parsed(["pressure=1:5.5", "force=::20"])
+    {'pressure': [1.0, 5.5], 'force': [None, None, 20.0]}
+    """
+    found = {}
+    for item in items:
+        name, equals, text = item.partition("=")
+        parts = text.split(":")
+        try:
+            if not (name and equals and text and 2 <= len(parts) <= 3):
+                raise ValueError
+            found[name] = [float(part) if part else None for part in parts]
+        except ValueError:
+            raise DataError(
+                f"--limits {item!r} is not of the form CHANNEL=LOW:HIGH or CHANNEL=LOW:HIGH:RATE",
+                remedy="write for instance --limits pressure=1:5.5:2, which is bar and bar/s",
+            ) from None
+    return found

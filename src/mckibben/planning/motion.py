@@ -1,0 +1,96 @@
+"""Motion for a recording: random motion of everything within limits, full cycles, and holds."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.planning.limits import Limits
+
+SLOWEST = 10.0
+"""Times longer than at the highest rate that a stroke of random motion takes, at most."""
+
+STROKES = 12.0
+"""Strokes over the whole range, at the slowest speed, for which there must be time."""
+
+SHARE = 0.3
+"""Most of the time that holds take, and that full cycles take."""
+
+HOLD = 10.0
+"""Shortest hold [s]."""
+
+CYCLES = 2
+"""Full cycles of everything together: what comes twice shows how well motion repeats."""
+
+PEAK = np.pi / 2
+"""Highest over mean speed of a half cosine."""
+
+Parts = list[tuple[str, Array]]
+"""What each part is for, and its commands, shape (n, channels)."""
+
+
+def motion(
+    limits: Limits, seconds: float, step: float, wanted: set[str], rng: np.random.Generator
+) -> Parts:
+    """Return motion that starts and ends at rest, in parts.
+
+    Random motion comes first; full cycles and holds follow where they are wanted and there is time.
+
+    Parameters
+    ----------
+    limits : Limits
+    seconds, step : float
+        Duration of all, and sample time [s].
+    wanted : set of str
+        "repeats" for full cycles, "holds" for holds.
+    """
+    low, high, rest = (
+        np.array([getattr(one, end) for one in limits.values()]) for end in ("low", "high", "rest")
+    )
+    crossing = PEAK * max(one.crossing for one in limits.values())
+    stops: list[tuple[str, Array, float]] = []  # levels to go to, and how long to stay there
+    if "repeats" in wanted and (2 * CYCLES + 1) * crossing <= SHARE * seconds:
+        stops += [("repeats", end, 0.0) for end in (low, *(high, low) * CYCLES)]
+    for count in (2, 1) if "holds" in wanted else ():
+        stays = SHARE * seconds / count - crossing
+        if stays >= HOLD:
+            shares = rng.uniform(0.15, 0.85, (count, low.size))
+            stops += [("holds", level, stays) for level in low + shares * (high - low)]
+            break
+    stops.append(("rest", rest, 0.0))
+    ways = [crossing, *(_lasts(limits, a, b) for (_, a, _), (_, b, _) in pairwise(stops))]
+    left = seconds - sum(ways) - sum(stays for *_, stays in stops) - step * len(stops)
+    parts = [("random", _strokes(limits, left, step, rng))]
+    for what, level, stays in stops:
+        here = parts[-1][1][-1]
+        count = max(int(np.ceil(_lasts(limits, here, level) / step)), 1)
+        share = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, count + 1) / count)[:, np.newaxis]
+        stay = np.tile(level, (round(stays / step), 1))
+        parts.append((what, np.concatenate([here + share * (level - here), stay])))
+    idle = round(seconds / step) - sum(len(part) for _, part in parts)
+    return [*parts, ("rest", np.tile(rest, (max(idle, 0), 1)))]
+
+
+def _strokes(limits: Limits, seconds: float, step: float, rng: np.random.Generator) -> Array:
+    """Go between random levels by half cosines of random speeds, each channel for itself."""
+    columns = []
+    for limit in limits.values():
+        slowest = np.clip(seconds / (STROKES * PEAK * max(limit.crossing, step)), 1.0, SLOWEST)
+        times, levels = [0.0], [limit.rest]
+        while times[-1] < seconds:
+            levels.append(float(rng.uniform(limit.low, limit.high)))
+            lasts = PEAK * abs(levels[-1] - levels[-2]) / limit.rate
+            times.append(times[-1] + max(lasts * float(slowest ** rng.uniform()), step))
+        time = step * np.arange(round(seconds / step))
+        at = np.searchsorted(times, time, side="right") - 1
+        share = 0.5 - 0.5 * np.cos(np.pi * (time - np.take(times, at)) / np.diff(times)[at])
+        columns.append(np.take(levels, at) + np.diff(levels)[at] * share)
+    return np.column_stack(columns)
+
+
+def _lasts(limits: Limits, here: Array, there: Array) -> float:
+    """Return how long half cosines of all channels take from one level to another [s]."""
+    ways = zip(limits.values(), (there - here).tolist(), strict=True)
+    return PEAK * max(abs(way) / limit.rate for limit, way in ways)

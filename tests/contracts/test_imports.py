@@ -25,7 +25,7 @@ LAYERS = (
     {"environments"},
     {"bands"},
     {"comparison"},
-    {"validation", "excitation"},
+    {"validation", "excitation", "diagnosis"},
     {"studying"},
     {"papers", "measured"},
     {"report"},

@@ -1,0 +1,1 @@
+"""Recordings and models diagnosed: what is in them, and what they miss."""

@@ -21,20 +21,21 @@ def check(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Say whether a saved model is right on recordings, and what it misses, in words and on a page.
+    """Test whether a saved model is right on recordings, and what it misses.
 
-    The model runs free. What it leaves is tested for being noise that follows nothing recorded: no
-    input, load, rate or branch (hysteresis that is left), no hold (creep), no time (drift).
-    Recordings that the model was not fitted to tell most. A folder stands for all recordings in it.
+    The model runs free. Its residual is tested for following a lag, inputs, their branches (hysteresis),
+    loads, time (drift), speed, holds (creep) and position. Recordings that the model was not fitted to
+    say most. A folder stands for all recordings in it.
     """
     from mckibben.blocks.saving import load
+    from mckibben.diagnosis.check import check as find
+    from mckibben.diagnosis.description import describe
     from mckibben.files.sources import expanded
     from mckibben.outputs import Results
     from mckibben.recording import notes_by_file
     from mckibben.report.check_page import check_page
+    from mckibben.report.words import check_sentences, check_verdict
     from mckibben.system.atomic import to_json
-    from mckibben.validation.check import check as find
-    from mckibben.validation.describing import describe
 
     folder = make_folder(out)
     *_, found_files = expanded([], list(files))
@@ -45,7 +46,10 @@ def check(
     recordings = reading.read(found_files, list(dict.fromkeys(wanted)), informative=False)
     found = find(block, recordings)
     description = describe(block, recordings, fitted=False)
+    verdict, sentences = check_verdict(found), check_sentences(found)
     told = found.to_dict() | {
+        "verdict": verdict,
+        "sentences": sentences,
         "description": description.to_dict(),
         "model_file": str(model),
         "notes_of_reading": notes_by_file(recordings),
@@ -55,9 +59,9 @@ def check(
     if as_json:
         print_json({"folder": str(folder)} | told)
         return
-    say(found.verdict)
-    for sentence in found.sentences:
+    say(verdict)
+    for sentence in sentences:
         say(f"- {sentence}")
-    for note in found.notes:
-        say(f"Note: {note}")
+    if found.untested:
+        say(f"Too short to be tested: {', '.join(found.untested)}")
     say(f"Written: {folder / 'report.html'}, validation.json")

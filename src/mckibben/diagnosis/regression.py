@@ -61,11 +61,14 @@ class FTest:
         Columns that add something to the others.
     explained : float
         Sum of squares of the series that they explain beside the others.
+    by_noise : float
+        What they would explain of noise alone, on average.
     """
 
     p_value: float
     freedom: int
     explained: float
+    by_noise: float
 
 
 class Regression:
@@ -90,7 +93,8 @@ class Regression:
         size = np.sqrt(np.mean(whole**2, axis=0))
         self._size = np.where(size > 0, size, 1.0)
         self._plain = whole / self._size
-        tables = np.split(self._plain, np.cumsum([len(table) for table in tables])[:-1])
+        self._ends = np.cumsum([len(table) for table in tables])[:-1]
+        tables = np.split(self._plain, self._ends)
         self._partial, self._doubt = self._fitted_noise(tables)
         order = self._partial.size
         whitener = _whitener(self._partial)
@@ -109,12 +113,13 @@ class Regression:
         """Test some of the columns beside others, all given by their places."""
         from scipy.special import fdtrc
 
-        own = _added(self._plain, chosen, beside).T @ self._plain[:, -1]
-        explained = float(own @ own) * float(self._size[-1]) ** 2
+        plain = _added(self._plain, chosen, beside)
+        explained = float(np.sum((plain.T @ self._plain[:, -1]) ** 2)) * float(self._size[-1]) ** 2
+        by_noise = float(sum(np.sum(self.noise.coloured(u) ** 2) for u in np.split(plain, self._ends)))
         new = _added(self._white, chosen, beside)
         q = new.shape[1]
         if q == 0 or self._variance <= 0:
-            return FTest(1.0, 0, explained)
+            return FTest(1.0, 0, explained, by_noise)
         along = new.T @ self._white[:, -1]
         unsure = self._unsure(chosen, beside, q)
         freedom = 2 / (2 / self._freedom + unsure)
@@ -126,7 +131,7 @@ class Regression:
         below = max(freedom - q + 1, 1.0)
         squared = along @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ along
         differing = fdtrc(q, below, squared / q * below / max(freedom, below))
-        return FTest(float(max(alike, differing)), q, explained)
+        return FTest(float(max(alike, differing)), q, explained, by_noise)
 
     def coefficients(self, chosen: Places) -> Array:
         """Return the coefficients of columns that follow the whitened series best, shape (k,)."""
@@ -144,7 +149,7 @@ class Regression:
 
         fitted, _ = _basis(self._plain[:, :-1])
         left = self._plain[:, -1] - fitted @ (fitted.T @ self._plain[:, -1])
-        burg = autoregression(np.split(left, np.cumsum([len(table) for table in tables])[:-1]))
+        burg = autoregression(np.split(left, self._ends))
         spare = max(len(left) - fitted.shape[1], 0) // SAMPLES_PER_TERM
         start = _partial(burg.coefficients)[: min(MOST_ORDER, spare)]
         order = start.size

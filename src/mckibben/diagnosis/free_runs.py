@@ -1,0 +1,183 @@
+"""What a model makes of recordings, running free; or why they say nothing of it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.comparison.free_run import PERIODIC, measured_start, refuse_runaway, run_free
+from mckibben.comparison.shared_rows import check_shared
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+
+FEWEST = 60
+"""Samples of all recordings together below which nothing can be tested."""
+
+SHORTEST = 10
+"""Samples of one recording."""
+
+SHIFTS = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
+"""Root mean squares of the residual by which the first measured output may be off."""
+
+SAME_TIME = 1e-3
+"""Relative difference up to which sample times are equal."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One recording, and what the model makes of it.
+
+    Parameters
+    ----------
+    recording : Recording
+        Measured.
+    inputs : array, shape (n, k)
+        What the model is given.
+    measured, modelled : array, shape (n, m)
+        Outputs; the model runs free.
+    start_chosen : bool
+        Whether its memory starts from that of a few starts which leaves least of the whole recording;
+        else as a leaderboard has it.
+    """
+
+    recording: Recording
+    inputs: Array
+    measured: Array
+    modelled: Array
+    start_chosen: bool = False
+
+    @property
+    def residual(self) -> Array:
+        """Measured less modelled, shape (n, m)."""
+        return self.measured - self.modelled
+
+
+def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
+    """Return a model's free runs over recordings.
+
+    Raises
+    ------
+    DataError
+        On no recordings, absent channels, too few samples, sample times that differ, or channels that
+        are constant throughout.
+    ModelError
+        Where the model's output is not finite.
+    """
+    check_usable(block, recordings)
+    inputs = [channel.name for channel in block.inputs]
+    outputs = [channel.name for channel in block.outputs]
+    check_shared({"check": recordings}, inputs, outputs)
+    found = []
+    for recording in recordings:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore", RuntimeWarning)
+            modelled = _modelled(block, recording, outputs, recordings)
+        measured = recording.matrix(outputs)
+        refuse_runaway(block, recording, modelled, measured)
+        chosen = block.n_states > 0 and not recording.meta.get(PERIODIC)
+        found.append(Run(recording, recording.matrix(inputs), measured, modelled, chosen))
+    return tuple(found)
+
+
+def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
+    """Refuse recordings that say nothing of a model; see `runs_of`."""
+    if not recordings:
+        raise DataError("there is no recording to check the model on", remedy="give at least one")
+    for recording in recordings:
+        _refuse(recording, block, recordings[0].sample_time)
+    total = sum(map(len, recordings))
+    if total < FEWEST:
+        raise DataError(
+            f"{total} samples are too few to tell a wrong model from noise",
+            file=recordings[0].source,
+            remedy=f"record at least {FEWEST}, better ten cycles with 50 or more each",
+        )
+    driven = [c.name for c in block.inputs if c.name not in block.scheduling]
+    if all(_constant(recordings, name) for name in driven):
+        raise DataError(
+            "the input is constant, so that nothing tells what the model does when it moves",
+            file=recordings[0].source,
+            channel=driven[0],
+            remedy="record while it moves",
+        )
+    for channel in block.outputs:
+        if _constant(recordings, channel.name):
+            raise DataError(
+                "the output is constant, as of a sensor that is stuck",
+                file=recordings[0].source,
+                channel=channel.name,
+                remedy="record while it moves, or name another column with --column",
+            )
+
+
+def _modelled(
+    block: Block, recording: Recording, outputs: Sequence[str], recordings: Sequence[Recording]
+) -> Array:
+    """Return modelled outputs, from the start of the memory that explains the whole recording best.
+
+    The excursion before the first sample that explains the first measured output is known no better
+    than that one sample, and a memory may keep the error for long. So outputs about the first one are
+    tried, and the block's own rule.
+    """
+    free = run_free(block, recording, outputs, recordings)
+    if block.n_states == 0 or recording.meta.get(PERIODIC):
+        return free
+    tried = [block.simulate(recording).matrix(outputs), free]
+    if not np.mean((tried[0] - free) ** 2) > 0:
+        return free
+    measured = recording.matrix(outputs)
+    noise = float(np.sqrt(np.mean((measured[:, 0] - free[:, 0]) ** 2)))
+    for shift in SHIFTS:
+        first = np.append(measured[0, 0] + shift * noise, measured[1:, 0])
+        units = {outputs[0]: recording.units[outputs[0]]}
+        start = measured_start(
+            block, recording.with_channels(units, **{outputs[0]: first}), outputs
+        )
+        tried.append(block.simulate(recording, initial=start.tolist()).matrix(outputs))
+    errors = [float(np.sum((measured - one) ** 2)) for one in tried]
+    return tried[int(np.nanargmin(errors))] if np.isfinite(errors).any() else free
+
+
+def _refuse(recording: Recording, block: Block, step: float | None) -> None:
+    for what, channels in (("reads", block.inputs), ("gives", block.outputs)):
+        for channel in channels:
+            if channel.name not in recording:
+                raise DataError(
+                    f"the model {what} this channel, and the recording lacks it",
+                    file=recording.source,
+                    channel=channel.name,
+                    remedy=f"name its column: --column {channel.name}=COLUMN",
+                )
+            if recording.units[channel.name] != channel.unit:
+                raise DataError(
+                    f"the model wants {channel.unit or 'no unit'}, the recording has "
+                    f"{recording.units[channel.name] or 'no unit'}",
+                    file=recording.source,
+                    channel=channel.name,
+                    remedy="convert the recording, or name its unit when reading it",
+                )
+    if len(recording) < SHORTEST:
+        raise DataError(
+            f"{len(recording)} samples are too few: what a residual remembers is longer",
+            file=recording.source,
+            remedy=f"leave this recording out, or record at least {SHORTEST} samples",
+        )
+    own = recording.sample_time
+    if (own is None) != (step is None) or (
+        own is not None and step is not None and abs(own - step) > SAME_TIME * step
+    ):
+        said = ["without time" if t is None else f"{t:g} s" for t in (step, own)]
+        raise DataError(
+            f"recordings differ in sample time: {said[0]} and {said[1]}",
+            file=recording.source,
+            remedy="check them one by one, or resample them with --resample",
+        )
+
+
+def _constant(recordings: Sequence[Recording], name: str) -> bool:
+    return bool(np.ptp(np.concatenate([recording[name] for recording in recordings])) == 0)

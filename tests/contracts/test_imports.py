@@ -25,7 +25,7 @@ LAYERS = (
     {"environments"},
     {"bands"},
     {"comparison"},
-    {"validation", "excitation", "diagnosis"},
+    {"excitation", "diagnosis"},
     {"studying"},
     {"papers", "measured"},
     {"report"},

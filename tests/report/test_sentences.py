@@ -24,11 +24,11 @@ import mckibben
 from mckibben import PI, Recording
 from mckibben.comparison.row import Memory, Row
 from mckibben.control import Twin, track
+from mckibben.diagnosis.description import describe
 from mckibben.excitation import untold
 from mckibben.report.page import page
 from mckibben.report.wording import next_steps, verdict
 from mckibben.studying.study import Study
-from mckibben.validation.describing import describe
 from tests.report.studies_by_hand import QUICKLY, TIME, hung, study, two_muscles
 
 FOLDER = Path(__file__).parent / "sentences"

@@ -10,6 +10,8 @@ import typer
 from mckibben.cli.grouping import spread
 from mckibben.cli.options import Files, Force, Json, Reading
 from mckibben.cli.output import make_folder, print_json, say
+from mckibben.errors import DataError
+from mckibben.recording import Recording
 
 
 @spread
@@ -43,7 +45,7 @@ def check(
     results.claim(["validation.json", "report.html"])
     block = load(model)
     wanted = [channel.name for channel in (*block.inputs, *block.outputs)]
-    recordings = reading.read(found_files, list(dict.fromkeys(wanted)), informative=False)
+    recordings = _with_loads(reading, found_files, list(dict.fromkeys(wanted)))
     found = find(block, recordings)
     description = describe(block, recordings, fitted=False)
     verdict, sentences = check_verdict(found), check_sentences(found)
@@ -65,3 +67,14 @@ def check(
     if found.untested:
         say(f"Too short to be tested: {', '.join(found.untested)}")
     say(f"Written: {folder / 'report.html'}, validation.json")
+
+
+def _with_loads(reading: Reading, files: list[Path], wanted: list[str]) -> list[Recording]:
+    """Return recordings with all their channels where those are read as well, as loads are."""
+    recordings = reading.read(files, wanted, informative=False)
+    try:
+        whole = reading.read(files, None, informative=False)
+    except DataError:
+        return recordings
+    alike = [len(one) for one in whole] == [len(one) for one in recordings]
+    return whole if alike and all(set(wanted) <= set(one.channels) for one in whole) else recordings

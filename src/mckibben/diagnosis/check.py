@@ -19,6 +19,7 @@ from mckibben.recording import Recording, listed
 from mckibben.signals.reversals import noise_level
 from mckibben.system.progress import Tell, one_by_one, telling
 from mckibben.system.showing import DrawsItself
+from mckibben.system.threads import one_blas_thread
 
 LEVEL = 0.01
 """How often a right model is said to miss something, all tests of all outputs together (Bonferroni)."""
@@ -235,6 +236,11 @@ def check(
 
 def check_runs(model: Block, runs: Sequence[Run], tell: Tell | None = None) -> Validation:
     """Check a model by what it made of recordings, running free; see `check`."""
+    with one_blas_thread():
+        return _checked(model, runs, tell)
+
+
+def _checked(model: Block, runs: Sequence[Run], tell: Tell | None) -> Validation:
     every = block_length(model, runs)
     tested = [run for run in runs if len(run.inputs) // every >= FEWEST_BLOCKS] or list(runs)
     outputs = tuple(
@@ -318,7 +324,9 @@ class _Search:
                 left = [group for group in left if group is not best and group.kind not in others]
         return tuple(found)
 
-    def finding(self, group: Group, known: tuple[int, ...], others: tuple[str, ...] = ()) -> Finding:
+    def finding(
+        self, group: Group, known: tuple[int, ...], others: tuple[str, ...] = ()
+    ) -> Finding:
         """Return what a group explains beside others, with what it is tested beside."""
         explained = self._explained(group, known).explained
         coefficient = None

@@ -108,14 +108,23 @@ class Regression:
         deviation = float(np.sqrt(self._variance) * self._size[-1])
         variance = deviation**2 / float(np.prod(1 - np.tanh(self._partial) ** 2))
         self.noise = Autoregression(-whitener[1:], deviation, variance)
+        self._tested: dict[tuple[tuple[int, ...], tuple[int, ...]], FTest] = {}
 
     def test(self, chosen: Places, beside: Places = ()) -> FTest:
         """Test some of the columns beside others, all given by their places."""
+        key = (tuple(chosen), tuple(beside))
+        if key not in self._tested:
+            self._tested[key] = self._test(*key)
+        return self._tested[key]
+
+    def _test(self, chosen: Places, beside: Places) -> FTest:
         from scipy.special import fdtrc
 
         plain = _added(self._plain, chosen, beside)
         explained = float(np.sum((plain.T @ self._plain[:, -1]) ** 2)) * float(self._size[-1]) ** 2
-        by_noise = float(sum(np.sum(self.noise.coloured(u) ** 2) for u in np.split(plain, self._ends)))
+        by_noise = float(
+            sum(np.sum(self.noise.coloured(u) ** 2) for u in np.split(plain, self._ends))
+        )
         new = _added(self._white, chosen, beside)
         q = new.shape[1]
         if q == 0 or self._variance <= 0:

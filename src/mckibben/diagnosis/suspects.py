@@ -14,8 +14,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.diagnosis.free_runs import Run
 from mckibben.blocks.hysteresis.pi import PI
+from mckibben.diagnosis.free_runs import Run
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import reversals
 
@@ -72,7 +72,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Suspects:
-    """The columns of all recordings, (blocks, k) each, and their groups; ``every`` samples to a block."""
+    """The columns of all recordings, (blocks, k) each, of blocks of ``every`` samples; their groups."""
 
     every: int
     tables: tuple[Array, ...]
@@ -100,7 +100,11 @@ def suspects(block: Block, runs: Sequence[Run], output: int, every: int) -> Susp
     groups: list[Group] = []
 
     def add(
-        kind: str, channel: str, columns: Sequence[Array], beside: Sequence[int] = (), delay: int = 0
+        kind: str,
+        channel: str,
+        columns: Sequence[Array],
+        beside: Sequence[int] = (),
+        delay: int = 0,
     ) -> tuple[int, ...]:
         first = sum(part.shape[1] for part in parts[0])
         places = tuple(range(first, first + columns[0].shape[1]))
@@ -132,7 +136,9 @@ def suspects(block: Block, runs: Sequence[Run], output: int, every: int) -> Susp
         add("creep", "", [_creeping(y, longest) for y in modelled], level)
     add("output", "", _hats(modelled, KNOTS), level)
     own = np.eye(len(runs))[:, 1:]
-    add("runs", "", [np.tile(row, (len(y), 1)) for row, y in zip(own, modelled, strict=True)], level)
+    add(
+        "runs", "", [np.tile(row, (len(y), 1)) for row, y in zip(own, modelled, strict=True)], level
+    )
     return Suspects(every, tuple(np.concatenate(own, axis=1) for own in parts), tuple(groups))
 
 
@@ -182,9 +188,9 @@ def _hats(parts: Sequence[Array], knots: int) -> list[Array]:
     """Return piecewise-linear functions between knots that have as many samples between them."""
     at = np.unique(np.quantile(np.concatenate(parts), np.linspace(0, 1, knots)))
     return [
-        np.column_stack([np.zeros(part.size), *(np.interp(part, at, r) for r in np.eye(at.size)[1:])])[
-            :, 1:
-        ]
+        np.column_stack(
+            [np.zeros(part.size), *(np.interp(part, at, r) for r in np.eye(at.size)[1:])]
+        )[:, 1:]
         for part in parts
     ]
 

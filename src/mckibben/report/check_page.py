@@ -16,8 +16,8 @@ from mckibben.report import (
 )
 
 if TYPE_CHECKING:
-    from mckibben.diagnosis.description import ModelDescription
     from mckibben.diagnosis.check import Validation
+    from mckibben.diagnosis.description import ModelDescription
 
 MOST_RECORDINGS = 4
 """Recordings with figures of their own: the longest."""

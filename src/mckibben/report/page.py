@@ -19,6 +19,7 @@ from mckibben.report import (
     subjects,
     templating,
     wording,
+    words,
 )
 from mckibben.report.answers import answers
 from mckibben.report.commands import Typed, commands
@@ -28,9 +29,9 @@ from mckibben.report.shown import Shown, drawn, shown, unique
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard
     from mckibben.comparison.row import Row
+    from mckibben.diagnosis.check import OutputCheck
     from mckibben.recording import Recording
     from mckibben.studying.study import Study
-    from mckibben.validation.results import OutputCheck
 
 N_VALUES = 180_000
 """Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""
@@ -109,6 +110,7 @@ def page(study: Study, typed: Typed | None = None) -> str:
         commands=commands(study, typed),
         answers=answers(study),
         checked=checked(study),
+        words=words,
         description=study.description,
         review=study.review,
     )

@@ -35,7 +35,9 @@ def check_sentences(found: Validation) -> list[str]:
             own.append(f"It is {'' if white else 'not '}white ({_p(one.whiteness.p_value)}).")
         if one.missing and not one.exact:
             own.append(_advice(one.missing[0]))
-        said += [f"{one.output}: {each}" if len(found.outputs) > 1 else each for each in own if each]
+        said += [
+            f"{one.output}: {each}" if len(found.outputs) > 1 else each for each in own if each
+        ]
     return said
 
 
@@ -117,6 +119,7 @@ def _p(value: float) -> str:
 
 def _percent(share: float) -> str:
     return f"{numeral(100 * share, 2)} %"
+
 
 # --- Data gaps and plans ----------------------------------------------------------------------------
 

@@ -19,6 +19,8 @@ from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.standing import Standing
 from mckibben.control import Tracked
 from mckibben.control.twin import COMMAND
+from mckibben.diagnosis.check import Validation
+from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.errors import DataError
 from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording, listed
@@ -29,8 +31,6 @@ from mckibben.studying.loops import closed_loops, named, recorded_rig
 from mckibben.studying.reviewing import Review, review
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
-from mckibben.validation.describing import ModelDescription, describe
-from mckibben.validation.results import Validation
 
 
 @dataclass(frozen=True, repr=False)

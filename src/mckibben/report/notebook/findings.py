@@ -9,9 +9,10 @@ import numpy as np
 
 from mckibben.characterization.results import Characterization
 from mckibben.control.loop import Tracked
+from mckibben.diagnosis.check import OutputCheck, Validation
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
-from mckibben.report import model_subjects, review_subjects
+from mckibben.report import check_subjects, model_subjects, review_subjects, words
 from mckibben.report.drawing import Curve, Drawing, Panel, axis_label
 from mckibben.report.notebook.card import Card
 from mckibben.report.notebook.face import Draw, Face

@@ -2,8 +2,7 @@
 
     python benchmarks/validation.py --seeds 100
 
-`right`: the truth with noise of several kinds; share of checks that find anything, of 1 % asked for, and
-the same of the F-test alone and of the Wald test alone that each test is the larger p-value of.
+`right`: the truth with noise of several kinds; share of checks that find anything, of 1 % asked for.
 `faults`: virtual plants whose physics is no model of the package, checked against themselves without
 the fault; share of checks that name it first.
 """

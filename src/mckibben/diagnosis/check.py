@@ -54,7 +54,7 @@ class Finding:
     p_value : float
         Probability of noise that looks so, beside what was found before.
     share : float
-        Of the residual's mean square that it explains, 0 to 1, beside what was found before.
+        Of the residual's variance that it explains, 0 to 1, beside what was found before.
     size : float
         The same as a root mean square, unit of the output.
     coefficient : float or None
@@ -297,8 +297,9 @@ class _Search:
         self, regression: Regression, left: Sequence[Array], groups: Sequence[Group], level: float
     ) -> None:
         self.regression, self.groups, self.level = regression, groups, level
-        self.total = float(sum(e @ e for e in left)) or 1.0
-        self.n = sum(map(len, left))
+        whole = np.concatenate(left)
+        self.n, self.squares = whole.size, float(whole @ whole)
+        self.about_mean = self.squares - whole.size * float(whole.mean()) ** 2
 
     def missing(self) -> tuple[Finding, ...]:
         """Return what is certain, each beside those before."""
@@ -310,58 +311,52 @@ class _Search:
         ):
             # an offset beside a curve that has a mean of its own is not determined
             left = [group for group in wave if group.kind != "offset" or not found]
-            while certain := [g for g in left if self._p(g, (*known, *g.beside)) <= self.level]:
+            while certain := [g for g in left if self._test(g, known).p_value <= self.level]:
                 best = max(certain, key=lambda group: self._gain(group, known))
                 others = [
                     group.kind
                     for group in certain
                     if group is not best
-                    and self._p(best, (*known, *best.beside, *group.beside, *group.columns))
+                    and self._test(best, (*known, *group.beside, *group.columns)).p_value
                     > self.level
                 ]
                 found.append(self.finding(best, known, tuple(dict.fromkeys(others))))
-                known = _union(known, best.beside, best.columns)
+                known = (*known, *best.columns)
                 left = [group for group in left if group is not best and group.kind not in others]
         return tuple(found)
 
     def finding(
         self, group: Group, known: tuple[int, ...], others: tuple[str, ...] = ()
     ) -> Finding:
-        """Return what a group explains beside others, with what it is tested beside."""
-        explained = self._explained(group, known).explained
-        coefficient = None
+        """Return what a group explains beside others."""
+        test = self._test(group, known)
+        coefficient, total = None, self.about_mean
         if group.kind == "lag":
             coefficient = float(group.delay)
         elif group.kind == "offset":
             coefficient = float(self.regression.coefficients(group.columns)[0])
+            total = self.squares
         return Finding(
-            group.kind,
-            group.channel,
-            self._p(group, (*known, *group.beside)),
-            min(explained / self.total, 1.0),
-            float(np.sqrt(explained / self.n)),
-            coefficient,
-            others,
+            *(group.kind, group.channel, test.p_value),
+            share=min(test.explained / total, 1.0) if total > 0 else 0.0,
+            size=float(np.sqrt(test.explained / self.n)),
+            coefficient=coefficient,
+            or_kinds=others,
         )
 
-    def _p(self, group: Group, beside: Sequence[int]) -> float:
-        return self.regression.test(group.columns, _without(beside, group.columns)).p_value
-
-    def _explained(self, group: Group, known: tuple[int, ...]) -> FTest:
-        return self.regression.test(_without(_union(group.beside, group.columns), known), known)
+    def _test(self, group: Group, known: Sequence[int]) -> FTest:
+        beside = set(known) | set(group.beside)
+        return self.regression.test(group.columns, tuple(sorted(beside - set(group.columns))))
 
     def _gain(self, group: Group, known: tuple[int, ...]) -> float:
-        """Return how much more a group explains than noise would, by Mallows' C_p, beside the mean."""
-        found = self._explained(group, _union(known, self.groups[0].columns))
+        """Return how much more a group explains than noise would, by Mallows' C_p, beside the mean.
+
+        With what it is beside: a branch by region may move the curve as well.
+        """
+        before = set(known) | set(self.groups[0].columns)
+        new = {*group.beside, *group.columns} - before
+        found = self.regression.test(tuple(sorted(new)), tuple(sorted(before)))
         return found.explained - 2 * found.by_noise
-
-
-def _union(*places: Sequence[int]) -> tuple[int, ...]:
-    return tuple(sorted({place for some in places for place in some}))
-
-
-def _without(places: Sequence[int], others: Sequence[int]) -> tuple[int, ...]:
-    return tuple(sorted(set(places) - set(others)))
 
 
 def _resolution(measured: Sequence[Array]) -> float:

@@ -232,11 +232,11 @@ def _trends(modelled: Sequence[Array]) -> list[Array]:
 
 
 def _speeds(modelled: Array) -> Array:
-    """Return functions of the modelled output's speed."""
+    """Return functions of the modelled output's speed; what is linear in it is a lag."""
     rate = np.gradient(modelled)
     rate = rate / (np.sqrt(np.mean(rate**2)) or 1.0)
     root = np.sign(rate) * np.sqrt(np.abs(rate))
-    return np.column_stack([rate, np.abs(rate), root, rate * modelled])
+    return np.column_stack([np.abs(rate), root, rate * modelled])
 
 
 def _longest_hold(names: Sequence[str], runs: Sequence[Run], shortest: int) -> int:

@@ -67,7 +67,7 @@ _KINDS = {
     "drift": "time within a recording (drift)",
     "speed": "the speed of the output",
     "creep": "slow motion in holds (creep)",
-    "output": "the position (such as an end stop)",
+    "output": "the position (a curve or an end stop)",
 }
 
 _ADVICE = {
@@ -96,7 +96,7 @@ def _residual(one: OutputCheck) -> str:
         return f"{residual} follows none of {one.n_tests} causes tested."
     first = one.missing[0]
     return (
-        f"{residual} follows {missed(one, first)}: {_percent(first.share)} of its mean square, "
+        f"{residual} follows {missed(one, first)}: {_percent(first.share)} of its variance, "
         f"{_p(first.p_value)}."
     )
 
@@ -105,7 +105,7 @@ def _missed(one: OutputCheck, finding: Finding) -> str:
     what = missed(one, finding)
     return (
         f"{what[0].upper()}{what[1:]}: {numeral(finding.size, 2)} {one.unit} RMS, "
-        f"{_percent(finding.share)} of the residual's mean square ({_p(finding.p_value)})."
+        f"{_percent(finding.share)} of the residual's variance ({_p(finding.p_value)})."
     )
 
 

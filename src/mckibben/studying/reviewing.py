@@ -348,7 +348,7 @@ def _delay(table: Suspects, runs: Sequence[Run], one: OutputCheck, place: int) -
     others = [
         column
         for each in one.missing
-        if each.kind != "lag"
+        if each.kind not in ("lag", "output")  # a curve of the modelled motion holds its delay
         for column in _columns(table, each.kind, each.channel)
     ]
     others = list(dict.fromkeys([*_columns(table, "offset", ""), *others]))

@@ -16,8 +16,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from tests.validation.runs import noise
-from tests.validation.test_parameters import MODELS, STEP, fitted
+from tests.diagnosis.runs import noise
+from tests.diagnosis.test_parameters import MODELS, STEP, fitted
 
 from mckibben import Recording, statistics
 from mckibben.validation import parameters as told

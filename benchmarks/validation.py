@@ -1,113 +1,171 @@
-"""How often `mckibben.check` rejects a right model, and how often it finds a wrong one.
+"""How often `mckibben.check` rejects a right model, and which fault of a wrong one it names first.
 
-    python benchmarks/validation.py --seeds 400
+    python benchmarks/validation.py --seeds 100
 
-`right`: true models under white noise and under noise of correlation 0.9. Share of seeds in which the
-tests of whiteness (for white noise only) and of branches reject at 1 %, and in which the verdict names
-anything. In 400 seeds a right test has 0.5 to 1.5 % four times out of five. `wrong`: the same of a
-straight line fitted to a play and noise.
+`right`: the truth with noise of several kinds; share of checks that find anything, of 1 % asked for.
+`faults`: virtual plants whose physics is no model of the package, checked against themselves without
+the fault; share of checks that name it first.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from importlib import import_module
 from itertools import product
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
+from tests.plants import motions
 
-from mckibben import GPI, PI, Block, RateDependentPI, Recording
-from mckibben.signals import random_wave, triangle
+from mckibben import Recording
+from mckibben.arrays import Array
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.diagnosis.check import check_runs
+from mckibben.diagnosis.free_runs import Run
 from mckibben.system.threads import one_blas_thread
-from mckibben.validation.check import check
-from mckibben.validation.level import LEVEL
-
-Array = NDArray[np.float64]
 
 STEP = 0.02
 
-MODELS: dict[str, Callable[[], Block]] = {
-    "pi": lambda: PI(thresholds=(0.0, 0.3, 0.6, 1.0), weights=(3.0, 1.0, 0.7, 0.5)),
-    "gpi": GPI.example,
-    "rdpi": RateDependentPI.example,
+MOTIONS: dict[str, Callable[[np.random.Generator, float], Array]] = {
+    "wander": lambda rng, s: motions.wander(rng, s, STEP, 0.3, 4.8),
+    "waves": lambda rng, s: motions.waves(rng, s, STEP, 0.3, 4.8, (0.04, 0.5)),
+    "ramps": lambda rng, s: motions.ramps(rng, s, STEP, 0.2, 5.0, (0.5, 3.0), 2.0),
+    "stairs": lambda rng, s: motions.stairs(rng, s, STEP, 0.3, 4.8),
+    "loops": lambda rng, s: motions.through([5, 0.3, 5, 1, 4, 1.5, 3.5, 2, 3], s, STEP),
 }
 
-CASES = [
-    *((model, given, 2000) for model in MODELS for given in ("triangle", "random", "multisine")),
-    ("pi", "triangle", 200),
-]
-"""Model, input, samples."""
+NOISES = ("white", "AR(0.9)", "AR(0.98)", "AR(0.995)", "by input", "by input, AR(0.9)", "quantised")
+
+RUNS = {"60 s": (60.0,), "6 s": (6.0,), "4 x 15 s": (15.0,) * 4}
+
+FAULTS = {
+    "lag": ("lag",),
+    "load": ("load",),
+    "friction": ("hysteresis",),
+    "contact": ("output", "curve"),
+    "warming": ("drift",),
+}
+"""What is planted, and the kinds that name it."""
+
+PLANTS = ("lugre_muscle", "load_rig", "lifter")
 
 
-def inputs(name: str, n: int, seed: int) -> Array:
-    """Return an input from 0 to 5 bar."""
-    t = STEP * np.arange(n)
-    rng = np.random.default_rng(10_000 + seed)
-    if name == "multisine":
-        waves = [np.sin(2 * np.pi * (f * t + rng.uniform())) for f in np.arange(0.05, 0.8, 0.08)]
-        whole = np.sum(waves, axis=0)
-        return 5 * (whole - whole.min()) / np.ptp(whole)
-    if name == "random":
-        return random_wave(t, 1.0, 5.0, seed=seed)
-    return triangle(t, 6.0, [5.0] if name == "triangle" else [5.0, 4.0, 3.0, 2.0, 4.5, 1.0])
+def noise(kind: str, x: Array, rng: np.random.Generator) -> Array:
+    """Return noise of unit size about, beside an input."""
+    white = rng.standard_normal(x.size + 3000)
+    found = white[3000:]
+    if "AR" in kind:
+        memory = float(kind.split("(")[1].rstrip(")"))
+        found = np.asarray(lfilter([np.sqrt(1 - memory**2)], [1, -memory], white))[3000:]
+    return found * (0.3 + x / 2) if kind.startswith("by input") else found
 
 
-def measured(model: Block, u: Array, share: float, alike: float, *seeds: int) -> Recording:
-    """Return a model's run with noise: a share of its range, neighbours correlated by `alike`."""
-    y = model.simulate(u, sample_time=STEP)
-    white = np.random.default_rng(seeds).standard_normal(u.size + 1000)
-    noise = np.asarray(lfilter([np.sqrt(1 - alike**2)], [1, -alike], white))[1000:]
-    given, found = model.inputs[0], model.outputs[0]
-    channels = {given.name: u, found.name: y + share * np.ptp(y) * noise}
-    return Recording(channels, STEP, {given.name: given.unit, found.name: found.unit})
+def reader(*inputs: str) -> Any:
+    """Return what stands for a model: names of its channels."""
+    channels = [SimpleNamespace(name=name, unit="") for name in inputs]
+    output = SimpleNamespace(name="displacement", unit="mm")
+    return SimpleNamespace(kind="truth", inputs=channels, outputs=[output], scheduling=())
 
 
-def rejections(model: Block, run: Recording) -> list[bool]:
-    """Tell whether whiteness, branches and the verdict reject a model."""
-    one = check(model, run).outputs[0]
-    tests = (one.whiteness.p_value, one.p_branch)
-    return [*(p is not None and p <= LEVEL for p in tests), not one.right]
+def run(pressure: Array, measured: Array, modelled: Array, **loads: Array) -> Run:
+    channels = {"pressure": pressure, "displacement": measured, **loads}
+    columns = np.column_stack([pressure, measured, modelled])
+    return Run(Recording(channels, STEP), columns[:, :1], columns[:, 1:2], columns[:, 2:])
 
 
-def shown(what: str, found: Sequence[Sequence[bool]]) -> None:
-    """Print the shares of models that are rejected."""
-    white, branch, verdict = 100 * np.mean(found, axis=0)
-    shares = f"white {white:5.2f} %  branch {branch:5.2f} %  verdict {verdict:5.2f} %"
-    print(f"{what}: {shares}", flush=True)
-
-
-def right(seeds: int, alike: float) -> None:
-    everything: list[list[bool]] = []
-    for case, (name, given, n) in enumerate(CASES):
-        model, found = MODELS[name](), []
+def right(seeds: int) -> None:
+    truth = PI(thresholds=(0.0, 0.3, 0.6, 1.0), weights=(3.0, 1.0, 0.7, 0.5))
+    every: dict[str, list[bool]] = {}
+    for (name, lengths), motion, kind in product(RUNS.items(), MOTIONS, NOISES):
+        found = []
         for seed in range(seeds):
-            run = measured(model, inputs(given, n, seed), 0.02, alike, case, 0, seed)
-            found.append(rejections(model, run))
-        shown(f"right  {name:4} {given:9} n {n:4} alike {alike}", found)
-        everything += found if n == 2000 else []
-    shown(f"right, all of 2000, alike {alike}", everything)
+            rng = np.random.default_rng((seed, 1))
+            runs = []
+            for seconds in lengths:
+                u = MOTIONS[motion](rng, seconds)
+                modelled = truth.simulate(u)
+                e = 0.02 * np.ptp(modelled) * noise(kind, u, rng)
+                y = modelled + e
+                if kind == "quantised":
+                    y = 0.1 * np.round(y / 0.1)
+                runs.append(run(u, y, modelled))
+            found.append(not check_runs(reader("pressure"), runs).right)
+        every.setdefault(kind, []).extend(found)
+        every.setdefault(name, []).extend(found)
+        every.setdefault(motion, []).extend(found)
+    for kind, found in every.items():
+        print(
+            f"right  {kind:18} rejected {100 * np.mean(found):5.2f} % of {len(found)}", flush=True
+        )
 
 
-def wrong(seeds: int) -> None:
-    motions = ("triangle", "decaying", "random", "multisine")
-    noises = ((0.01, 0.0, 1500), (0.03, 0.0, 1500), (0.02, 0.9, 3000))
-    for given, width, (share, alike, n) in product(motions, (0.05, 0.1, 0.2), noises):
-        play, found = PI(thresholds=(5.0 * width / 2,), weights=(4.0,)), []
-        for seed in range(seeds):
-            run = measured(play, inputs(given, n, seed), share, alike, seed)
-            slope, offset = np.polyfit(run["pressure"], run["displacement"], 1)
-            line = PI(thresholds=(0.0,), weights=(slope,), offset=offset)
-            found.append(rejections(line, run))
-        shown(f"wrong  {given:9} loop {width:4} noise {share} alike {alike} n {n}", found)
+def planted(plant: str, fault: str, motion: str, seed: int) -> tuple[str, ...]:
+    """Return what a check names first of a fault, with what it may be as well."""
+    module, rng = import_module(f"tests.plants.{plant}"), np.random.default_rng((seed, 2))
+    pressure = MOTIONS[motion](rng, 90.0)
+    held = np.full(pressure.size, module.BENCH.load or 0.0)
+    load = held.copy()
+    command = pressure
+    if fault == "lag":
+        share = 1 - np.exp(-STEP / 0.15)
+        start = [(1 - share) * pressure[0]]
+        command = np.asarray(lfilter([share], [1, share - 1], pressure, zi=start)[0])
+    if fault == "load":
+        load = held + motions.stairs(rng, 90.0, STEP, -12.0, 12.0, (3.0, 6.0), 0.5)[: held.size]
+    modelled, y = (responded(module, *given) for given in ((pressure, held), (command, load)))
+    span, time = np.ptp(modelled), np.linspace(0, 1, y.size)
+    if fault == "friction":
+        way = (pressure - PI(thresholds=(0.15,), weights=(1.0,)).simulate(pressure)) / 0.15
+        y = y - 0.05 * span * np.maximum(way, 0)
+    if fault == "contact":
+        wall = modelled.min() + 0.75 * span
+        y = np.where(y > wall, wall + 0.2 * (y - wall), y)
+    if fault == "warming":
+        y = y * (1 + 0.15 * (1 - np.exp(-2 * time)))
+    y = y + 0.01 * span * noise(("white", "AR(0.9)")[seed % 2], pressure, rng)
+    loads = {"force": load} if np.ptp(load) > 0 else {}
+    missing = (
+        check_runs(reader("pressure"), [run(pressure, y, modelled, **loads)]).outputs[0].missing
+    )
+    return (missing[0].kind, *missing[0].or_kinds) if missing else ("nothing",)
+
+
+def responded(module: Any, pressure: Array, load: Array) -> Array:
+    """Return what a plant does over samples of `STEP`, which its own are a part of."""
+    fine = round(STEP / module.BENCH.sample_time)
+    loads = np.repeat(load, fine)[:, np.newaxis] if module.BENCH.loads else np.zeros((0, 0))
+    times = np.arange(fine * pressure.size) / fine
+    steps = np.interp(times, np.arange(pressure.size), pressure)
+    return np.asarray(module.respond(steps[:, np.newaxis], loads)[::fine, 0])
+
+
+def faults(seeds: int) -> None:
+    for fault, kinds in FAULTS.items():
+        every: list[bool] = []
+        for plant, motion in product(PLANTS, MOTIONS):
+            if fault == "load" and plant == "lugre_muscle":
+                continue
+            named = [planted(plant, fault, motion, seed) for seed in range(seeds)]
+            hits = [bool(set(one) & set(kinds)) for one in named]
+            every += hits
+            if not all(hits):
+                others = sorted({one[0] for one, hit in zip(named, hits, strict=True) if not hit})
+                print(
+                    f"fault  {fault:9} {plant:13} {motion:7} {100 * np.mean(hits):4.0f} %, else {others}"
+                )
+        print(
+            f"fault  {fault:9} named first in {100 * np.mean(every):5.1f} % of {len(every)}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=400)
+    parser.add_argument("--seeds", type=int, default=100)
     given = parser.parse_args()
     with one_blas_thread():
-        right(given.seeds, 0.0)
-        right(given.seeds, 0.9)
-        wrong(given.seeds)
+        faults(max(given.seeds // 10, 2))
+        right(given.seeds)

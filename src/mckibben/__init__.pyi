@@ -25,6 +25,7 @@ from .comparison.calibrating import calibrate as calibrate
 from .comparison.identifying import identify as identify
 from .comparison.ranking import compare as compare
 from .diagnosis.characterization import characterize as characterize
+from .diagnosis.check import check as check
 from .diagnosis.data_gaps import data_gaps as data_gaps
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning
@@ -45,7 +46,6 @@ from .rigs import check_rig as check_rig
 from .rigs import load_rig as load_rig
 from .studying.reviewing import review as review
 from .studying.study import study as study
-from .validation.check import check as check
 from .version import __version__ as __version__
 
 __all__: list[str]

@@ -25,7 +25,7 @@ LAYERS = (
     {"environments"},
     {"bands"},
     {"comparison"},
-    {"validation", "diagnosis"},
+    {"diagnosis"},
     {"planning"},
     {"studying"},
     {"papers"},

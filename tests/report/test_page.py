@@ -21,6 +21,7 @@ from mckibben import registry
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
+from mckibben.diagnosis.description import describe
 from mckibben.outputs import Results
 from mckibben.papers.reproduction import Reproduction
 from mckibben.recording import Recording
@@ -31,7 +32,6 @@ from mckibben.report.page import page
 from mckibben.report.reproduction import reproduction_page
 from mckibben.report.wording import number, percent
 from mckibben.studying.study import Study
-from mckibben.validation.describing import describe
 from tests.report.studies_by_hand import measured, renamed, study
 
 SECTIONS = {

@@ -26,10 +26,10 @@ from mckibben.comparison.leaderboard import Row
 from mckibben.comparison.memory_test import Memory
 from mckibben.control import Twin, track
 from mckibben.diagnosis.data_gaps import data_gaps
+from mckibben.diagnosis.description import describe
 from mckibben.report.page import page
 from mckibben.report.wording import next_steps, verdict
 from mckibben.studying.study import Study
-from mckibben.validation.describing import describe
 from tests.report.studies_by_hand import QUICKLY, TIME, hung, study, two_muscles
 
 FOLDER = Path(__file__).parent / "sentences"

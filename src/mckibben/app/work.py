@@ -100,10 +100,11 @@ def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
 
 def check(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Judge a model by the test recordings, or else the training ones, and write the page."""
+    from mckibben.diagnosis.check import check as judged
+    from mckibben.diagnosis.description import describe
     from mckibben.report.check_page import check_page
+    from mckibben.report.words import check_sentences, check_verdict
     from mckibben.system.atomic import write_text
-    from mckibben.validation.check import check as judged
-    from mckibben.validation.describing import describe
 
     name = str(given["name"])
     model = workspace.model(name)
@@ -122,7 +123,7 @@ def check(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     description = describe(model, recordings, fitted=False)
     page = check_page(found, description, f"models/{name}.json")
     write_text(workspace.new_path("takeaway", str(given["file"])), page)
-    return " ".join([on, found.verdict, *found.sentences])
+    return " ".join([on, check_verdict(found), *check_sentences(found)])
 
 
 def plan(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mckibben.diagnosis.check import Validation
 from mckibben.report.wording import number, of_test_range, percent
-from mckibben.report.words import gap_run, gap_sentence
-from mckibben.validation.results import Validation
+from mckibben.report.words import check_sentences, check_verdict, gap_run, gap_sentence
 
 if TYPE_CHECKING:
     from mckibben.studying.study import Study
@@ -28,7 +28,7 @@ def right(study: Study) -> list[str]:
         return ["The chosen model is checked when all are fitted."]
     if not isinstance(check, Validation):
         return [f"That cannot be told: {check}"]
-    return [check.verdict, *check.sentences[:MOST]]
+    return [check_verdict(check), *check_sentences(check)[:MOST]]
 
 
 def how_far(study: Study) -> list[str]:

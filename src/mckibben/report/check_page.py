@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mckibben.diagnosis.check import LEVEL
 from mckibben.report import (
     check_subjects,
     description_subjects,
@@ -11,13 +12,12 @@ from mckibben.report import (
     subjects,
     templating,
     wording,
+    words,
 )
-from mckibben.validation.level import LEVEL
-from mckibben.validation.words import phrase
 
 if TYPE_CHECKING:
-    from mckibben.validation.describing import ModelDescription
-    from mckibben.validation.results import Validation
+    from mckibben.diagnosis.check import Validation
+    from mckibben.diagnosis.description import ModelDescription
 
 MOST_RECORDINGS = 4
 """Recordings with figures of their own: the longest."""
@@ -46,18 +46,15 @@ def check_page(found: Validation, description: ModelDescription, model_file: str
         figures[f"autocorrelation-{place}"] = [
             interactive.plots(check_subjects.autocorrelation(one))
         ]
-        if one.crossings:
-            figures[f"crossings-{place}"] = [interactive.plots(check_subjects.crossings(one))]
         panels = [interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns]
         figures[f"patterns-{place}"] = [panels]
-        first = one.crossings[0].channel if one.crossings else ""
+        first = one.patterns[0].channel
         figures[f"fit-{place}"], figures[f"residuals-{place}"] = [], []
         for run in runs:
             outputs = {MODEL: run.modelled[:, place]}
             about = (run.recording, one.output, outputs)
             figures[f"fit-{place}"].append(interactive.plots(subjects.fit_over_time(*about)))
-            given = first or next(iter(run.recording.channels))
-            drawing = subjects.residuals(run.recording, given, one.output, outputs)
+            drawing = subjects.residuals(run.recording, first, one.output, outputs)
             figures[f"residuals-{place}"].append(interactive.plots(drawing))
     return templating.page(
         "check.html.j2",
@@ -66,7 +63,7 @@ def check_page(found: Validation, description: ModelDescription, model_file: str
         description=description,
         model_file=model_file,
         drawn=runs,
-        phrase=phrase,
+        words=words,
         level=LEVEL,
         versions=wording.versions(),
     )

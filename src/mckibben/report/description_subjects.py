@@ -12,8 +12,8 @@ from mckibben.report.drawing import N_AGES, Curve, Drawing, Panel, axis_label
 
 if TYPE_CHECKING:
     from mckibben.blocks.fields import Channel
-    from mckibben.validation.describing import ModelDescription
-    from mckibben.validation.responses import DescribingFunction, FrequencyResponse
+    from mckibben.diagnosis.description import ModelDescription
+    from mckibben.diagnosis.responses import DescribingFunction, FrequencyResponse
 
 
 def figures(description: ModelDescription) -> dict[str, list[list[interactive.Json]]]:
@@ -72,7 +72,7 @@ def describing_function(found: DescribingFunction) -> Drawing:
             curves.append(Curve(x, modelled, "model, same cycles" * first, "series-2", "rings"))
         x_label = axis_label(f"amplitude of {found.input.name}", found.input.unit)
         panels.append(Panel(x_label, label, tuple(curves)))
-    return Drawing(tuple(panels), stacked=True, note=found.said and f"Not measured: {found.said}.")
+    return Drawing(tuple(panels), stacked=True)
 
 
 def _gain_label(given: Channel, wanted: Channel) -> str:

@@ -27,9 +27,9 @@ from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Leaderboard, Row
+    from mckibben.diagnosis.check import OutputCheck
     from mckibben.recording import Recording
     from mckibben.studying.study import Study
-    from mckibben.validation.results import OutputCheck
 
 N_VALUES = 180_000
 """Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""

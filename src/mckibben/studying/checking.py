@@ -9,10 +9,9 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.comparison.splits import Split
+from mckibben.diagnosis.check import Validation, check_runs
+from mckibben.diagnosis.free_runs import Run, check_usable
 from mckibben.errors import DataError
-from mckibben.validation.check import check_runs
-from mckibben.validation.residuals import Run, check_usable
-from mckibben.validation.results import Validation
 
 
 def check_on_test(

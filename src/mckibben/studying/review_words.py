@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mckibben.numerals import numeral
-from mckibben.validation.words import phrase
 
 if TYPE_CHECKING:
+    from mckibben.diagnosis.check import OutputCheck
     from mckibben.studying.causes import Cause
     from mckibben.studying.chain import Chain
     from mckibben.studying.log import Loop
     from mckibben.studying.refitting import Refit
     from mckibben.studying.reviewing import Followed, Review
     from mckibben.studying.shifts import Delay
-    from mckibben.validation.results import OutputCheck
 
 NOTABLE = 0.02
 """Share from which a cause is worth a word, on either side of zero."""
@@ -137,7 +136,11 @@ def refit(found: Refit) -> str:
 
 def missing(one: OutputCheck) -> list[str]:
     """Return what a model misses, but for what has a cause of its own."""
-    return [phrase(one, each) for each in one.missing if each.kind not in ("lag", "drift")]
+    return [
+        " of ".join(filter(None, (each.kind, each.channel)))
+        for each in one.missing
+        if each.kind not in ("lag", "drift")
+    ]
 
 
 def told(one: Followed, check: OutputCheck, chains: Sequence[Chain]) -> dict[str, str]:

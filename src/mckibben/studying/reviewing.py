@@ -11,6 +11,10 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.comparison.shared_rows import check_shared
+from mckibben.diagnosis.check import OutputCheck, check_runs
+from mckibben.diagnosis.free_runs import Run, check_usable
+from mckibben.diagnosis.regression import Regression
+from mckibben.diagnosis.suspects import Suspects, averaged, suspects
 from mckibben.recording import Recording, listed
 from mckibben.studying import review_words
 from mckibben.studying.causes import Cause, explained, shares
@@ -20,11 +24,6 @@ from mckibben.studying.log import Loop, has_reference, loop_of
 from mckibben.studying.refitting import Refit, refitted
 from mckibben.studying.shifts import Delay, shifted
 from mckibben.system.showing import DrawsItself
-from mckibben.validation.check import check_runs
-from mckibben.validation.regression import Regression
-from mckibben.validation.residuals import Run, check_usable
-from mckibben.validation.results import OutputCheck
-from mckibben.validation.suspects import Suspects, averaged, suspects
 
 CAUSE_OF = {"lag": "delay", "drift": "drift"}
 """What a residual follows -> its cause; all else that follows motion is the model's."""
@@ -306,7 +305,7 @@ def _missed(table: Suspects, runs: Sequence[Run], one: OutputCheck, place: int) 
     residual = np.concatenate([run.residual[:, place] for run in runs])
     level = list(_columns(table, "offset", ""))
     columns: dict[str, list[int]] = {}
-    for each in (*one.missing, *(slow for slow in one.slow if slow.kind == "drift")):
+    for each in one.missing:
         if each.kind != "offset":
             # a curve and a drift have a level of their own, and share it where there are both
             kind = CAUSE_OF.get(each.kind, "model")
@@ -349,7 +348,7 @@ def _delay(table: Suspects, runs: Sequence[Run], one: OutputCheck, place: int) -
     others = [
         column
         for each in one.missing
-        if each.kind != "lag"
+        if each.kind not in ("lag", "output")  # a curve of the modelled motion holds its delay
         for column in _columns(table, each.kind, each.channel)
     ]
     others = list(dict.fromkeys([*_columns(table, "offset", ""), *others]))
@@ -364,7 +363,7 @@ def _delay(table: Suspects, runs: Sequence[Run], one: OutputCheck, place: int) -
     weights = np.linalg.pinv(whole, rcond=1e-9)[-1]
     more = float(weights @ np.concatenate([left for left, _ in pieces]))
     ends = np.cumsum([len(left) for left, _ in pieces])[:-1]
-    sure = Regression(pieces).spread(np.split(weights, ends))
+    sure = Regression(*zip(*pieces, strict=True)).deviation(np.split(weights, ends))
     samples = group.delay + more
     return Delay(
         "measured motion after modelled",

@@ -17,7 +17,9 @@ from mckibben.comparison.ranking import Standing, ranked
 from mckibben.control import Tracked
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis import Characterization, characterize
+from mckibben.diagnosis.check import Validation
 from mckibben.diagnosis.data_gaps import Gap, data_gaps
+from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
 from mckibben.rigs import load_rig
@@ -27,8 +29,6 @@ from mckibben.studying.loops import closed_loops, named, recorded_rig
 from mckibben.studying.reviewing import Review, review
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
-from mckibben.validation.describing import ModelDescription, describe
-from mckibben.validation.results import Validation
 
 
 @dataclass(frozen=True, repr=False)

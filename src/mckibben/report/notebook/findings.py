@@ -9,14 +9,14 @@ import numpy as np
 
 from mckibben.control.loop import Tracked
 from mckibben.diagnosis.characterization import Characterization
+from mckibben.diagnosis.check import OutputCheck, Validation
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
-from mckibben.report import model_subjects, review_subjects, words
+from mckibben.report import check_subjects, model_subjects, review_subjects, words
 from mckibben.report.drawing import Curve, Drawing, Panel, axis_label
 from mckibben.report.notebook.card import Card
 from mckibben.report.notebook.face import Draw, Face
 from mckibben.studying.reviewing import Review
-from mckibben.validation.results import Validation
 
 QUANTITIES = (
     *("loop width e_w", "mean branch gap", "asymmetry", "dead zone after upper reversals", "gain"),
@@ -127,6 +127,28 @@ class ValidationFace(Face):
         self.found = found
 
     def card(self) -> Card:
-        """Return its verdict, and what the model misses."""
-        said = (self.found.verdict, *self.found.sentences)
-        return Card(f"Check of {self.found.model}", said, notes=self.found.notes)
+        """Return what the residual follows."""
+        said = (words.check_verdict(self.found), *words.check_sentences(self.found))
+        return Card(f"Check of {self.found.model}", said)
+
+    def drawings(self, choices: Mapping[str, Any]) -> Mapping[str, Draw]:
+        """Return the residual's autocorrelation, and its means over what it should not depend on."""
+        return {"autocorrelation": self.autocorrelation, "residual": self.residual}
+
+    def autocorrelation(self, output: str | None = None) -> Drawing:
+        """Draw the autocorrelation of an output's residual."""
+        return check_subjects.autocorrelation(self._output(output))
+
+    def residual(self, output: str | None = None, against: str = "branch") -> Drawing:
+        """Draw the means of an output's residual over inputs, loads, outputs or branches."""
+        one = self._output(output)
+        known = {each.against: each for each in one.patterns}
+        if against not in known:
+            raise DataError(f"{against!r} was not tested", remedy=f"use {', '.join(known)}")
+        return check_subjects.pattern(one, known[against])
+
+    def _output(self, name: str | None) -> OutputCheck:
+        known = {one.output: one for one in self.found.outputs}
+        if name is not None and name not in known:
+            raise DataError("the model has no such output", remedy=f"use {', '.join(known)}")
+        return known[name or next(iter(known))]

@@ -13,8 +13,8 @@ from mckibben import PI, Recording
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.validation.parameters import parameters, residuals, sureness
-from tests.validation.runs import noise
+from mckibben.diagnosis.description import describe
+from tests.diagnosis.runs import noise
 
 STEP, SAMPLES = 0.05, 3000
 
@@ -66,8 +66,8 @@ def covered(block: Block, u: Array, memory: float, seeds: int) -> tuple[int, int
         y = clean + 0.1 * noise(SAMPLES, memory, 1000 + seed)
         model = fitted(block, u, y)
         recording = Recording({"pressure": u, "displacement": y}, STEP)
-        sure = sureness(model, [recording], residuals(model, [recording]))
-        for one, true in zip(parameters(model, sure), truth.tolist(), strict=True):
+        found = describe(model, [recording]).parameters
+        for one, true in zip(found, truth.tolist(), strict=True):
             if one.interval is not None:
                 hits += one.interval[0] <= true <= one.interval[1]
                 trials += 1
@@ -97,8 +97,7 @@ def test_what_is_not_determined_is_said_and_has_no_number() -> None:
     y = np.asarray(block.simulate(u, initial="virgin")) + 0.1 * noise(SAMPLES, 0.0, 1)
     still = PI(THRESHOLDS, (3.0, 1.5, 0.9, 0.5), 2.0, initial="virgin")
     recording = Recording({"pressure": u, "displacement": y}, STEP)
-    sure = sureness(still, [recording], residuals(still, [recording]))
-    found = parameters(still, sure)
+    found = describe(still, [recording]).parameters
     assert found[0].standard_error is not None
     assert found[3].standard_error is None
     assert found[3].interval is None

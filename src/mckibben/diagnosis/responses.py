@@ -97,8 +97,6 @@ class DescribingFunction:
         Of the measured cycles.
     modelled_gain, modelled_angle : array, shape (c,)
         Of the model run free over the same cycles.
-    said : str
-        Why nothing is measured; empty where something is.
     """
 
     input: Channel
@@ -113,7 +111,6 @@ class DescribingFunction:
     measured_angle: Array
     modelled_gain: Array
     modelled_angle: Array
-    said: str = ""
 
 
 def pairs(block: Block, output: str | None) -> Iterator[tuple[int, int]]:
@@ -271,10 +268,6 @@ def _describing_function(
         for column, half in enumerate(amplitude):
             about = min(max(centre, low + half), high - half)
             answers[row, column] = _answer(block, i, j, medians, about, half, one)
-    said = ""
-    if not rows:
-        alone = f" while nothing else moves ({', '.join(others)})" if others else ""
-        said = f"the recordings hold no whole cycle of {given.name}{alone}"
     return DescribingFunction(
         *(given, wanted, amplitude, rate, np.abs(answers), np.degrees(np.angle(answers))),
         *(
@@ -283,7 +276,7 @@ def _describing_function(
             np.abs(table[:, 2]),
             np.degrees(np.angle(table[:, 2])),
         ),
-        *(np.abs(table[:, 3]), np.degrees(np.angle(table[:, 3])), said),
+        *(np.abs(table[:, 3]), np.degrees(np.angle(table[:, 3]))),
     )
 
 

@@ -1,4 +1,4 @@
-"""Models described: every block, and criteria where residuals are white."""
+"""Models described: every block, with the standard errors of a fit."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
+import mckibben
 from mckibben import Recording
 from mckibben.blocks.base import Block
-from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.laws import examples
-from mckibben.validation.describing import describe
+from mckibben.diagnosis.description import describe
+from mckibben.estimators.hysteresis.loops import BoucWenEstimator
+from mckibben.estimators.hysteresis.pi import PIEstimator
 
 STEP = 0.05
 EXAMPLES = examples()
@@ -52,7 +53,7 @@ def test_every_block_is_described(title: str) -> None:
     found = describe(block, [recorded(block)])
     assert len(found.parameters) == block.n_parameters
     for one in found.parameters:
-        assert (one.standard_error is None) == (one.interval is None) == bool(one.said)
+        assert (one.standard_error is None) == (one.interval is None) == (one.status != "estimated")
         if one.standard_error is not None:
             assert one.standard_error > 0
     assert found.frequency_responses or found.describing_functions
@@ -60,19 +61,17 @@ def test_every_block_is_described(title: str) -> None:
     assert told["parameters"][0]["name"] == found.parameters[0].name
 
 
-def test_criteria_are_those_of_the_residuals_one_step_ahead() -> None:
-    n, memory, rng = 3000, 0.9, np.random.default_rng(3)
-    u = np.repeat(np.random.default_rng(5).uniform(0.2, 4.8, n // 10), 10)
-    block = TransferFunction((0.4, 0.2), (-0.7,), STEP, noise_denominator=(-memory,))
-    y = np.asarray(block.simulate(u, sample_time=STEP))
-    y += lfilter([1.0], [1.0, -memory], rng.normal(0, 0.1, n))
-    recording = Recording({"pressure": u, "displacement": y}, STEP)
-    found = describe(block, [recording]).criteria
-    assert found.fpe is not None
-    assert found.aic is not None
-    assert found.bic is not None
-    assert abs(found.fpe / 0.01 - 1) < 0.1  # the variance of the shocks
-    p = 4  # b_0, b_1, f_1 and d_1
-    assert (found.n_samples, found.n_parameters) == (n, p)
-    assert abs((found.bic - found.aic) - p * (np.log(n) - 2)) < 1e-9
-    assert abs(found.aic / n - np.log(found.fpe)) < 1e-5
+def test_standard_errors_are_those_of_the_fit() -> None:
+    train = mckibben.read(mckibben.example.TRAIN)
+    for estimator in (PIEstimator(), BoucWenEstimator()):
+        estimator.fit(train)
+        told = np.array(
+            [
+                np.nan if one.standard_error is None else one.standard_error
+                for one in describe(estimator.model_, train).parameters
+            ]
+        )
+        errors = np.array(estimator.diagnostics_.standard_errors)
+        both = np.isfinite(told) & np.isfinite(errors)
+        assert both.sum() >= 3
+        assert told[both] == pytest.approx(errors[both], rel=1e-6), estimator

@@ -1,4 +1,4 @@
-"""What a model leaves of recordings: measured less modelled, running free; or why that says nothing."""
+"""What a model makes of recordings, running free; or why they say nothing of it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Run:
     recording : Recording
         Measured.
     inputs : array, shape (n, k)
-        What the model is told.
+        What the model is given.
     measured, modelled : array, shape (n, m)
         Outputs; the model runs free.
     start_chosen : bool
@@ -85,11 +85,9 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
 
 
 def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
-    """Refuse recordings that tell nothing of a model; see `runs_of`."""
+    """Refuse recordings that say nothing of a model; see `runs_of`."""
     if not recordings:
         raise DataError("there is no recording to check the model on", remedy="give at least one")
-    inputs = [channel.name for channel in block.inputs]
-    outputs = [channel.name for channel in block.outputs]
     for recording in recordings:
         _refuse(recording, block, recordings[0].sample_time)
     total = sum(map(len, recordings))
@@ -99,7 +97,7 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
             file=recordings[0].source,
             remedy=f"record at least {FEWEST}, better ten cycles with 50 or more each",
         )
-    driven = [name for name in inputs if name not in block.scheduling]
+    driven = [c.name for c in block.inputs if c.name not in block.scheduling]
     if all(_constant(recordings, name) for name in driven):
         raise DataError(
             "the input is constant, so that nothing tells what the model does when it moves",
@@ -107,12 +105,12 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
             channel=driven[0],
             remedy="record while it moves",
         )
-    for name in outputs:
-        if _constant(recordings, name):
+    for channel in block.outputs:
+        if _constant(recordings, channel.name):
             raise DataError(
                 "the output is constant, as of a sensor that is stuck",
                 file=recordings[0].source,
-                channel=name,
+                channel=channel.name,
                 remedy="record while it moves, or name another column with --column",
             )
 
@@ -129,23 +127,19 @@ def _modelled(
     free = run_free(block, recording, outputs, recordings)
     if block.n_states == 0 or recording.meta.get(PERIODIC):
         return free
-    own = block.simulate(recording).matrix(outputs)
-    scale = np.sqrt(np.mean((own - free) ** 2))
-    if not scale > 0:
+    tried = [block.simulate(recording).matrix(outputs), free]
+    if not np.mean((tried[0] - free) ** 2) > 0:
         return free
     measured = recording.matrix(outputs)
     noise = float(np.sqrt(np.mean((measured[:, 0] - free[:, 0]) ** 2)))
-    tried = [own, free]
     for shift in SHIFTS:
-        first = measured[0, 0] + shift * noise
-        moved = recording.with_channels(
-            {outputs[0]: recording.units[outputs[0]]},
-            **{outputs[0]: np.append(first, measured[1:, 0])},
+        first = np.append(measured[0, 0] + shift * noise, measured[1:, 0])
+        units = {outputs[0]: recording.units[outputs[0]]}
+        start = measured_start(
+            block, recording.with_channels(units, **{outputs[0]: first}), outputs
         )
-        start = measured_start(block, moved, outputs)
         tried.append(block.simulate(recording, initial=start.tolist()).matrix(outputs))
-    with np.errstate(all="ignore"):
-        errors = [float(np.sum((measured - one) ** 2)) for one in tried]
+    errors = [float(np.sum((measured - one) ** 2)) for one in tried]
     return tried[int(np.nanargmin(errors))] if np.isfinite(errors).any() else free
 
 
@@ -186,5 +180,4 @@ def _refuse(recording: Recording, block: Block, step: float | None) -> None:
 
 
 def _constant(recordings: Sequence[Recording], name: str) -> bool:
-    low = min(float(recording[name].min()) for recording in recordings)
-    return all(float(recording[name].max()) == low for recording in recordings)
+    return bool(np.ptp(np.concatenate([recording[name] for recording in recordings])) == 0)

@@ -8,8 +8,8 @@ from mckibben import Recording
 from mckibben.arrays import Array
 from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.hysteresis.play_operators import Play
-from mckibben.validation.parameters import residuals, sureness
-from mckibben.validation.responses import describing_functions, frequency_responses
+from mckibben.diagnosis.description import uncertainty
+from mckibben.diagnosis.responses import describing_functions, frequency_responses
 
 STEP = 0.02
 
@@ -52,8 +52,8 @@ def test_a_process_model_answers_as_its_formula_says() -> None:
     u = np.repeat(rng.uniform(0, 5, 400), 10)
     y = np.asarray(block.simulate(u, sample_time=STEP)) + rng.normal(0, 0.05, u.size)
     recording = Recording({"pressure": u, "displacement": y}, STEP)
-    sure = sureness(block, [recording], residuals(block, [recording]))
-    (found,) = frequency_responses(block, [recording], sure.covariance, sure.half_width)
+    covariance = uncertainty(block, [recording])[1]
+    (found,) = frequency_responses(block, [recording], covariance, 1.96)
     slow = found.frequency < 3.0  # far from where straight lines between samples matter
     s = 2j * np.pi * found.frequency[slow]
     expected = 2.0 * np.exp(-0.04 * s) / (0.5 * s + 1)

@@ -1,0 +1,372 @@
+"""A model checked on recordings: whether what it leaves is noise, and if not, what it follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.bands import inside
+from mckibben.blocks.base import Block
+from mckibben.diagnosis.free_runs import Run, runs_of
+from mckibben.diagnosis.patterns import Pattern, Whiteness, patterns, whiteness
+from mckibben.diagnosis.regression import FTest, Regression
+from mckibben.diagnosis.suspects import Group, averaged, block_length, suspects
+from mckibben.recording import Recording, listed
+from mckibben.signals.reversals import noise_level
+from mckibben.system.progress import Tell, one_by_one, telling
+from mckibben.system.showing import DrawsItself
+from mckibben.system.threads import one_blas_thread
+
+LEVEL = 0.01
+"""How often a right model is said to miss something, all tests of all outputs together (Bonferroni)."""
+
+FEWEST_BLOCKS = 6
+"""Of a recording that is tested."""
+
+ROUNDING = 1e-9
+"""Share of the span up to which a residual is rounding."""
+
+STEP = 0.5
+"""Steps of the sensor up to which a residual's root mean square says nothing."""
+
+UNMOVED = 0.05
+"""Share of the samples that are equal to the one before, from which a sensor shows its steps."""
+
+OFF_GRID = 0.01
+"""Steps by which a sample may miss the sensor's steps."""
+
+LAST = ("runs", "offset")
+"""Groups that have no shape: whatever else is missed shifts the mean, so they are tested beside it."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a residual was tested for.
+
+    Parameters
+    ----------
+    kind, channel : str
+        As `mckibben.diagnosis.suspects.Group` has them.
+    p_value : float
+        Probability of noise that looks so, beside what was found before.
+    share : float
+        Of the residual's variance that it explains, 0 to 1, beside what was found before.
+    size : float
+        The same as a root mean square, unit of the output.
+    coefficient : float or None
+        The offset [unit of the output], or how much later measured motion is than modelled [samples].
+    or_kinds : tuple of str
+        What it may be as well: beside them it is not certain.
+    """
+
+    kind: str
+    channel: str
+    p_value: float
+    share: float
+    size: float
+    coefficient: float | None = None
+    or_kinds: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class OutputCheck:
+    """What a model leaves of one output.
+
+    Parameters
+    ----------
+    output, unit : str
+        Channel.
+    n_samples : int
+        Of all recordings.
+    sample_time : float or None
+        [s].
+    span, deviation : float
+        Range of the measured output, and its standard deviation.
+    rmse : float
+        Of the free run.
+    sensor_noise : float or None
+        Standard deviation of the measured output's white noise, from its third differences; None
+        where it cannot be told from movement.
+    resolution : float
+        Smallest step of the measured output; 0 where it shows none.
+    missing : tuple of Finding
+        What the model misses, most important first.
+    suspects : tuple of Finding
+        All that was tested, each by itself.
+    n_tests : int
+        Tests that share `LEVEL`.
+    independent : float
+        Samples without memory that determine a mean as well as all do.
+    every : int
+        Samples to a block; all tests but that of whiteness see means of these.
+    whiteness : Whiteness
+    patterns : tuple of Pattern
+        Means of the residual over inputs, loads, modelled output and branches.
+    """
+
+    output: str
+    unit: str
+    n_samples: int
+    sample_time: float | None
+    span: float
+    deviation: float
+    rmse: float
+    sensor_noise: float | None
+    resolution: float
+    missing: tuple[Finding, ...]
+    suspects: tuple[Finding, ...]
+    n_tests: int
+    independent: float
+    every: int
+    whiteness: Whiteness
+    patterns: tuple[Pattern, ...]
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing is left but rounding, or the sensor's steps."""
+        return self.rmse <= max(ROUNDING * self.span, STEP * self.resolution)
+
+    @property
+    def useless(self) -> bool:
+        """Whether the mean of the measured output would be off by less."""
+        return self.rmse >= self.deviation
+
+    @property
+    def right(self) -> bool:
+        """Whether nothing is found that the model misses."""
+        return self.exact or not (self.missing or self.useless)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        found = asdict(self)
+        found["range"] = found.pop("span")
+        found["independent_samples"] = found.pop("independent")
+        found["samples_to_a_block"] = found.pop("every")
+        return found | {
+            "right": self.right,
+            "level": LEVEL,
+            "p_whiteness": self.whiteness.p_value,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Validation(DrawsItself):
+    """Whether a model is right on recordings, and what it misses.
+
+    Parameters
+    ----------
+    model : str
+        Kind of the model.
+    recordings : tuple of str
+        Names of what it was checked on.
+    outputs : tuple of OutputCheck
+    untested : tuple of str
+        Names of recordings too short beside the others to be tested.
+    runs : tuple of Run
+        The recordings, and what the model makes of them; not in ``to_dict``.
+    """
+
+    face: ClassVar[str] = "validation"
+
+    model: str
+    recordings: tuple[str, ...]
+    outputs: tuple[OutputCheck, ...]
+    untested: tuple[str, ...] = ()
+    runs: tuple[Run, ...] = field(default=(), repr=False)
+
+    @property
+    def right(self) -> bool:
+        """Whether nothing is found that the model misses."""
+        return all(one.right for one in self.outputs)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything for JSON, without runs."""
+        return {
+            "model": self.model,
+            "recordings": list(self.recordings),
+            "right": self.right,
+            "untested": list(self.untested),
+            "outputs": [one.to_dict() for one in self.outputs],
+        }
+
+
+def check(
+    model: Block,
+    recordings: Recording | Sequence[Recording],
+    *,
+    progress: bool | Tell | None = None,
+) -> Validation:
+    """Test whether a model is right on recordings, and what it misses if it is not.
+
+    The model runs free, from an honest start of its memory. What it leaves is tested for following a
+    lag of the output, inputs, their branches by region (hysteresis that is left), recorded loads, time,
+    speed, holds (creep) and the modelled output. The tests hold for noise whose samples are like their
+    neighbours and whose size varies; they share one level.
+
+    Parameters
+    ----------
+    model : Block
+        What is checked.
+    recordings : Recording or sequence of Recording
+        With all inputs and outputs of the model; of one sample time. Those that the model was not
+        fitted to say most. Other channels of pressure, voltage, force and torque are tested as causes.
+    progress : bool or callable, optional
+        Whether to show a bar; or what is called with the share done, and words.
+
+    Returns
+    -------
+    Validation
+
+    Raises
+    ------
+    DataError
+        On recordings that lack channels, are too short or constant, differ in sample time, or are the
+        same in part.
+    ModelError
+        Where the model's output is not finite, or runs away.
+    """
+    model = inside(model)
+    with telling(progress, "checking") as tell:
+        return check_runs(model, runs_of(model, listed(recordings)), tell)
+
+
+def check_runs(model: Block, runs: Sequence[Run], tell: Tell | None = None) -> Validation:
+    """Check a model by what it made of recordings, running free; see `check`."""
+    with one_blas_thread():
+        return _checked(model, runs, tell)
+
+
+def _checked(model: Block, runs: Sequence[Run], tell: Tell | None) -> Validation:
+    every = block_length(model, runs)
+    tested = [run for run in runs if len(run.inputs) // every >= FEWEST_BLOCKS] or list(runs)
+    outputs = tuple(
+        _output(model, runs, tested, every, place)
+        for place in one_by_one(range(len(model.outputs)), tell)
+    )
+    names = tuple(run.recording.name for run in runs)
+    untested = tuple(run.recording.name for run in runs if run not in tested)
+    return Validation(model.kind, names, outputs, untested, tuple(runs))
+
+
+def _output(
+    model: Block, runs: Sequence[Run], tested: Sequence[Run], every: int, place: int
+) -> OutputCheck:
+    residuals = [run.residual[:, place] for run in runs]
+    measured = [run.measured[:, place] for run in runs]
+    whole = np.concatenate(measured)
+    span, resolution = float(np.ptp(whole)), _resolution(measured)
+    rmse = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
+    if rmse <= max(ROUNDING * span, STEP * resolution):
+        # what rounding follows is the arithmetic, or the sensor's steps
+        residuals = [0.0 * e for e in residuals]
+    table = suspects(model, tested, place, every)
+    left = [averaged(e, every) for e, run in zip(residuals, runs, strict=True) if run in tested]
+    regression = Regression(left, table.tables)
+    n_tests = len(model.outputs) * len(table.groups)
+    search = _Search(regression, left, table.groups, LEVEL / n_tests)
+    levels = [noise_level(y, span) for y in measured if len(y) > 1]
+    known = [level for level in levels if np.isfinite(level)]
+    return OutputCheck(
+        output=model.outputs[place].name,
+        unit=model.outputs[place].unit,
+        n_samples=whole.size,
+        sample_time=runs[0].recording.sample_time,
+        span=span,
+        deviation=float(np.std(whole)),
+        rmse=rmse,
+        sensor_noise=float(np.median(known)) if known else None,
+        resolution=resolution,
+        missing=search.missing(),
+        suspects=tuple(search.finding(group, ()) for group in table.groups),
+        n_tests=n_tests,
+        independent=regression.noise.effective_sample_size(sum(map(len, left))),
+        every=every,
+        whiteness=whiteness(residuals),
+        patterns=patterns(model, tested, place, left, table, regression),
+    )
+
+
+class _Search:
+    """Groups that a residual follows, taken one by one, the most important first."""
+
+    def __init__(
+        self, regression: Regression, left: Sequence[Array], groups: Sequence[Group], level: float
+    ) -> None:
+        self.regression, self.groups, self.level = regression, groups, level
+        whole = np.concatenate(left)
+        self.n, self.squares = whole.size, float(whole @ whole)
+        self.about_mean = self.squares - whole.size * float(whole.mean()) ** 2
+
+    def missing(self) -> tuple[Finding, ...]:
+        """Return what is certain, each beside those before."""
+        found: list[Finding] = []
+        known: tuple[int, ...] = ()
+        for wave in (
+            [group for group in self.groups if group.kind not in LAST],
+            *([group for group in self.groups if group.kind == kind] for kind in LAST),
+        ):
+            # an offset beside a curve that has a mean of its own is not determined
+            left = [group for group in wave if group.kind != "offset" or not found]
+            while certain := [g for g in left if self._test(g, known).p_value <= self.level]:
+                best = max(certain, key=lambda group: self._gain(group, known))
+                others = [
+                    group.kind
+                    for group in certain
+                    if group is not best
+                    and self._test(best, (*known, *group.beside, *group.columns)).p_value
+                    > self.level
+                ]
+                found.append(self.finding(best, known, tuple(dict.fromkeys(others))))
+                known = (*known, *best.columns)
+                left = [group for group in left if group is not best and group.kind not in others]
+        return tuple(found)
+
+    def finding(
+        self, group: Group, known: tuple[int, ...], others: tuple[str, ...] = ()
+    ) -> Finding:
+        """Return what a group explains beside others."""
+        test = self._test(group, known)
+        coefficient, total = None, self.about_mean
+        if group.kind == "lag":
+            coefficient = float(group.delay)
+        elif group.kind == "offset":
+            coefficient = float(self.regression.coefficients(group.columns)[0])
+            total = self.squares
+        return Finding(
+            *(group.kind, group.channel, test.p_value),
+            share=min(test.explained / total, 1.0) if total > 0 else 0.0,
+            size=float(np.sqrt(test.explained / self.n)),
+            coefficient=coefficient,
+            or_kinds=others,
+        )
+
+    def _test(self, group: Group, known: Sequence[int]) -> FTest:
+        beside = set(known) | set(group.beside)
+        return self.regression.test(group.columns, tuple(sorted(beside - set(group.columns))))
+
+    def _gain(self, group: Group, known: tuple[int, ...]) -> float:
+        """Return how much more a group explains than noise would, by Mallows' C_p, beside the mean.
+
+        With what it is beside: a branch by region may move the curve as well.
+        """
+        before = set(known) | set(self.groups[0].columns)
+        new = {*group.beside, *group.columns} - before
+        found = self.regression.test(tuple(sorted(new)), tuple(sorted(before)))
+        return found.explained - 2 * found.by_noise
+
+
+def _resolution(measured: Sequence[Array]) -> float:
+    """Return the step of a measured output whose samples are all whole steps apart; else 0."""
+    values = np.unique(np.concatenate(measured))
+    steps = np.diff(values)
+    steps = steps[steps > ROUNDING * (values[-1] - values[0])]
+    unmoved = np.mean(np.concatenate([np.diff(y) for y in measured]) == 0)
+    if not steps.size or unmoved < UNMOVED:
+        return 0.0
+    step = float(steps.min())
+    places = (values - values[0]) / step
+    return step if np.abs(places - np.round(places)).max() < OFF_GRID else 0.0

@@ -1,0 +1,291 @@
+"""Regression of residuals on what they may depend on, where neighbours are alike and variances differ.
+
+Noise is an autoregression of the greatest restricted likelihood beside *all* columns (Harville, JASA 72,
+1977), so that the freedom that columns take makes it look no rougher than it is; its order is that of
+Burg's method by BIC. A test has the larger p-value of two in the whitened series, as either alone
+rejects too often: the F-test, with the freedom by which that noise is known (Satterthwaite), where
+variances differ; and Hotelling's T² by the covariance HC3 (MacKinnon and White, J. Econometrics 29,
+1985) where samples are few. ``benchmarks/validation.py`` measures both.
+
+Pieces (one per recording) are whitened each by itself; nothing crosses from one into the next. Whatever
+asks whether a curve, a loop or a trend is in a recording is such a test, beside the columns that it may
+be without being one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.statistics import Autoregression, autoregression
+
+MOST_ORDER = 6
+"""Largest order of the noise model."""
+
+SAMPLES_PER_TERM = 16
+"""Beside those that columns take, at least."""
+
+SMOOTHEST = 3.8
+"""Partial correlations of noise are at most the tanh of this: 0.999."""
+
+STEP = 0.02
+"""Of finite differences by these."""
+
+LEAST_CURVATURE = 0.1
+"""Of the likelihood, so that what the data do not determine has a large error and no infinite one."""
+
+DEPENDENT = 1e-9
+"""Share of the energy of columns below which what one adds to the others is rounding."""
+
+ROUNDING = 1e-12
+"""Energy that is added to every column, so that none vanishes when it is whitened."""
+
+MOST_LEVERAGE = 0.9
+"""Share of a sample in its own fit that is corrected for."""
+
+Places = Sequence[int]
+
+
+@dataclass(frozen=True)
+class FTest:
+    """A test of columns beside others.
+
+    Parameters
+    ----------
+    p_value : float
+        Probability that noise alone is followed as well.
+    freedom : int
+        Columns that add something to the others.
+    explained : float
+        Sum of squares of the series that they explain beside the others.
+    by_noise : float
+        What they would explain of noise alone, on average.
+    """
+
+    p_value: float
+    freedom: int
+    explained: float
+    by_noise: float
+
+
+class Regression:
+    """Pieces of a series, what they may depend on, and the noise beside.
+
+    Parameters
+    ----------
+    series : sequence of array, shape (n,)
+        One per recording, all at one sample time.
+    columns : sequence of array, shape (n, k)
+        A constant is one of them, or there is none.
+
+    Attributes
+    ----------
+    noise : Autoregression
+        What is left when all columns are taken out.
+    """
+
+    def __init__(self, series: Sequence[Array], columns: Sequence[Array]) -> None:
+        tables = [np.column_stack([x, e]) for x, e in zip(columns, series, strict=True)]
+        whole = np.concatenate(tables)
+        size = np.sqrt(np.mean(whole**2, axis=0))
+        self._size = np.where(size > 0, size, 1.0)
+        self._plain = whole / self._size
+        self._ends = np.cumsum([len(table) for table in tables])[:-1]
+        tables = np.split(self._plain, self._ends)
+        self._partial, self._doubt = self._fitted_noise(tables)
+        order = self._partial.size
+        whitener = _whitener(self._partial)
+        unit = Autoregression(-whitener[1:], 1.0, 0.0)
+        self._white = np.concatenate([unit.whitened(table)[order:] for table in tables])
+        basis, _ = _basis(self._white[:, :-1])
+        left = self._white[:, -1] - basis @ (basis.T @ self._white[:, -1])
+        self._freedom = max(len(left) - basis.shape[1] - order, 1)
+        self._variance = float(left @ left) / self._freedom
+        self._left = left / (1 - np.minimum((basis**2).sum(axis=1), MOST_LEVERAGE))
+        deviation = float(np.sqrt(self._variance) * self._size[-1])
+        variance = deviation**2 / float(np.prod(1 - np.tanh(self._partial) ** 2))
+        self.noise = Autoregression(-whitener[1:], deviation, variance)
+        self._tested: dict[tuple[tuple[int, ...], tuple[int, ...]], FTest] = {}
+
+    def test(self, chosen: Places, beside: Places = ()) -> FTest:
+        """Test some of the columns beside others, all given by their places."""
+        key = (tuple(chosen), tuple(beside))
+        if key not in self._tested:
+            self._tested[key] = self._test(*key)
+        return self._tested[key]
+
+    def _test(self, chosen: Places, beside: Places) -> FTest:
+        from scipy.special import fdtrc
+
+        plain = _added(self._plain, chosen, beside)
+        explained = float(np.sum((plain.T @ self._plain[:, -1]) ** 2)) * float(self._size[-1]) ** 2
+        by_noise = float(
+            sum(np.sum(self.noise.coloured(u) ** 2) for u in np.split(plain, self._ends))
+        )
+        new = _added(self._white, chosen, beside)
+        q = new.shape[1]
+        if q == 0 or self._variance <= 0:
+            return FTest(1.0, 0, explained, by_noise)
+        along = new.T @ self._white[:, -1]
+        unsure = self._unsure(chosen, beside, q)
+        freedom = 2 / (2 / self._freedom + unsure)
+        alike = fdtrc(q, freedom, along @ along / q / self._variance)
+        scores = new * self._left[:, np.newaxis]
+        # samples of which columns are 0 say nothing of their noise
+        weights = (new**2).sum(axis=1) / q
+        freedom = 2 / (2 * max(1 / self._freedom, float(weights @ weights)) + unsure)
+        below = max(freedom - q + 1, 1.0)
+        squared = along @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ along
+        differing = fdtrc(q, below, squared / q * below / max(freedom, below))
+        return FTest(float(max(alike, differing)), q, explained, by_noise)
+
+    def coefficients(self, chosen: Places) -> Array:
+        """Return the coefficients of columns that follow the whitened series best, shape (k,)."""
+        places = list(chosen)
+        found = np.linalg.lstsq(self._white[:, places], self._white[:, -1], rcond=DEPENDENT)[0]
+        return np.asarray(found * self._size[-1] / self._size[places])
+
+    def deviation(self, weights: Sequence[Array]) -> float:
+        """Return the standard deviation that noise gives to a weighted sum of pieces, (n,) each."""
+        return float(np.sqrt(sum(float(np.sum(self.noise.coloured(w) ** 2)) for w in weights)))
+
+    def _fitted_noise(self, tables: Sequence[Array]) -> tuple[Array, Array]:
+        """Return what the noise's partial correlations are the tanh of, and its covariance."""
+        from scipy.optimize import approx_fprime, minimize
+
+        fitted, _ = _basis(self._plain[:, :-1])
+        left = self._plain[:, -1] - fitted @ (fitted.T @ self._plain[:, -1])
+        burg = autoregression(np.split(left, self._ends))
+        spare = max(len(left) - fitted.shape[1], 0) // SAMPLES_PER_TERM
+        start = _partial(burg.coefficients)[: min(MOST_ORDER, spare)]
+        order = start.size
+        self._lagged = _lagged(tables, order)
+        # of the rows that noise is known by: what is only in the first ones would be nothing there
+        _, inner = _basis(np.concatenate([table[order:, :-1] for table in tables]))
+        k = inner.shape[1]
+        change = np.zeros((len(inner) + 1, k + 1))
+        change[:-1, :k], change[-1, k] = inner, 1.0
+        self._small = np.einsum("ia,pqij,jb->pqab", change, self._lagged, change, optimize=True)
+        if not order:
+            return np.zeros(0), np.zeros((0, 0))
+        freedom = max(sum(max(len(table) - order, 0) for table in tables) - k, 1)
+
+        def cost(partial: Array) -> float:
+            columns, left = _sizes(self._small, partial)
+            return freedom * left + columns
+
+        ends = [(-SMOOTHEST, SMOOTHEST)] * order
+        at = minimize(cost, start, method="L-BFGS-B", bounds=ends).x
+        slope = approx_fprime(at, cost, STEP)
+        moved = [approx_fprime(at + step, cost, STEP) for step in STEP * np.eye(order)]
+        curvature = (np.array(moved) - slope) / STEP
+        energies, ways = np.linalg.eigh((curvature + curvature.T) / 2)
+        return at, np.asarray(2 * (ways / np.maximum(energies, LEAST_CURVATURE)) @ ways.T)
+
+    def _unsure(self, chosen: Places, beside: Places, q: int) -> float:
+        """Return the variance of the logarithm of the noise's power where columns have theirs."""
+        from scipy.optimize import approx_fprime
+
+        if not self._partial.size:
+            return 0.0
+
+        def power(partial: Array) -> float:
+            products = _filtered(self._lagged, partial)
+            new = _log_size(products, [*beside, *chosen]) - _log_size(products, beside)
+            return new / q - _sizes(self._small, partial)[1]
+
+        slopes = approx_fprime(self._partial, power, STEP)
+        return float(slopes @ self._doubt @ slopes)
+
+
+def f_test(
+    series: Sequence[Array], columns: Sequence[Array], beside: Sequence[Array] | None = None
+) -> FTest:
+    """Test whether pieces (n,) of a series follow columns (n, k) beside others (n, m).
+
+    `Regression` tests several groups of columns under one noise.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> wave, noise = np.sin(np.arange(500.0) / 9), np.cumsum(rng.normal(0, 0.02, 500))
+    >>> f_test([noise], [wave[:, np.newaxis]]).p_value > 0.05
+    True
+    >>> f_test([noise + 0.1 * wave], [wave[:, np.newaxis]]).p_value < 1e-6
+    True
+    """
+    k = columns[0].shape[1]
+    if beside is not None:
+        columns = [np.column_stack(both) for both in zip(columns, beside, strict=True)]
+    return Regression(series, columns).test(range(k), range(k, columns[0].shape[1]))
+
+
+def _basis(columns: Array) -> tuple[Array, Array]:
+    """Return an orthonormal basis of columns, (n, rank), and what it is of them, (k, rank)."""
+    energies, ways = np.linalg.eigh(columns.T @ columns)
+    kept = energies > DEPENDENT * float(energies.max(initial=1e-300))
+    change = ways[:, kept] / np.sqrt(energies[kept])
+    return columns @ change, change
+
+
+def _added(table: Array, chosen: Places, beside: Places) -> Array:
+    """Return an orthonormal basis of what chosen columns add to others, shape (n, rank)."""
+    known, _ = _basis(table[:, list(beside)])
+    new = table[:, list(chosen)]
+    rest = new - known @ (known.T @ new)
+    energies, ways = np.linalg.eigh(rest.T @ rest)
+    kept = energies > DEPENDENT * float((new**2).sum())
+    return np.asarray(rest @ ways[:, kept] / np.sqrt(energies[kept]))
+
+
+def _lagged(tables: Sequence[Array], order: int) -> Array:
+    """Return the products of columns at lags i and j, summed over time, (order + 1, order + 1, k, k)."""
+    width = tables[0].shape[1]
+    total = np.zeros(((order + 1) * width,) * 2)
+    for table in tables:
+        shifted = [table[order - lag : max(len(table) - lag, 0)] for lag in range(order + 1)]
+        side = np.concatenate(shifted, axis=1) if len(table) > order else np.zeros((0, len(total)))
+        total += side.T @ side
+    return total.reshape(order + 1, width, order + 1, width).transpose(0, 2, 1, 3)
+
+
+def _whitener(partial: Array) -> Array:
+    """Return a stable autoregression's filter from what its partial correlations are the tanh of."""
+    found = np.ones(1)
+    for value in np.tanh(partial):
+        longer = np.append(found, 0.0)
+        found = longer - value * longer[::-1]
+    return found
+
+
+def _partial(coefficients: Array) -> Array:
+    """Return the inverse of `_whitener`, from its coefficients less the first, of other sign."""
+    found, whitener = [], np.concatenate([[1.0], -coefficients])
+    while whitener.size > 1:
+        value = -whitener[-1]
+        found.append(value)
+        whitener = ((whitener + value * whitener[::-1]) / (1 - value**2))[:-1]
+    return np.arctanh(found[::-1]).clip(-SMOOTHEST, SMOOTHEST)
+
+
+def _filtered(lagged: Array, partial: Array) -> Array:
+    """Return the products of columns that a noise model has whitened."""
+    whitener = _whitener(partial)
+    return np.asarray(np.tensordot(np.outer(whitener, whitener), lagged, 2))
+
+
+def _sizes(lagged: Array, partial: Array) -> tuple[float, float]:
+    """Return the logarithms of the determinant of whitened columns, and of what they leave."""
+    products = _filtered(lagged, partial)
+    products += ROUNDING * np.eye(len(products))
+    columns = np.linalg.slogdet(products[:-1, :-1])[1]
+    return float(columns), float(np.linalg.slogdet(products)[1] - columns)
+
+
+def _log_size(products: Array, chosen: Places) -> float:
+    """Return the logarithm of the determinant of some columns, without what is rounding."""
+    energies = np.linalg.eigvalsh(products[np.ix_(list(chosen), list(chosen))])
+    return float(np.log(energies[energies > DEPENDENT * energies.max(initial=1e-300)]).sum())

@@ -1,0 +1,259 @@
+"""What a residual may follow: columns, in groups with a name, each what a model can lack.
+
+They are computed of every sample and then averaged over blocks, which loses nothing of what is as slow
+as a branch of the loop, and makes noise short. All are made of inputs, loads, the modelled output and
+time; nothing is made of the measured output, whose noise is the residual's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.hysteresis.pi import PI
+from mckibben.diagnosis.free_runs import Run
+from mckibben.signals.holds import holds
+from mckibben.signals.reversals import reversals
+
+PER_BRANCH = 24
+"""Blocks to a usual branch of the input."""
+
+FEWEST, MOST = 400, 6000
+"""Blocks looked at, at least where there are as many samples, and at most."""
+
+KNOTS = 8
+"""Of curves over inputs, shared among them."""
+
+WAYS = (0.05, 0.2, 0.6)
+"""Parts of half its range by which an input moves back until it is on the other branch."""
+
+HELD = 0.15
+"""Share of the samples in holds from which creep is told from the loop."""
+
+PER_COLUMN = 6
+"""Blocks to a column, at least."""
+
+MOST_DELAY, LONGER = 50, 8
+"""Samples that outputs are shifted by at most, and the shortest recording as a multiple of that."""
+
+CAUSES = ("pressure", "voltage", "force", "torque")
+"""Channels of which a residual can be the effect, though the model does not read them."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns that belong together.
+
+    Parameters
+    ----------
+    kind : str
+        ``offset``, ``curve`` over an input, ``load``, ``hysteresis`` (branches by region), ``lag``,
+        ``drift``, ``speed``, ``creep``, ``output`` (its curve) or ``runs`` (offsets between them).
+    channel : str
+        The channel that they are made of; "" for the output and time.
+    columns : tuple of int
+        Places.
+    beside : tuple of int
+        Places of what the residual may follow without this group being at fault.
+    delay : int
+        Of a lag: samples by which the modelled output is best shifted.
+    """
+
+    kind: str
+    channel: str
+    columns: tuple[int, ...]
+    beside: tuple[int, ...] = ()
+    delay: int = 0
+
+
+@dataclass(frozen=True)
+class Suspects:
+    """The columns of all recordings, (blocks, k) each, of blocks of ``every`` samples; their groups."""
+
+    every: int
+    tables: tuple[Array, ...]
+    groups: tuple[Group, ...]
+
+    def of(self, kind: str, channel: str = "") -> Group | None:
+        """Return a group, or None."""
+        found = (g for g in self.groups if g.kind == kind and channel in ("", g.channel))
+        return next(found, None)
+
+
+def averaged(samples: Array, every: int) -> Array:
+    """Return the means over blocks of so many samples, shape (n // every, ...)."""
+    n = len(samples) // every
+    return np.asarray(samples[: n * every].reshape(n, every, *samples.shape[1:]).mean(axis=1))
+
+
+def suspects(block: Block, runs: Sequence[Run], output: int, every: int) -> Suspects:
+    """Return what the residual of an output may follow, as means over blocks of so many samples.
+
+    Groups that come first have room first where recordings are short.
+    """
+    room = max(sum(len(run.inputs) // every for run in runs) // PER_COLUMN, 1)
+    parts: list[list[Array]] = [[] for _ in runs]
+    groups: list[Group] = []
+
+    def add(
+        kind: str,
+        channel: str,
+        columns: Sequence[Array],
+        beside: Sequence[int] = (),
+        delay: int = 0,
+    ) -> tuple[int, ...]:
+        first = sum(part.shape[1] for part in parts[0])
+        places = tuple(range(first, first + columns[0].shape[1]))
+        if places and places[-1] < room:
+            groups.append(Group(kind, channel, places, tuple(beside), delay))
+            for own, part in zip(parts, columns, strict=True):
+                own.append(averaged(part, every))
+            return places
+        return ()
+
+    modelled = _scaled([run.modelled[:, output] for run in runs])
+    causes = {name: _scaled(_samples(runs, name)) for name in _moving(block, runs)}
+    driven = [name for name in causes if name in _driven(block)]
+    level = add("offset", "", [np.ones((len(y), 1)) for y in modelled])
+    delay = _best_delay(runs, output)
+    add("lag", "", [_lagging(y, delay) for y in modelled], level, delay)
+    for name, x in causes.items():
+        if name in driven:
+            places = add("curve", name, _hats(x, max(KNOTS // len(driven), 4)), level)
+            add("hysteresis", name, [_branches(part) for part in x], (*level, *places))
+        else:
+            acting = zip(x, modelled, strict=True)
+            add("load", name, [np.column_stack([load, load * y]) for load, y in acting], level)
+    add("drift", "", _trends(modelled), level)
+    add("speed", "", [_speeds(y) for y in modelled], level)
+    shortest = max(int(np.median(branch_lengths(block, runs))) // 2, 10)
+    longest = _longest_hold(list(causes), runs, shortest)
+    if longest:
+        add("creep", "", [_creeping(y, longest) for y in modelled], level)
+    add("output", "", _hats(modelled, KNOTS), level)
+    own = np.eye(len(runs))[:, 1:]
+    add(
+        "runs", "", [np.tile(row, (len(y), 1)) for row, y in zip(own, modelled, strict=True)], level
+    )
+    return Suspects(every, tuple(np.concatenate(own, axis=1) for own in parts), tuple(groups))
+
+
+def block_length(block: Block, runs: Sequence[Run]) -> int:
+    """Return how many samples make a block: few beside a branch, and not too many blocks in all."""
+    sizes = [len(run.inputs) for run in runs]
+    branches = branch_lengths(block, runs)
+    usual = int(np.median(branches)) // PER_BRANCH if branches else 1
+    most = max(int(np.median(sizes)) // (2 * PER_COLUMN), 1)
+    return min(max(1, min(usual, sum(sizes) // FEWEST), -(-sum(sizes) // MOST)), most)
+
+
+def branch_lengths(block: Block, runs: Sequence[Run]) -> list[int]:
+    """Return the samples between turning points of driven inputs."""
+    driven = [x for name in _driven(block) for x in _samples(runs, name) if np.ptp(x) > 0]
+    return [int(length) for x in driven for length in np.diff(reversals(x))]
+
+
+def _driven(block: Block) -> list[str]:
+    return [c.name for c in block.inputs if c.name not in block.scheduling]
+
+
+def _moving(block: Block, runs: Sequence[Run]) -> list[str]:
+    """Return the names of inputs, and of recorded causes that the model does not read, if they move."""
+    taken = [channel.name for channel in (*block.inputs, *block.outputs)]
+    others = [
+        name
+        for name in runs[0].recording.channels
+        if name.split("_")[0] in CAUSES and name not in taken
+    ]
+    names = [channel.name for channel in block.inputs] + others
+    recorded = [name for name in names if all(name in run.recording for run in runs)]
+    return [name for name in recorded if np.ptp(np.concatenate(_samples(runs, name))) > 0]
+
+
+def _samples(runs: Sequence[Run], name: str) -> list[Array]:
+    return [run.recording[name] for run in runs]
+
+
+def _scaled(parts: Sequence[Array]) -> list[Array]:
+    """Return samples scaled to a range from -1 to 1."""
+    low, high = min(part.min() for part in parts), max(part.max() for part in parts)
+    return [2 * (part - low) / ((high - low) or 1.0) - 1 for part in parts]
+
+
+def _hats(parts: Sequence[Array], knots: int) -> list[Array]:
+    """Return piecewise-linear functions between knots that have as many samples between them."""
+    at = np.unique(np.quantile(np.concatenate(parts), np.linspace(0, 1, knots)))
+    return [
+        np.column_stack(
+            [np.zeros(part.size), *(np.interp(part, at, r) for r in np.eye(at.size)[1:])]
+        )[:, 1:]
+        for part in parts
+    ]
+
+
+def _branches(x: Array) -> Array:
+    """Return the branch of an input, from -1 to 1 after some way into it, and that times the input."""
+    ways = [(x - PI(thresholds=(way,), weights=(1.0,)).simulate(x)) / way for way in WAYS]
+    return np.column_stack([part for way in ways for part in (way, way * x)])
+
+
+def _lagging(modelled: Array, delay: int) -> Array:
+    """Return how fast the modelled output moves, and how far it is from itself when it is delayed."""
+    slope = np.gradient(modelled)
+    places = np.clip(np.arange(modelled.size) - delay, 0, modelled.size - 1)
+    return np.column_stack([slope, modelled[places] - modelled])
+
+
+def _best_delay(runs: Sequence[Run], output: int) -> int:
+    """Return by how many samples the modelled output is best shifted."""
+    most = min(MOST_DELAY, min(len(run.inputs) for run in runs) // LONGER)
+
+    def left(delay: int) -> float:
+        total = 0.0
+        for run in runs:
+            # the same samples at every delay
+            y, modelled = run.measured[:, output], run.modelled[:, output]
+            kept = slice(most, len(y) - most)
+            total += float(np.sum((y[kept] - modelled[most - delay : len(y) - most - delay]) ** 2))
+        return total
+
+    return min(range(-most, most + 1), key=lambda delay: (left(delay), abs(delay)))
+
+
+def _trends(modelled: Sequence[Array]) -> list[Array]:
+    """Return a line, a parabola and a change of gain over time, anew in every recording."""
+    longest = max(map(len, modelled))
+    times = [np.arange(len(y)) / longest for y in modelled]
+    return [np.column_stack([t, t**2, t * y]) for t, y in zip(times, modelled, strict=True)]
+
+
+def _speeds(modelled: Array) -> Array:
+    """Return functions of the modelled output's speed; what is linear in it is a lag."""
+    rate = np.gradient(modelled)
+    rate = rate / (np.sqrt(np.mean(rate**2)) or 1.0)
+    root = np.sign(rate) * np.sqrt(np.abs(rate))
+    return np.column_stack([np.abs(rate), root, rate * modelled])
+
+
+def _longest_hold(names: Sequence[str], runs: Sequence[Run], shortest: int) -> int:
+    """Return the samples of the longest hold of all inputs and loads; 0 where little is held."""
+    tables = [run.recording.matrix(names) for run in runs]
+    spans = np.ptp(np.concatenate(tables), axis=0).tolist()
+    found = [hold.stop - hold.start for table in tables for hold in holds(table, spans, shortest)]
+    return max(found, default=0) if sum(found) >= HELD * sum(map(len, tables)) else 0
+
+
+def _creeping(modelled: Array, longest: int) -> Array:
+    """Return how far the modelled output is ahead of its own slow lags."""
+    from scipy.signal import lfilter
+
+    found = []
+    for time in (longest / 3, longest):
+        share = 1 - np.exp(-1 / time)
+        start = [(1 - share) * modelled[0]]
+        found.append(modelled - lfilter([share], [1.0, share - 1.0], modelled, zi=start)[0])
+    return np.column_stack(found)

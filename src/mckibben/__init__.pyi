@@ -22,9 +22,9 @@ from .blocks.memoryless import PiecewiseLinear as PiecewiseLinear
 from .blocks.memoryless import Polynomial as Polynomial
 from .blocks.saving import load as load
 from .characterization import characterize as characterize
-from .comparison.calibrating import calibrate as calibrate
 from .comparison.orders import identify as identify
 from .comparison.ranking import compare as compare
+from .diagnosis.bands import calibrate as calibrate
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning
 from .errors import MckibbenError as MckibbenError

@@ -134,6 +134,15 @@ class Said(Kept):
     said: Text = ""
 
 
+class Band(Kept):
+    """How a band holds on the test; of results of older versions some figures are absent."""
+
+    level: Number = None
+    unit_of_width: Text = ""
+    coverage: dict[Text, Number] = {}
+    width: dict[Text, Number] = {}
+
+
 class Fitted(Kept):
     """What came of a fit."""
 
@@ -152,7 +161,7 @@ class Fitted(Kept):
     train: Figures | None = None
     memory: Memory | None = None
     start: Said | None = None
-    band: Said | None = None
+    band: Band | None = None
     outputs: dict[Text, Figures] = {}
     n_parameters: Count | None = None
     fit_seconds: Number = None

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.comparison.banding import tested_band
 from mckibben.comparison.bootstrap import skill_of
 from mckibben.comparison.channels import Names
 from mckibben.comparison.choosing import Choice, choice_of
@@ -37,6 +36,7 @@ from mckibben.comparison.trying import (
     parts_of,
     processes_for,
 )
+from mckibben.diagnosis.bands import tested_band
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.statistics import differences, interval

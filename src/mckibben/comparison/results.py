@@ -152,7 +152,7 @@ class Leaderboard(DrawsItself):
         if best is None:
             return (*self.off_training, *drift)
         price = [] if self.choice is None else [self.choice.said(self.unit)]
-        said = [*filter(None, (best.start, best.band)), *best.diagnostics.get("notes", ())]
+        said = [*filter(None, (best.start,)), *best.diagnostics.get("notes", ())]
         return (
             *filter(None, price),
             *self.off_training,

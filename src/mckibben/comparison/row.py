@@ -12,12 +12,12 @@ import numpy as np
 from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
-from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.drift import Drift
 from mckibben.comparison.offered import caution
 from mckibben.comparison.recommending import CONSTANT, order
 from mckibben.comparison.starts import Start
+from mckibben.diagnosis.bands import TestedBand
 from mckibben.errors import MckibbenError
 from mckibben.metrics import Scores
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
-from mckibben.bands.held import Held
 from mckibben.blocks.base import Block
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.cluster import outcomes_outside, outer_backend, processes_outside
@@ -22,6 +21,7 @@ from mckibben.comparison.offered import objections
 from mckibben.comparison.pieces import PIECES, squares_of
 from mckibben.comparison.row import Row
 from mckibben.comparison.splits import Fold, Mask, Split
+from mckibben.diagnosis.bands import Held
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.optimisers.tracker import Progress, whole_searches
 from mckibben.metrics import Scores, mean_scores, score
@@ -320,7 +320,6 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
 
     def validate(block: Block, fold: Fold) -> None:
         nonlocal count
-        place = next(k for k, other in enumerate(data.folds) if other is fold)
         # a single recording is fitted and tested on samples of its own
         fitted_to = list(zip(fold.train, fold.train_rows, strict=True))
         for recording, rows in zip(fold.test, fold.test_rows, strict=True):
@@ -329,7 +328,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
             modelled = run_free(block, recording, names, own, own_rows)
             measured, step = recording.matrix(names), recording.sample_time
             driving = recording.matrix(channel.name for channel in block.inputs)
-            held.append(Held(driving, modelled, measured, rows, step, place))
+            held.append(Held(driving, modelled, measured, rows, step))
             errors = (modelled - measured)[rows]
             squares.extend(squares_of(errors))
             count += len(errors)

@@ -6,6 +6,18 @@ a room, so that all of it can be read, counted and tested on plants where it is 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from mckibben.numerals import numeral
+from mckibben.report.wording import percent
+
+if TYPE_CHECKING:
+    from mckibben.arrays import Array
+    from mckibben.blocks.fields import Channel
+    from mckibben.diagnosis.bands import Calibration
+
+
 # --- Comparison -------------------------------------------------------------------------------------
 
 # --- What the muscle does ---------------------------------------------------------------------------
@@ -15,5 +27,51 @@ from __future__ import annotations
 # --- Data gaps and plans ----------------------------------------------------------------------------
 
 # --- Bands and log reviews --------------------------------------------------------------------------
+
+
+def band_on_test(
+    level: float, coverage: Mapping[str, float], width: Mapping[str, float], unit: str
+) -> list[str]:
+    """Return, an output a sentence, the share of the test's samples inside of a band, and its width."""
+    return [
+        f"The band for {percent(level, 3)} holds {percent(coverage[name], 3)} of the test's samples of "
+        f"{name}; it is ±{numeral(wide / 2, 2)} {unit} wide on average."
+        for name, wide in width.items()
+    ]
+
+
+def calibrated(found: Calibration) -> list[str]:
+    """Return what a band rests on, and how wide it is."""
+    band, n = found.band, found.band.units
+    said = [f"Calibrated on {n} {band.unit}s, which allow levels up to {percent(n / (n + 1), 3)}."]
+    for channel, width, ratio in zip(band.given, found.widths, found.over_constant, strict=True):
+        said.append(
+            f"{channel.name}: the band for {percent(band.level, 3)} is {numeral(width, 3)} "
+            f"{channel.unit} wide on average in cross-validation, {numeral(ratio, 2)} of a band of "
+            "constant width."
+        )
+    return said
+
+
+def calibrated_on_blocks(found: Calibration) -> str:
+    """Return what a band does not include whose units are blocks of runs."""
+    return (
+        f"{found.band.units} blocks of {found.runs} run(s) count as exchangeable, so differences "
+        "between runs are not in the band. Remedy: calibrate on 9 runs or more."
+    )
+
+
+def outside_calibration(
+    run: str, channel: Channel, share: float, values: Array, ends: tuple[float, float]
+) -> str:
+    """Return how much of a run is beyond the range of a calibration."""
+    least, most = numeral(float(values.min()), 3), numeral(float(values.max()), 3)
+    low, high = (numeral(end, 3) for end in ends)
+    return (
+        f"In {run}, {channel.name} goes from {least} to {most} {channel.unit}, the calibration from "
+        f"{low} to {high}: beyond it, in {percent(share, 3)} of the samples, the level of the band is "
+        "not guaranteed."
+    )
+
 
 # --- The three answers ------------------------------------------------------------------------------

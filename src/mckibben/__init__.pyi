@@ -25,6 +25,7 @@ from .characterization import characterize as characterize
 from .comparison.orders import identify as identify
 from .comparison.ranking import compare as compare
 from .diagnosis.bands import calibrate as calibrate
+from .diagnosis.review import review as review
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning
 from .errors import MckibbenError as MckibbenError
@@ -43,7 +44,6 @@ from .report import write_report as write_report
 from .rigs import Rig as Rig
 from .rigs import check_rig as check_rig
 from .rigs import load_rig as load_rig
-from .studying.reviewing import review as review
 from .studying.study import study as study
 from .validation.check import check as check
 from .version import __version__ as __version__

@@ -205,14 +205,6 @@ class Line2D(Kept):
     y: list[Number] = []
 
 
-class Cause(Kept):
-    """What a part of an error comes from."""
-
-    kind: Text
-    share: Number = None
-    said: Text = ""
-
-
 class Reviewed(Kept):
     """What a log of the real rig said of one output."""
 
@@ -223,8 +215,8 @@ class Reviewed(Kept):
     unit: Text = ""
     achieved: Number = None
     predicted: Number = None
-    causes: list[Cause] = []
-    verdict: Text = ""
+    pressure: Number = None
+    residual: Number = None
     sentences: list[Text] = []
     refitted: bool = False
     curves: list[Line2D] = []

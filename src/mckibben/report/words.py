@@ -7,6 +7,7 @@ a room, so that all of it can be read, counted and tested on plants where it is 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 from mckibben.numerals import numeral
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from mckibben.arrays import Array
     from mckibben.blocks.fields import Channel
     from mckibben.diagnosis.bands import Calibration
+    from mckibben.diagnosis.review import Review
 
 
 # --- Comparison -------------------------------------------------------------------------------------
@@ -72,6 +74,45 @@ def outside_calibration(
         f"{low} to {high}: beyond it, in {percent(share, 3)} of the samples, the level of the band is "
         "not guaranteed."
     )
+
+
+def reviewed(found: Review) -> list[str]:
+    """Return what a log's review found: every output, then delays, limits and the refit."""
+    said = []
+    for one in found.outputs:
+        size = partial(_size, one.unit)
+        said.append(
+            f"{one.output}: achieved error {size(one.achieved)} RMS; the model misses "
+            f"{size(one.residual)} of the measured motion."
+        )
+        if one.predicted is not None and one.pressure is not None:
+            said.append(
+                f"{one.output}: the model predicts an error of {size(one.predicted)} for the "
+                f"{found.judged_by}s, and {size(one.pressure)} for pressures that differ from them."
+            )
+        low, high = (numeral(60 * end, 2) for end in one.drift_interval)
+        said.append(
+            f"{one.output}: the residual drifts by {size(60 * one.drift)} per minute (95 %: {low} to "
+            f"{high})."
+        )
+    for delay in [*found.delays, *(one.delay for one in found.outputs if one.delay)]:
+        late, low, high = (numeral(1000 * x, 2) for x in (delay.seconds, *delay.interval))
+        said.append(f"Delay and lag of {delay.where}: {late} ms (95 %: {low} to {high}).")
+    if found.clipped:
+        said.append(f"{found.clipped} of {found.n_samples} samples are at a limit of the command.")
+    if isinstance(found.refit, str):
+        said.append(found.refit)
+    elif found.refit is not None:
+        low, high = (percent(end, 2) for end in found.refit.ratio)
+        said.append(
+            f"The model fitted again to the log has {percent(found.refit.new / found.refit.old, 2)} of "
+            f"the old one's error on {found.refit.n_folds} parts held out (95 %: {low} to {high})."
+        )
+    return said
+
+
+def _size(unit: str, value: float) -> str:
+    return f"{numeral(value, 2)} {unit}".rstrip()
 
 
 # --- The three answers ------------------------------------------------------------------------------

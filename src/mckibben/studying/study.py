@@ -19,6 +19,7 @@ from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.standing import Standing
 from mckibben.control import Tracked
 from mckibben.control.twin import COMMAND
+from mckibben.diagnosis.review import Review, review
 from mckibben.errors import DataError
 from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording, listed
@@ -26,7 +27,6 @@ from mckibben.rigs import load_rig
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, named, recorded_rig
-from mckibben.studying.reviewing import Review, review
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
 from mckibben.validation.describing import ModelDescription, describe

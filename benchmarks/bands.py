@@ -23,10 +23,10 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from tests.plants import PLANTS, Plant
 
 from mckibben import Recording, registry
-from mckibben.blocks.base import Block
+from mckibben.blocks.bands import Banded
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.offered import objections
-from mckibben.diagnosis.bands import calibration
+from mckibben.diagnosis.bands import calibration, held_of
 from mckibben.errors import MckibbenError
 
 MODELS = ("pi", "gpi", "coupled-memory", "arx", "linear-memory")
@@ -56,14 +56,14 @@ def arranged(name: str, plant: Plant) -> Channels | None:
     return next((way for way in ways if not objections([name], plant.train, way)), None)
 
 
-def share(block: Block, runs: Sequence[Recording], outputs: Sequence[str]) -> float:
-    """Return the share of the samples of runs that a calibrated model holds."""
+def share(banded: Banded, runs: Sequence[Recording]) -> float:
+    """Return the share of the samples of runs that a band holds, started as those of calibration."""
     holds = []
-    for run in runs:
-        ends = block.simulate(run)
-        for name in outputs:
-            low, high = ends[f"{name}_lower"], ends[f"{name}_upper"]
-            holds.append((low <= run[name]) & (run[name] <= high))
+    for run in (held_of(banded.forward, run) for run in runs):
+        ends = banded.band.simulate(run.modelled, sample_time=run.sample_time)
+        _, low, high = ends.reshape(*run.modelled.shape, 3)[run.counts].T
+        measured = run.measured[run.counts].T
+        holds.append(((low <= measured) & (measured <= high)).ravel())
     return float(np.concatenate(holds).mean())
 
 
@@ -84,7 +84,7 @@ def tried(name: str, model: str, seed: int) -> list[Tried]:
                 model,
                 motion,
                 banded.band.level,
-                share(banded, runs, channels.outputs),
+                share(banded, runs),
                 float(np.mean(found.over_constant)),
             )
             for motion, runs in plant.test.items()

@@ -24,7 +24,7 @@ from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.refit import Refit, refitted
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.recording import Recording, listed
-from mckibben.statistics import NORMAL_95, autoregression, block_length, correlation_length
+from mckibben.statistics import NORMAL_95, block_length, correlation_length
 from mckibben.system.showing import DrawsItself
 
 REFERENCE = "reference_"
@@ -197,7 +197,7 @@ def review(
             delay
             for link in links
             for name, pair in link.pressures.items()
-            if (delay := _delay(f"{name} after {link.judged_by}", [pair], link.step))
+            if (delay := _delay(f"{name} after command", [pair], link.step))
         ),
         clipped=sum(link.clipped for link in links),
         n_samples=sum(len(link.log) for link in links),
@@ -362,7 +362,8 @@ def _followed(links: Sequence[_Links], name: str, unit: str) -> Followed:
     if len(given) == len(links):
         commanded = np.concatenate(given)
         parts |= {"pressure": modelled - commanded, "command": commanded - reference}
-    sizes = {kind: _rms(part) for kind, part in parts.items()}
+    least = ROUNDING * float(np.ptp(reference))
+    sizes = {kind: size if (size := _rms(part)) > least else 0.0 for kind, part in parts.items()}
     slope, half = _slope([got - model for model, got in pairs], step)
     time = logs[0].time if len(logs) == 1 else step * np.arange(measured.size)
     return Followed(
@@ -388,7 +389,8 @@ def _slope(series: Sequence[Array], step: float) -> tuple[float, float]:
     power = sum(float(t @ t) for t in times)
     slope = sum(float(t @ y) for t, y in zip(times, series, strict=True)) / power
     left = [y - y.mean() - slope * t for y, t in zip(series, times, strict=True)]
-    return slope, NORMAL_95 * float(np.sqrt(autoregression(left).long_run_variance / power))
+    variance = float(np.var(np.concatenate(left))) * correlation_length(left)
+    return slope, NORMAL_95 * float(np.sqrt(variance / power))
 
 
 def _delay(where: str, pairs: Sequence[tuple[Array, Array]], step: float) -> Delay | None:
@@ -425,8 +427,10 @@ def _delay(where: str, pairs: Sequence[tuple[Array, Array]], step: float) -> Del
         for one in products
         for block in np.array_split(one, max(len(one) // block_length(len(one), memory), 2))
     ]
-    half = NORMAL_95 * float(np.linalg.norm(sums) / (abs(gain) * (alone @ alone))) * step
-    return Delay(where, late * step, (late * step - half, late * step + half))
+    half = NORMAL_95 * float(np.linalg.norm(sums) / (abs(gain) * (alone @ alone)))
+    # decimals behind the ninth of a sample are rounding
+    low, middle, high = (round(samples, 9) * step for samples in (late - half, late, late + half))
+    return Delay(where, middle, (low, high))
 
 
 def _centred(x: Array, most: int) -> Array:

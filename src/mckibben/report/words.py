@@ -37,7 +37,7 @@ def band_on_test(
     """Return, an output a sentence, the share of the test's samples inside of a band, and its width."""
     return [
         f"The band for {percent(level, 3)} holds {percent(coverage[name], 3)} of the test's samples of "
-        f"{name}; it is ±{numeral(wide / 2, 2)} {unit} wide on average."
+        f"{name}; its half width is {numeral(wide / 2, 2)} {unit} on average."
         for name, wide in width.items()
     ]
 
@@ -78,6 +78,7 @@ def outside_calibration(
 
 def reviewed(found: Review) -> list[str]:
     """Return what a log's review found: every output, then delays, limits and the refit."""
+    given = " of the compensator" if found.judged_by == "compensator" else ""
     said = []
     for one in found.outputs:
         size = partial(_size, one.unit)
@@ -88,7 +89,7 @@ def reviewed(found: Review) -> list[str]:
         if one.predicted is not None and one.pressure is not None:
             said.append(
                 f"{one.output}: the model predicts an error of {size(one.predicted)} for the "
-                f"{found.judged_by}s, and {size(one.pressure)} for pressures that differ from them."
+                f"commands{given}, and {size(one.pressure)} for pressures that differ from them."
             )
         low, high = (numeral(60 * end, 2) for end in one.drift_interval)
         said.append(

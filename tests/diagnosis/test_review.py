@@ -49,8 +49,7 @@ def found_in(log: Recording, **known: object) -> Review:
     return review(log, refit=False, **(known or {"model": MUSCLE}))  # type: ignore[arg-type]
 
 
-def within(delay: Delay | None, seconds: float) -> bool:
-    assert delay is not None
+def within(delay: Delay, seconds: float) -> bool:
     return delay.interval[0] < seconds < delay.interval[1]
 
 
@@ -67,9 +66,8 @@ def test_parts_add_up_to_the_error_that_the_loop_reckoned(cause: str) -> None:
 
 
 def test_the_delay_of_motion_or_pressure_is_in_its_interval() -> None:
-    late = found_in(logged(0, late=8, noise=0.05)[0]).outputs[0].delay
+    late = found_in(logged(0, late=8, noise=0.05)[0]).delays[-1]
     assert within(late, 8 * STEP)
-    assert late is not None
     assert late.interval[1] - late.interval[0] < STEP
     assert found_in(logged(0, dead=8, noise=0.05)[0]).delays[0].seconds == pytest.approx(8 * STEP)
 
@@ -82,8 +80,9 @@ def test_intervals_of_delay_and_drift_hold_zero_where_there_is_none() -> None:
         rng = np.random.default_rng(seed)
         slow = np.convolve(0.05 * rng.standard_normal(len(log) + 39), np.ones(40) / 6, "valid")
         log = log.with_channels(displacement=log["displacement"] + slow)
-        one = found_in(log).outputs[0]
-        missed += not within(one.delay, 0.0)
+        found = found_in(log)
+        one = found.outputs[0]
+        missed += not within(found.delays[-1], 0.0)
         missed += not one.drift_interval[0] < 0 < one.drift_interval[1]
     assert missed <= 6  # of 40; the 99 % point of a binomial distribution at 5 % is 6
 
@@ -115,7 +114,7 @@ def test_without_commands_pressures_are_compared_with_the_compensators() -> None
     one = found.outputs[0]
     assert (one.pressure or 0.0) > one.residual
     blind = log.select(["reference_displacement", "command_pressure", "displacement"])
-    assert found_in(blind).delays == ()
+    assert len(found_in(blind).delays) == 1
 
 
 def test_what_is_no_log_is_refused() -> None:
@@ -123,7 +122,6 @@ def test_what_is_no_log_is_refused() -> None:
     for bad, said in (
         (log.select(["pressure", "displacement"]), "reference"),
         (log.select(["reference_displacement", "displacement"]), "pressure"),
-        (log.slice(1000, 1030), "30"),
     ):
         with pytest.raises(DataError, match=said):
             review(bad, model=MUSCLE)

@@ -30,9 +30,6 @@ from mckibben.system.showing import DrawsItself
 REFERENCE = "reference_"
 """What the names of channels begin with that hold a desired motion."""
 
-FEWEST = 60
-"""Scored samples of a log."""
-
 LONGEST = 1.0
 """Delay that is looked for [s]; an eighth of the log at most."""
 
@@ -77,8 +74,6 @@ class Followed:
         less that. None where commands are not known.
     residual : float
         Measured less what the model gives for measured pressures.
-    delay : Delay or None
-        Of measured after modelled motion; None where either stands still.
     drift, drift_interval : float, (float, float)
         Slope of the residual over time [unit/s], and its interval of 95 %.
     time, reference, measured : array, shape (n,)
@@ -93,7 +88,6 @@ class Followed:
     predicted: float | None
     pressure: float | None
     residual: float
-    delay: Delay | None
     drift: float
     drift_interval: tuple[float, float]
     time: Array = field(repr=False)
@@ -114,7 +108,7 @@ class Review(DrawsItself):
         Kind of the model.
     outputs : tuple of Followed
     delays : tuple of Delay
-        Of measured pressures after commands.
+        Of measured pressures after commands, and of measured after modelled motion, log by log.
     clipped, n_samples : int
         Scored samples with a command at a limit, and all.
     judged_by : {"command", "compensator", ""}
@@ -139,7 +133,6 @@ class Review(DrawsItself):
         shown = {one.name: getattr(self, one.name) for one in fields(self)}
         outputs = [
             {one.name: getattr(each, one.name) for one in fields(each) if one.repr}
-            | {"delay": None if each.delay is None else asdict(each.delay)}
             for each in self.outputs
         ]
         refit = self.refit.to_dict() if isinstance(self.refit, Refit) else self.refit
@@ -193,12 +186,7 @@ def review(
         logs=tuple(one.name for one in logs),
         model=model.kind,
         outputs=tuple(_followed(links, channel.name, channel.unit) for channel in outputs),
-        delays=tuple(
-            delay
-            for link in links
-            for name, pair in link.pressures.items()
-            if (delay := _delay(f"{name} after command", [pair], link.step))
-        ),
+        delays=tuple(delay for link in links for delay in link.delays([c.name for c in outputs])),
         clipped=sum(link.clipped for link in links),
         n_samples=sum(len(link.log) for link in links),
         judged_by=links[0].judged_by,
@@ -258,17 +246,6 @@ def _check(logs: Sequence[Recording], model: Block, inputs: Sequence[str], follo
             if channel.name in inputs and COMMAND + channel.name in log:
                 continue
             log[channel.name]  # which says what is absent
-        if (n := int(scored(log).sum())) < FEWEST:
-            raise DataError(
-                f"{n} samples are too few to review",
-                file=log.source,
-                remedy=f"log at least {FEWEST}, better ten cycles with 50 or more each",
-            )
-
-
-def scored(log: Recording) -> Array:
-    """Return which samples count, bool (n,): all from time zero on; `track` begins before it."""
-    return np.asarray(log.time >= -ROUNDING * (log.sample_time or 1.0))
 
 
 class _Links:
@@ -291,7 +268,8 @@ class _Links:
         runs = [model.simulate(given, initial=start.tolist()) for start in starts]
         left = [np.sum((run.matrix(names) - given.matrix(names)) ** 2) for run in runs]
         modelled, start = runs[int(np.argmin(left))], starts[int(np.argmin(left))].tolist()
-        begin = int(np.argmax(scored(log)))
+        # all counts from time zero on; `track` begins before it
+        begin = int(np.argmax(log.time >= -ROUNDING))
         self.step, self.log = float(log.sample_time or 1.0), given.slice(begin, len(log))
         self.modelled = modelled.slice(begin, len(log))
         self.commanded: Recording | None = None
@@ -308,6 +286,14 @@ class _Links:
         self.clipped = int(
             np.any([_at_limit(sent[n][begin:], references) for n in inputs], axis=0).sum()
         )
+
+    def delays(self, outputs: Sequence[str]) -> list[Delay]:
+        """Return how late pressures and outputs are."""
+        pairs = {f"{n} after command": pair for n, pair in self.pressures.items()} | {
+            f"measured after modelled {n}": (self.modelled[n], self.log[n]) for n in outputs
+        }
+        found = [_delay(where, *pair, self.step) for where, pair in pairs.items()]
+        return [delay for delay in found if delay is not None]
 
 
 def _commands(
@@ -373,7 +359,6 @@ def _followed(links: Sequence[_Links], name: str, unit: str) -> Followed:
         predicted=sizes.get("command"),
         pressure=sizes.get("pressure"),
         residual=sizes["model"],
-        delay=_delay("measured motion after modelled", pairs, step),
         drift=slope,
         drift_interval=(slope - half, slope + half),
         time=np.asarray(time),
@@ -393,49 +378,39 @@ def _slope(series: Sequence[Array], step: float) -> tuple[float, float]:
     return slope, NORMAL_95 * float(np.sqrt(variance / power))
 
 
-def _delay(where: str, pairs: Sequence[tuple[Array, Array]], step: float) -> Delay | None:
-    """Return by how much the second signals are later, of any gain and level, by least squares.
+def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
+    """Return by how much a signal is later than another, of any gain and level, by least squares.
 
     The standard error is that of sums over blocks that are long against the correlation of errors.
     """
-    most = min(round(LONGEST / step), min(len(x) for x, _ in pairs) // 8)
-    if most < 1 or any(np.ptp(x) == 0 or np.ptp(y) == 0 for x, y in pairs):
+    most = min(round(LONGEST / step), len(first) // 8)
+    if most < 1 or np.ptp(first) == 0 or np.ptp(then) == 0:
         return None
-    n = [len(x) - 2 * most for x, _ in pairs]
-    got = np.concatenate([_centred(y, most) for _, y in pairs])
+    inner = slice(most, len(first) - most)
+    got = then[inner] - then[inner].mean()
 
-    def later(samples: float) -> Array:
-        moved = [_shifted(x, samples) for x, _ in pairs]
-        return np.concatenate(
-            [np.array([_centred(x, most), _centred(-np.gradient(x), most)]) for x in moved], axis=1
-        )
+    def later(samples: float) -> tuple[Array, Array]:
+        moved = _shifted(first, samples)
+        x, slope = moved[inner], -np.gradient(moved)[inner]
+        return x - x.mean(), slope - slope.mean()
 
-    def left(samples: float) -> float:
+    def explained(samples: float) -> float:
         x = later(samples)[0]
-        return float(got @ got - (x @ got) ** 2 / (x @ x))
+        return float((x @ got) ** 2 / (x @ x))
 
-    late, gain = float(min(range(-most, most + 1), key=left)), 1.0
+    late, gain = float(max(range(-most, most + 1), key=explained)), 1.0
     for _ in range(3):
-        gain, change = np.linalg.lstsq(later(late).T, got, rcond=None)[0]
+        gain, change = np.linalg.lstsq(np.column_stack(later(late)), got, rcond=None)[0]
         late = float(np.clip(late + change / gain, -most, most))
     x, slope = later(late)
     alone = slope - x * (x @ slope) / (x @ x)
-    products = np.split(alone * (got - gain * x), np.cumsum(n)[:-1])
-    memory = correlation_length(products)
-    sums = [
-        block.sum()
-        for one in products
-        for block in np.array_split(one, max(len(one) // block_length(len(one), memory), 2))
-    ]
+    product = alone * (got - gain * x)
+    block = block_length(product.size, correlation_length([product]))
+    sums = [part.sum() for part in np.array_split(product, max(product.size // block, 2))]
     half = NORMAL_95 * float(np.linalg.norm(sums) / (abs(gain) * (alone @ alone)))
     # decimals behind the ninth of a sample are rounding
     low, middle, high = (round(samples, 9) * step for samples in (late - half, late, late + half))
     return Delay(where, middle, (low, high))
-
-
-def _centred(x: Array, most: int) -> Array:
-    inner = x[most : len(x) - most]
-    return np.asarray(inner - inner.mean())
 
 
 def _shifted(x: Array, samples: float) -> Array:

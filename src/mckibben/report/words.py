@@ -96,7 +96,7 @@ def reviewed(found: Review) -> list[str]:
             f"{one.output}: the residual drifts by {size(60 * one.drift)} per minute (95 %: {low} to "
             f"{high})."
         )
-    for delay in [*found.delays, *(one.delay for one in found.outputs if one.delay)]:
+    for delay in found.delays:
         late, low, high = (numeral(1000 * x, 2) for x in (delay.seconds, *delay.interval))
         said.append(f"Delay and lag of {delay.where}: {late} ms (95 %: {low} to {high}).")
     if found.clipped:

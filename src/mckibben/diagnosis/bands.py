@@ -154,14 +154,11 @@ def calibrate(
     --------
     >>> import mckibben
     >>> import numpy as np
-    >>> from mckibben.signals import random_wave
-    >>> model = mckibben.PI.example()
-    >>> runs = []
-    >>> for seed in range(40):
-    ...     u = random_wave(0.1 * np.arange(100), 0.5, 5.0, seed=seed)
-    ...     y = model.simulate(u) + 0.1 * np.random.default_rng(seed).standard_normal(100)
-    ...     runs.append(mckibben.Recording({"pressure": u, "displacement": y}, 0.1))
-    >>> list(mckibben.calibrate(model, runs).at(0.8).simulate(runs[0]).channels)
+    >>> model, noise = mckibben.PI.example(), np.random.default_rng(0)
+    >>> u = 2.5 - 2.5 * np.cos(0.1 * np.arange(1000))
+    >>> y = model.simulate(u) + 0.1 * noise.standard_normal(1000)
+    >>> run = mckibben.Recording({"pressure": u, "displacement": y}, 0.1)
+    >>> list(mckibben.calibrate(model, run).at(0.8).simulate(run).channels)
     ['pressure', 'displacement', 'displacement_lower', 'displacement_upper']
     """
     with telling(progress, "calibrating") as tell:
@@ -204,9 +201,8 @@ def calibration(
                 )
     inputs, outputs = ([c.name for c in channels] for channels in (model.inputs, model.outputs))
     check_shared({"fit": fitted, "calibrate": recordings}, inputs, outputs)
-    found = find_band(
-        model, [held_of(model, one) for one in one_by_one(recordings, tell)], exchangeable
-    )
+    held = [held_of(model, one) for one in one_by_one(recordings, tell)]
+    found = find_band(model, held, exchangeable)
     return Banded(model, found.band), found
 
 
@@ -220,13 +216,7 @@ def held_of(model: Block, recording: Recording) -> Held:
 
 
 def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Calibration:
-    """Return the band of a model by its errors on runs that it was not fitted to.
-
-    Raises
-    ------
-    DataError
-        Where there are fewer than two units.
-    """
+    """Return the band of a model by its errors on runs that it was not fitted to; two units or more."""
     runs = [run for run in runs if run.counts.any()]
     errors = [run.errors for run in runs]
     memory = max(correlation_length(one) for one in zip(*(e.T for e in errors), strict=True))
@@ -321,10 +311,8 @@ class TestedBand:
     ----------
     level : float
         What it is to hold: 0.9, or the most that so few units allow.
-    unit : {"run", "block"}
-        What counts as exchangeable.
-    units : int
-        How many of them the cross-validation had.
+    unit, units : {"run", "block"}, int
+        What counts as exchangeable, and how many the cross-validation had.
     unit_of_width : str
         Unit of the outputs.
     coverage, width : mapping of str to float

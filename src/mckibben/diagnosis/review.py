@@ -191,8 +191,7 @@ def review(
         n_samples=sum(len(link.log) for link in links),
         judged_by=links[0].judged_by,
     )
-    exact = all(one.achieved <= ROUNDING * np.ptp(one.reference) for one in found.outputs)
-    if not refit or exact:
+    if not refit or all(one.achieved <= ROUNDING * np.ptp(one.reference) for one in found.outputs):
         return found
     older = [one for one in every if not has_reference(one)]
     again = refitted(model, [link.log for link in links], older, seed=seed)
@@ -259,9 +258,8 @@ class _Links:
     ) -> None:
         names = [channel.name for channel in model.outputs]
         sent, self.judged_by = _commands(log, model, compensator, inputs)
-        given = log
-        if any(name not in log for name in inputs):
-            given = log.with_channels(**(sent or {}))
+        blind = [name for name in inputs if name not in log]
+        given = log.with_channels(**{n: _shifted(log[COMMAND + n], 1.0) for n in blind})
         # the first measured output has noise, so its start counts where it leaves less of the log
         first = given.matrix(channel.name for channel in model.inputs)[0]
         starts = [model.initial_state(first), measured_start(model, given, names)]
@@ -283,9 +281,8 @@ class _Links:
         self.commanded = commanded.slice(begin, len(log))
         self.pressures = {n: (sent[n][begin:], log[n][begin:]) for n in inputs if n in log}
         references = [x[begin:] for n, x in log.channels.items() if n.startswith(REFERENCE)]
-        self.clipped = int(
-            np.any([_at_limit(sent[n][begin:], references) for n in inputs], axis=0).sum()
-        )
+        limits = [_at_limit(sent[n][begin:], references) for n in inputs]
+        self.clipped = int(np.any(limits, axis=0).sum())
 
     def delays(self, outputs: Sequence[str]) -> list[Delay]:
         """Return how late pressures and outputs are."""
@@ -301,17 +298,14 @@ def _commands(
 ) -> tuple[dict[str, Array] | None, str]:
     """Return the commands by input, logged or given by the compensator, and which; None if unknown."""
     if all(COMMAND + name in log for name in inputs):
-        sent = log.matrix(COMMAND + name for name in inputs)
-        later = np.concatenate([sent[:1], sent[:-1]])
+        sent = {name: log[COMMAND + name] for name in inputs}
+        later = {name: _shifted(values, 1.0) for name, values in sent.items()}
+
+        def off(way: Mapping[str, Array]) -> float:
+            return float(sum(np.sum((way[n] - log[n]) ** 2) for n in inputs if n in log))
+
         # a command is logged when it is sent, before what it did is measured, or beside that
-        ways = [later, sent] if all(name in log for name in inputs) else [later]
-        acted = min(
-            ways,
-            key=lambda way: float(
-                sum(np.sum((way[:, k] - log[n]) ** 2) for k, n in enumerate(inputs) if n in log)
-            ),
-        )
-        return dict(zip(inputs, acted.T, strict=True)), "command"
+        return min((later, sent), key=off), "command"
     wanted = [channel.name for channel in model.outputs]
     if compensator is None or any(REFERENCE + name not in log for name in wanted):
         return None, ""

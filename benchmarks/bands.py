@@ -1,121 +1,134 @@
-"""Bands of 90 % on measured runs left out: share held, and width over that of a constant band.
+"""Bands of 90 % on motion of the calibration's kind and of others: share of samples held, and width.
 
-    python benchmarks/bands.py --data FOLDER
+    python benchmarks/bands.py [PLANT ...] [--seeds N] [--models NAME ...]
 
-The constant band is conformal too, from the same runs: one width for all samples. Of a set's runs, or
-pieces of them, a third is tested, in several draws: the rest is fitted to, and what fits to three
-quarters of it miss on the fourth calibrates. Where a model leaves but noise no band is narrower than a
-constant one: simple models of the field are shown, which leave something.
+Plants are those of `tests/plants`, which know no model of the package. A model is fitted to the
+first training run and calibrated on the others, which are patterns of pressure; then it is tried on
+every kind of motion of the test.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from mckibben import Recording
-from mckibben.bands.finding import find_band
-from mckibben.bands.held import Held
-from mckibben.bands.scale import SHAPES
-from mckibben.blocks.bands import Band
-from mckibben.blocks.base import Block
-from mckibben.comparison.calibrating import held_of
-from mckibben.measured.sets import sets_in
-from mckibben.registry import load
-from mckibben.signals import resample
+sys.path.insert(0, str(Path(__file__).parent.parent))
 
-PARTS, DRAWS = 4, 7
-"""Parts of what is fitted to, each left out in turn; and draws of what is tested."""
+from mckibben.comparison.offered import objections
+from tests.plants import PLANTS, Plant
 
-MOVED = ("pressure", "displacement")
-HELD_LENGTH = (("force-petrovic",), "length", "force")
-ARM = (("input_1", "input_2", "input_3"), ("displacement_1", "displacement_2"))
-"""What is given and what is modelled of measured sets."""
+from mckibben import Recording, registry
+from mckibben.blocks.bands import Banded
+from mckibben.comparison.channels import Channels
+from mckibben.diagnosis.bands import calibration, held_of
+from mckibben.errors import MckibbenError
+
+MODELS = ("pi", "gpi", "coupled-memory", "arx", "linear-memory")
+SAME = "patterns"
+"""Kind of test motion that is like that of training."""
 
 
-def missed(model: Block, runs: Sequence[Recording]) -> list[Held]:
-    """Return what a model misses on runs that it was not fitted to."""
-    outputs = [channel.name for channel in model.outputs]
-    return [held_of(model, run, outputs) for run in runs]
+class Tried(NamedTuple):
+    """Share of samples held by a band on one kind of motion, and mean width over that of a constant."""
+
+    plant: str
+    model: str
+    motion: str
+    level: float
+    held: float
+    ratio: float
 
 
-def tried(band: Band, runs: Sequence[Held]) -> tuple[float, float]:
-    """Return the share of samples held, and the mean width, over runs."""
-    held, width = [], []
-    for run in runs:
-        ends = band.simulate(np.hstack([run.inputs, run.modelled]), sample_time=run.sample_time)
-        ends = ends.reshape(len(ends), -1, 3)[run.counts]
-        measured = run.measured[run.counts]
-        held.append(((ends[..., 1] <= measured) & (measured <= ends[..., 2])).mean())
-        width.append((ends[..., 2] - ends[..., 1]).mean())
-    return float(np.mean(held)), float(np.mean(width))
-
-
-def drawn(
-    estimator: Callable[[], Any], runs: Sequence[Recording], seed: int
-) -> tuple[float, float]:
-    """Return the share of a third of the runs held [%], and the width over the constant band's."""
-    order = np.random.default_rng(seed).permutation(len(runs))
-    test, rest = (
-        [runs[place] for place in sorted(some)]
-        for some in (order[: len(runs) // 3], order[len(runs) // 3 :])
+def arranged(name: str, plant: Plant) -> Channels | None:
+    """Return channels on which a model has a place, those first that tell it most."""
+    given, loads, moved = plant.bench.pressures, plant.bench.loads, plant.bench.outputs
+    ways = (
+        Channels(given, moved, loads or None),
+        Channels(given + loads, moved),
+        Channels(given, moved),
     )
-    held = []
-    for part in range(PARTS):
-        known = [run for place, run in enumerate(rest) if place % PARTS != part]
-        model = estimator().fit(known).model_
-        held += [replace(run, by=part) for run in missed(model, rest[part::PARTS])]
-    model = estimator().fit(rest).model_
-    bands = [find_band(model, held, shapes=shapes).band for shapes in (SHAPES, SHAPES[:1])]
-    asked = missed(model, test)
-    (share, width), (_, constant) = (tried(band, asked) for band in bands)
-    return 100 * share, width / constant
+    return next((way for way in ways if not objections([name], plant.train, way)), None)
 
 
-def cut(runs: Sequence[Recording], n: int) -> list[Recording]:
-    """Return so many parts of every run."""
-    return [run.slice(k * len(run) // n, (k + 1) * len(run) // n) for run in runs for k in range(n)]
+def share(banded: Banded, runs: Sequence[Recording]) -> float:
+    """Return the share of the samples of runs that a band holds, started as those of calibration."""
+    holds = []
+    for run in (held_of(banded.forward, run) for run in runs):
+        ends = banded.band.simulate(run.modelled, sample_time=run.sample_time)
+        _, low, high = ends.reshape(*run.modelled.shape, 3)[run.counts].T
+        measured = run.measured[run.counts].T
+        holds.append(((low <= measured) & (measured <= high)).ravel())
+    return float(np.concatenate(holds).mean())
 
 
-def main(folder: Path) -> None:
-    found = {one.name: one.recordings() for one in sets_in(folder)}
-    sample = [run for run in found["cavatappi_loads"] if run.name.startswith("sample3")]
-    held = [resample(run, 0.2) for run in found["festo_isometric_20mm"]]
-    arm = cut([resample(run, 0.25) for run in found["soft_arm_three_muscles"]], 3)
-    training, *_, test = found["bouc_wen_benchmark"]
-    print("| what | held [%]: median (range) | width / constant |\n|---|---:|---:|")
-    for name, runs, kinds, given, wanted in (
-        ("DMSP-10, levels", cut(found["festo_dmsp10_levels"], 12), ("gpi", "pi", "arx"), *MOVED),
-        ("Cavatappi, sample 3", cut(sample, 6), ("gpi", "pi", "p2uz"), *MOVED),
-        *(
-            (f"DMSP-20, {length}", [run for run in held if length in run.name], *HELD_LENGTH)
-            for length in ("12cm", "30cm")
-        ),
-        ("soft arm", arm, ("coupled-memory",), *ARM),
-        ("soft arm, one muscle of three", arm, ("pi",), "input_1", "displacement_1"),
-        ("wing", cut(found["sma_wing"], 10), ("gpi", "pi"), *MOVED),
-        ("Bouc-Wen", cut([training, test], 12), ("arx",), "force", "displacement"),
-    ):
-        for kind in kinds:
-            estimator = partial(load("estimators", kind), input=given, output=wanted)
-            shares, wide = np.array([drawn(estimator, runs, seed) for seed in range(DRAWS)]).T
-            print(
-                f"| {name}, `{kind}` | {np.median(shares):.1f} "
-                f"({shares.min():.0f} to {shares.max():.0f}) | {np.median(wide):.2f} "
-                f"({wide.min():.2f} to {wide.max():.2f}) |",
-                flush=True,
+def tried(name: str, model: str, seed: int) -> list[Tried]:
+    """Return how the band of a model holds on a plant's motions; nothing where it cannot be fitted."""
+    plant = PLANTS[name](seed)
+    channels = arranged(model, plant)
+    if channels is None:
+        return []
+    kind = registry.load("estimators", model)
+    told = kind.channel_settings(channels.inputs, channels.outputs, channels.scheduling)
+    try:
+        block = kind(**told, seed=seed).fit([plant.train[0]]).model_
+        banded, found = calibration(block, plant.train[1:])
+        return [
+            Tried(
+                name,
+                model,
+                motion,
+                banded.band.level,
+                share(banded, runs),
+                float(np.mean(found.over_constant)),
             )
+            for motion, runs in plant.test.items()
+        ]
+    except MckibbenError as error:
+        print(f"{name}, {model}: {str(error)[:100]}", file=sys.stderr)
+        return []
+
+
+def main(plants: Sequence[str], models: Sequence[str], seeds: int) -> None:
+    rows = [
+        row
+        for name in plants
+        for model in models
+        for seed in range(seeds)
+        for row in tried(name, model, seed)
+    ]
+    print(
+        "| plant, model | motion | level [%] | held [%] | width / constant |\n|---|---|---:|---:|---:|"
+    )
+    for row in rows:
+        print(
+            f"| {row.plant}, `{row.model}` | {row.motion} | {100 * row.level:.0f} "
+            f"| {100 * row.held:.0f} | {row.ratio:.2f} |"
+        )
+    for what, some in (
+        ("motion like the calibration's", [row for row in rows if row.motion == SAME]),
+        ("motion of other kinds", [row for row in rows if row.motion != SAME]),
+    ):
+        held = np.array([row.held for row in some])
+        met = np.mean([row.held >= row.level - 0.05 for row in some])
+        tenth, middle = np.quantile(held, [0.1, 0.5])
+        print(
+            f"{what}: {held.size} cases, held {100 * held.mean():.0f} % on average, median "
+            f"{100 * middle:.0f} %, lowest tenth {100 * tenth:.0f} %; in {100 * met:.0f} % of them no "
+            "more than 5 % below the level"
+        )
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder of measured recordings")
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("plants", nargs="*", default=list(PLANTS))
+    parser.add_argument("--models", nargs="*", default=MODELS)
+    parser.add_argument("--seeds", type=int, default=2)
+    arguments = parser.parse_args()
     warnings.simplefilter("ignore")
-    main(parser.parse_args().data)
+    main(arguments.plants or list(PLANTS), arguments.models, arguments.seeds)

@@ -1162,61 +1162,21 @@ def state_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return _rows([block.output_offset + block.output_scale * x[0] for x in states])
 
 
-def motion_seen(
-    ends: Rows, widths: list[float], keeps: list[float], n_driving: int, inputs: Rows
-) -> tuple[Rows, list[float]]:
-    """Return what a band sees of a motion, and how far it is beyond what calibration saw."""
-    low, high = ends
-
-    def shares(row: list[float]) -> list[float]:
-        return [(x - a) / (b - a) for x, a, b in zip(row, low, high, strict=True)]
-
-    first = [min(max(share, 0.0), 1.0) for share in shares(inputs[0])[:n_driving]]
-    plays = [[share] * len(widths) for share in first]
-    lags = [[share] * len(keeps) for share in first]
-    seen, beyond = [], []
-    for row in inputs:
-        given = shares(row)
-        beyond.append(max(0.0, *(share - 1.0 for share in given), *(-share for share in given)))
-        one = []
-        for j, share in enumerate(min(max(share, 0.0), 1.0) for share in given):
-            one.append(share)
-            if j < n_driving:
-                plays[j] = [_play(s, share, r) for s, r in zip(plays[j], widths, strict=True)]
-                lags[j] = [share + k * (s - share) for s, k in zip(lags[j], keeps, strict=True)]
-                one += [(share - s) / r for s, r in zip(plays[j], widths, strict=True)]
-                one += [share - s for s in lags[j]]
-        seen.append(one)
-    return seen, beyond
-
-
 def band(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    keeps = [math.exp(-sample_time / time) for time in block.times]
-    n = len(block.driving)
-    seen, beyond = motion_seen(block.ends, block.widths, keeps, n, inputs)
     place = math.ceil(block.level * (len(block.scores[0]) - 1) - 1e-9)
     outputs = []
-    for row, one, far in zip(inputs, seen, beyond, strict=True):
-        z = [
-            min(max((x - m) / s, -3.0), 3.0)
-            for x, m, s in zip(one, block.mean, block.spread, strict=True)
-        ]
-        bells = [math.exp(-block.sharpness * math.dist(z, bell) ** 2) for bell in block.bells]
-        terms, ends = [1.0, *z, *bells], []
-        for g, y in enumerate(row[n:]):
-            a, b, c, d = block.limits[g]
-            shift = min(max(_sum(block.shift[g], terms), a), b)
-            scale = math.exp(min(max(_sum(block.log_scale[g], terms), c), d))
-            half = block.scores[g][place] * scale * (1.0 + far / 0.05)
-            ends += [y, min(y, y + shift - half), max(y, y + shift + half)]
+    for before, row in zip([inputs[0], *inputs], inputs, strict=False):
+        ends = []
+        for g, y in enumerate(row):
+            half = block.scores[g][place]
+            half += half * block.widening[g] / sample_time * abs(y - before[g])
+            ends += [y, y - half, y + half]
         outputs.append(ends)
     return outputs
 
 
 def banded_pi(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    modelled = stepping(_PI)(block.forward, inputs, sample_time)
-    both = [[*given, *found] for given, found in zip(inputs, modelled, strict=True)]
-    return band(block.band, both, sample_time)
+    return band(block.band, stepping(_PI)(block.forward, inputs, sample_time), sample_time)
 
 
 TWINS: dict[str, Twin] = {

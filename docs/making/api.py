@@ -17,7 +17,7 @@ PARTS = (
     *("recording", "signals", "metrics", "diagnosis", "files", "rigs", "environments"),
     *("blocks", "estimators", "control", "comparison", "planning", "validation", "muscles"),
     *("papers", "report", "studying", "export", "stream", "link", "simulators", "ros"),
-    *("bands", "measured", "example", "errors"),
+    *("diagnosis", "measured", "example", "errors"),
 )
 """Of the package, in the order of its layers."""
 

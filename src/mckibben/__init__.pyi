@@ -21,12 +21,13 @@ from .blocks.memoryless import Affine as Affine
 from .blocks.memoryless import PiecewiseLinear as PiecewiseLinear
 from .blocks.memoryless import Polynomial as Polynomial
 from .blocks.saving import load as load
-from .comparison.calibrating import calibrate as calibrate
 from .comparison.identifying import identify as identify
 from .comparison.ranking import compare as compare
+from .diagnosis.bands import calibrate as calibrate
 from .diagnosis.characterization import characterize as characterize
 from .diagnosis.check import check as check
 from .diagnosis.data_gaps import data_gaps as data_gaps
+from .diagnosis.review import review as review
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning
 from .errors import MckibbenError as MckibbenError
@@ -44,7 +45,6 @@ from .report import write_report as write_report
 from .rigs import Rig as Rig
 from .rigs import check_rig as check_rig
 from .rigs import load_rig as load_rig
-from .studying.reviewing import review as review
 from .studying.study import study as study
 from .version import __version__ as __version__
 

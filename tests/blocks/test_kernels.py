@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import ModelWarning
-from mckibben.blocks.bands import look_along
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_law import (
     AT_REST,
@@ -40,7 +39,7 @@ from mckibben.estimators.coupled.mpi_narmax import remembered
 from mckibben.registry import load, names
 from mckibben.system.compiling import Deferred
 from tests.blocks.balances import ALONE as HARDENING
-from tests.twins import STEP_ERROR, STEPPED, TWINS, motion_seen
+from tests.twins import STEP_ERROR, STEPPED, TWINS
 
 pytestmark = pytest.mark.kernel
 
@@ -401,19 +400,6 @@ def test_air_holds_between_its_goals_and_goes_as_far_as_it_can() -> None:
     assert pressure[:14].tolist() == [pressure[0]] * 14  # held, then late
     expected = TWINS["air"](air, command[:, np.newaxis].tolist(), 0.01)
     np.testing.assert_allclose(pressure[:, np.newaxis], expected, atol=1e-12)
-
-
-def test_what_a_band_is_fitted_to_is_what_it_sees() -> None:
-    samples = path([-0.5, 0.0, -1.0], [5.5, 2.0, 41.0])
-    ends, widths, keeps = (
-        np.array([[0.0, 0.1, 0.0], [5.0, 1.9, 40.0]]),
-        np.array([0.1, 0.3]),
-        np.array([0.9]),
-    )
-    found = np.empty((len(samples), 3 + 2 * 3))
-    look_along(samples, ends.ravel(), widths, keeps, np.empty(2 * 3), found)
-    expected, _ = motion_seen(ends.tolist(), widths.tolist(), keeps.tolist(), 2, samples.tolist())
-    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_sums_that_may_be_reordered_are_compiled_alike_whatever_was_compiled_before() -> None:

@@ -88,7 +88,7 @@ def test_without_a_band_a_twin_is_simulate_to_the_bit(block: Block) -> None:
 
 
 def test_a_band_at_any_level_holds_that_share_of_what_is_drawn() -> None:
-    banded, given = Banded(MODEL, band(limits=((0.0, 0.0, -3.0, 1.0),))), pressures(4000)
+    banded, given = Banded(MODEL, band()), pressures(4000)
     drawn = Twin(banded).run(given, seed=1)["displacement"]
     for level in (0.5, 0.8, 0.9):
         ends = banded.at(level).simulate(given)

@@ -172,9 +172,10 @@ def kept_motion(
 
 def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Say how far a log of the real rig was off its reference, and why; keep it, and the refit."""
+    from mckibben.diagnosis.refit import Refit
+    from mckibben.diagnosis.review import review
     from mckibben.files import read
-    from mckibben.studying.refitting import Refit
-    from mckibben.studying.reviewing import review
+    from mckibben.report import words
 
     name, settings = str(given["name"]), given.get("settings") or {}
     with warnings.catch_warnings(record=True) as caught:
@@ -202,14 +203,13 @@ def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         refit.model.save(workspace.path("reviews", f"{name}-refit.json"))
     for place, one in enumerate(found.outputs):
         time, error = one.time, one.measured - one.reference
-        causes = [cause for cause in one.causes if abs(cause.share) >= 0.01][:5]
         curves = [
             curve("reference", time, one.reference, "measured"),
             curve("measured", time, one.measured, "series-1"),
             curve("error", time, error, "measured", below=True),
             *(
-                curve(cause.kind, time, cause.signal, f"series-{k + 1}", below=True)
-                for k, cause in enumerate(causes)
+                curve(kind, time, part, f"series-{k + 1}", below=True)
+                for k, (kind, part) in enumerate(one.parts.items())
             ),
         ]
         workspace.write_json(
@@ -223,17 +223,14 @@ def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
                 "unit": one.unit,
                 "achieved": one.achieved,
                 "predicted": one.predicted,
-                "causes": [
-                    {"kind": cause.kind, "share": cause.share, "said": cause.told}
-                    for cause in one.causes
-                ],
-                "verdict": found.verdict,
-                "sentences": [*found.sentences, *found.notes, *notes],
+                "pressure": one.pressure,
+                "residual": one.residual,
+                "sentences": [*words.reviewed(found), *notes],
                 "refitted": refit is not None,
                 "curves": curves,
             },
         )
-    return found.verdict
+    return words.reviewed(found)[0]
 
 
 def estimate(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

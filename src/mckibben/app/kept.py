@@ -134,6 +134,15 @@ class Said(Kept):
     said: Text = ""
 
 
+class Band(Kept):
+    """How a band holds on the test; of results of older versions some figures are absent."""
+
+    level: Number = None
+    unit_of_width: Text = ""
+    coverage: dict[Text, Number] = {}
+    width: dict[Text, Number] = {}
+
+
 class Fitted(Kept):
     """What came of a fit."""
 
@@ -151,7 +160,7 @@ class Fitted(Kept):
     test: Figures | None = None
     train: Figures | None = None
     memory: Memory | None = None
-    band: Said | None = None
+    band: Band | None = None
     outputs: dict[Text, Figures] = {}
     n_parameters: Count | None = None
     fit_seconds: Number = None
@@ -195,14 +204,6 @@ class Line2D(Kept):
     y: list[Number] = []
 
 
-class Cause(Kept):
-    """What a part of an error comes from."""
-
-    kind: Text
-    share: Number = None
-    said: Text = ""
-
-
 class Reviewed(Kept):
     """What a log of the real rig said of one output."""
 
@@ -213,8 +214,8 @@ class Reviewed(Kept):
     unit: Text = ""
     achieved: Number = None
     predicted: Number = None
-    causes: list[Cause] = []
-    verdict: Text = ""
+    pressure: Number = None
+    residual: Number = None
     sentences: list[Text] = []
     refitted: bool = False
     curves: list[Line2D] = []

@@ -1,10 +1,9 @@
-"""Bands: how far off a model may be, by the state of motion, and models that come with one.
+"""Bands: how far off a model may be, and models that come with one.
 
-    lower = min(y, y + m(z) - q s(z) w),   upper = max(y, y + m(z) + q s(z) w),
+    lower = y - q (1 + k |dy/dt|),   upper = y + q (1 + k |dy/dt|),
 
-where y is modelled, z is the state of motion, m what the model misses on average there, log s how much
-it misses, both linear in z; q is what a level asks for, and w = 1, or more beyond the ranges that
-calibration saw. `mckibben.bands` finds m, s and q.
+where y is modelled, q is the half width at rest that a level asks for, and k how much wider the band is
+at speed, 0 for a constant width. `mckibben.calibrate` finds both.
 """
 
 from __future__ import annotations
@@ -29,198 +28,73 @@ from mckibben.errors import ModelError
 from mckibben.numerals import numeral
 from mckibben.registry import load
 
-WIDENS = 0.05
-"""Share of a range beyond its end at which a band is twice as wide."""
-
-FARTHEST = 3.0
-"""Deviations from the mean beyond which what is seen counts as just there."""
-
-HEAD = 6
-
-
-@kernel
-def rest(first: Array, ends: Array, n_driving: int, per: int, state: Array) -> None:
-    """Fill the state of a motion that begins at rest; ``per`` are plays and lags of an input."""
-    for j in range(n_driving):
-        low, high = ends[j], ends[ends.size // 2 + j]
-        share = min(max((first[j] - low) / (high - low), 0.0), 1.0)
-        state[j * per : (j + 1) * per] = share
-
-
-@kernel
-def look(
-    x: Array, ends: Array, widths: Array, keeps: Array, n_driving: int, state: Array, seen: Array
-) -> float:
-    """Take one sample, fill the state of motion, and return how far it is beyond what was seen.
-
-    Every input, scaled to the range that calibration saw, gives its level, how far it is from its last
-    reversals (plays of several widths, over their widths: 1 where the play is drawn along, less where
-    the input just turned), and how far it is from its own past (lags of several times). Every modelled
-    output gives its level.
-
-    ``x`` are ``n_driving`` inputs, then modelled outputs, of the lowest, then highest ``ends``;
-    ``widths`` are of plays, as shares of the range, and ``keeps`` what lags keep of themselves from
-    sample to sample. The state has plays and lags of every input. How far a sample is beyond an end is
-    a share of that channel's range, the largest of all.
-    """
-    beyond, place, slot = 0.0, 0, 0
-    for j in range(x.size):
-        low, high = ends[j], ends[x.size + j]
-        share = (x[j] - low) / (high - low)
-        beyond = max(beyond, share - 1.0, -share)
-        share = min(max(share, 0.0), 1.0)
-        seen[place] = share
-        place += 1
-        if j >= n_driving:
-            continue
-        for i in range(widths.size):
-            at = min(max(state[slot], share - widths[i]), share + widths[i])
-            state[slot] = at
-            seen[place] = (share - at) / widths[i]
-            slot += 1
-            place += 1
-        for i in range(keeps.size):
-            at = share + keeps[i] * (state[slot] - share)
-            state[slot] = at
-            seen[place] = share - at
-            slot += 1
-            place += 1
-    return beyond
-
-
-@kernel
-def look_along(
-    samples: Array, ends: Array, widths: Array, keeps: Array, state: Array, found: Array
-) -> None:
-    """Fill ``found``, shape (n, states of motion), over a run that begins at rest.
-
-    ``state`` is room for plays and lags of all inputs that drive.
-    """
-    per = widths.size + keeps.size
-    n_driving = state.size // per
-    rest(samples[0], ends, n_driving, per, state)
-    for t in range(samples.shape[0]):
-        look(samples[t], ends, widths, keeps, n_driving, state, found[t])
-
 
 @step
-def band_step(
-    coefficients: Array, state: Array, scratch: Array, inputs: Array, outputs: Array
-) -> None:
-    """Give, for every modelled output, its value, its lower and its upper end."""
-    c = coefficients
-    n_driving, n_given = int(c[0]), int(c[1])
-    n_widths, n_keeps, n_bells, sharpness = int(c[2]), int(c[3]), int(c[4]), c[5]
-    n_x = n_driving + n_given
-    n_seen = n_x + n_driving * (n_widths + n_keeps)
-    n_terms = 1 + n_seen + n_bells
-    at_widths = HEAD + 2 * n_x
-    at_mean = at_widths + n_widths + n_keeps
-    at_bells = at_mean + 2 * n_seen
-    at_weights = at_bells + n_bells * n_seen
-    at_limits = at_weights + 2 * n_given * n_terms
-    ends, widths = c[HEAD:at_widths], c[at_widths : at_widths + n_widths]
-    keeps = c[at_widths + n_widths : at_mean]
-    mean, spread = c[at_mean : at_mean + n_seen], c[at_mean + n_seen : at_bells]
-    bells, weights = c[at_bells:at_weights], c[at_weights:at_limits]
-    limits, quantile = c[at_limits : at_limits + 4 * n_given], c[at_limits + 4 * n_given :]
-    seen, terms = scratch[:n_seen], scratch[n_seen : n_seen + n_terms]
-    beyond = look(inputs, ends, widths, keeps, n_driving, state, seen)
-    terms[0] = 1.0
-    for i in range(n_seen):
-        far = (seen[i] - mean[i]) / spread[i]
-        terms[1 + i] = min(max(far, -FARTHEST), FARTHEST)
-    for k in range(n_bells):
-        distance = 0.0
-        for i in range(n_seen):
-            off = terms[1 + i] - bells[k * n_seen + i]
-            distance += off * off
-        terms[1 + n_seen + k] = np.exp(-sharpness * distance)
-    for g in range(n_given):
-        m, s = 0.0, 0.0
-        for i in range(n_terms):
-            m += weights[g * n_terms + i] * terms[i]
-            s += weights[(n_given + g) * n_terms + i] * terms[i]
-        m = min(max(m, limits[4 * g]), limits[4 * g + 1])
-        s = np.exp(min(max(s, limits[4 * g + 2]), limits[4 * g + 3]))
-        half = quantile[g] * s * (1.0 + beyond / WIDENS)
-        value = inputs[n_driving + g]
-        outputs[3 * g] = value
-        outputs[3 * g + 1] = min(value, value + m - half)
-        outputs[3 * g + 2] = max(value, value + m + half)
+def band_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Give, for every modelled output, its value, its lower and its upper end.
+
+    Coefficients are the half widths at rest, then how much each grows by a change from sample to sample.
+    The state is the last outputs, then whether there were any.
+    """
+    n = inputs.size
+    for k in range(n):
+        half = coefficients[k]
+        if state[n] > 0.0:
+            half += coefficients[n + k] * abs(inputs[k] - state[k])
+        state[k] = inputs[k]
+        outputs[3 * k] = inputs[k]
+        outputs[3 * k + 1] = inputs[k] - half
+        outputs[3 * k + 2] = inputs[k] + half
+    state[n] = 1.0
 
 
 @kernel
 def band_start(coefficients: Array, state: Array, inputs: Array, virgin: bool) -> None:
-    """Start plays and lags at rest at the first sample."""
-    c = coefficients
-    n_driving, n_x = int(c[0]), int(c[0]) + int(c[1])
-    rest(inputs, c[HEAD : HEAD + 2 * n_x], n_driving, int(c[2]) + int(c[3]), state)
+    """Start at rest: no output was before the first."""
+    state[:] = 0.0
 
 
 @dataclass(frozen=True, config=STRICT)
 class Band(Block):
-    """From a model's inputs and outputs to its outputs with their lower and upper ends.
+    """From a model's outputs to these with their lower and upper ends.
 
     Parameters
     ----------
     driving, given : tuple of Channel
         The model's inputs, and its outputs.
     ends : rows, shape (2, inputs and outputs)
-        Lowest and highest of each that calibration saw.
-    widths : vector
-        Of plays, as shares of a range.
-    times : vector
-        Time constants of lags [s]; with some the band is rate-dependent.
-    mean, spread : vector, shape (s,)
-        Of the state of motion.
-    bells : rows, shape (b, s)
-        RBF centres, in deviations from the mean: none but in bands of earlier versions.
-    sharpness : float
-        Of these, per squared deviation.
-    shift, log_scale : rows, shape (outputs, 1 + s + b)
-        Weights of the constant, of the state of motion, and of RBF centres: of what the model misses on
-        average in the output's unit, and of the logarithm of how much.
-    limits : rows, shape (outputs, 4)
-        Least and largest shift, least and largest logarithm of the scale.
+        Lowest and highest of each in the calibration.
+    widening : vector, shape (outputs,)
+        Share by which the band is wider for every unit of speed [s per unit of the output]; 0 for a
+        constant width.
     scores : rows, shape (outputs, any)
-        What the half width is in scales, at evenly spaced levels from 0 to 1.
+        Half width at rest, at evenly spaced levels from 0 to 1 [unit of the output].
     units : int
-        How many exchangeable runs, or blocks of runs, calibration had.
+        Number of exchangeable runs, or blocks of runs, in the calibration.
     unit : {"run", "block"}
         Which of them.
     level : float
-        Share of samples of a new run that the band is to hold, between 0 and units / (units + 1).
+        Share of the samples of a new run that the band is to hold, between 0 and units / (units + 1).
     memory : float
-        Integral of the autocorrelation of what is missed [s], or in samples where there are no
-        ``times``; 0 where it is not known. Not for the band, but for what is drawn from it
+        Correlation length of the errors [s]; 0 where it is not known. For what is drawn from the band
         (`mckibben.control.Twin`).
     """
 
     kind: ClassVar[str] = "band"
-    ports: ClassVar[Ports] = ("driving", "given"), (), ("given",)
+    ports: ClassVar[Ports] = ("given",), (), ("given",)
     kernel: ClassVar[Step] = band_step
     start_kernel: ClassVar[Start] = band_start
-    parameters: ClassVar[tuple[str, ...]] = ("shift", "log_scale")
+    parameters: ClassVar[tuple[str, ...]] = ("widening",)
+    made_again: ClassVar[str] = "calibrate the model again (mckibben calibrate)"
     notation: ClassVar[Notation] = Notation(
-        r"y^{\pm} = \begin{cases} \max(y,\, y + m + q s w) \\ \min(y,\, y + m - q s w) \end{cases}",
-        r"m = M \cdot (1,\, z,\, \beta(z)),\quad \ln s = S \cdot (1,\, z,\, \beta(z))",
-        shift="M_{jk} [{out0}]",
-        log_scale="S_{jk}",
+        r"y^{\pm} = y \pm q\,(1 + k\,|\dot y|)",
+        widening="k_{k} [s/{out0}]",
     )
 
     driving: Channels
     given: Channels
     ends: Rows
-    widths: Vector
-    times: Vector
-    mean: Vector
-    spread: Vector
-    bells: Rows
-    sharpness: float
-    shift: Rows
-    log_scale: Rows
-    limits: Rows
+    widening: Vector
     scores: Rows
     units: Annotated[int, Field(ge=1)]
     unit: Literal["run", "block"] = "run"
@@ -228,39 +102,23 @@ class Band(Block):
     memory: Annotated[FiniteFloat, Field(ge=0)] = 0.0
 
     def __post_init__(self) -> None:
-        n_x, n_given, terms = len(self.inputs), len(self.given), 1 + self._n_seen + len(self.bells)
-        fits = {
-            "ends": [n_x] * 2,
-            "bells": [self._n_seen] * len(self.bells),
-            "shift": [terms] * n_given,
-            "log_scale": [terms] * n_given,
-            "limits": [4] * n_given,
-            "scores": [max(len(self.scores[0]) if self.scores else 0, 2)] * n_given,
-        }
-        for name, wanted in fits.items():
-            if [len(row) for row in getattr(self, name)] != wanted:
-                raise ModelError(f"the {name} of a band do not fit. Remedy: calibrate again.")
-        if {len(self.mean), len(self.spread)} != {self._n_seen} or not self.driving:
-            raise ModelError("the state of a band does not fit. Remedy: calibrate again.")
-        positive = (*self.widths, *self.times, *self.spread, self.sharpness)
-        if min(positive) <= 0 or any(a >= b for a, b in zip(*self.ends, strict=True)):
+        n = len(self.given)
+        lengths = {len(self.widening), len(self.scores)}
+        if [len(row) for row in self.ends] != [len(self.driving) + n] * 2 or lengths != {n}:
             raise ModelError(
-                "a width, time, spread, sharpness or range of a band is not positive. "
-                "Remedy: calibrate again."
+                "the numbers of a band do not fit its channels. Remedy: calibrate again."
             )
-        if any(list(row) != sorted(row) or row[0] < 0 for row in self.scores):
+        if any(low > high for low, high in zip(*self.ends, strict=True)) or min(self.widening) < 0:
+            raise ModelError(
+                "a range or a widening of a band is negative. Remedy: calibrate again."
+            )
+        if any(len(row) < 2 or list(row) != sorted(row) or row[0] < 0 for row in self.scores):
             raise ModelError("the scores of a band do not rise. Remedy: calibrate again.")
-        if any(a > b or c > d for a, b, c, d in self.limits):
-            raise ModelError("the limits of a band are not in order. Remedy: calibrate again.")
         check_level(self.level, self.units, self.unit)
 
     @property
-    def _n_seen(self) -> int:
-        return len(self.inputs) + self.n_states
-
-    @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
-        return bool(self.times)
+        return any(self.widening)
 
     @property
     def outputs(self) -> tuple[Channel, ...]:
@@ -273,42 +131,25 @@ class Band(Block):
 
     @property
     def n_states(self) -> int:
-        """Plays and lags of every input."""
-        return len(self.driving) * (len(self.widths) + len(self.times))
-
-    @property
-    def n_scratch(self) -> int:
-        """State of motion, and terms."""
-        return 1 + 2 * self._n_seen + len(self.bells)
+        """The last outputs, and whether there were any."""
+        return len(self.given) + 1
 
     def coefficients(self, sample_time: float | None) -> Array:
-        step = needs_sample_time(self.kind, sample_time) if self.times else 1.0
-        keeps = np.exp(-step / np.array(self.times))
-        places = [int(np.ceil(self.level * (len(row) - 1) - 1e-9)) for row in self.scores]
-        quantiles = [row[place] for row, place in zip(self.scores, places, strict=True)]
-        counts = [len(x) for x in (self.driving, self.given, self.widths, self.times, self.bells)]
-        seen = (self.widths, keeps, self.mean, self.spread)
-        weights = (self.bells, self.shift, self.log_scale, self.limits)
-        numbers = (*counts, self.sharpness), self.ends, *seen, *weights, quantiles
-        return np.concatenate([np.ravel(np.array(some, dtype=np.float64)) for some in numbers])
+        step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else 1.0
+        half = np.array(
+            [row[int(np.ceil(self.level * (len(row) - 1) - 1e-9))] for row in self.scores]
+        )
+        return np.concatenate([half, half * self.widening / step])
 
     @classmethod
     def example(cls) -> Self:
-        """Return a band of a displacement by pressure that is wider where the pressure just turned."""
+        """Return a band of a displacement by pressure that is wider where the motion is fast."""
         return cls(
             driving=(Channel("pressure", "bar"),),
             given=(Channel("displacement", "mm"),),
             ends=((0.0, -1.0), (6.0, 40.0)),
-            widths=(0.1,),
-            times=(2.0,),
-            mean=(0.5, 0.0, 0.0, 0.5),
-            spread=(0.3, 0.5, 0.2, 0.3),
-            bells=((0.0, -1.0, 0.5, 0.0),),
-            sharpness=0.25,
-            shift=((0.0, 0.1, 0.05, -0.1, 0.0, 0.2),),
-            log_scale=((-1.0, 0.2, 0.1, 0.3, 0.0, 0.4),),
-            limits=((-0.5, 0.5, -3.0, 1.0),),
-            scores=((0.0, 0.5, 1.0, 1.5, 2.0, 4.0),),
+            widening=(0.02,),
+            scores=((0.0, 0.25, 0.5, 0.75, 1.0, 2.0),),
             units=19,
         )
 
@@ -338,7 +179,7 @@ class Banded(Composition):
     forward : Block
         The model.
     band : Band
-        Of its inputs and outputs; `mckibben.calibrate` finds it.
+        Of its outputs; `mckibben.calibrate` finds it.
 
     Examples
     --------
@@ -368,7 +209,7 @@ class Banded(Composition):
 
     def __post_init__(self) -> None:
         self.check_parts()
-        if self.band.inputs != (*self.forward.inputs, *self.forward.outputs):
+        if (self.band.driving, self.band.given) != (self.forward.inputs, self.forward.outputs):
             raise ModelError(
                 f"the band is of other channels than {self.forward.title!r}. Remedy: calibrate it again."
             )
@@ -393,13 +234,13 @@ class Banded(Composition):
         if initial is None or isinstance(initial, str) or len(initial) != self.forward.n_states:
             return super().initial_state(first, initial)
         own = self.forward.initial_state(first, initial)
-        return np.concatenate([own, self.band.initial_state(first)])
+        return np.concatenate([own, np.zeros(self.band.n_states)])
 
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
-        return self.band.wired(board, [*taken, *self.forward.wired(board, taken)])
+        return self.band.wired(board, self.forward.wired(board, taken))
 
     def joined(self, parts: Sequence[str]) -> str:
-        return r"y = P[u],\quad (y^{-},\, y^{+}) = \text{band}[u, y]"
+        return r"y = P[u],\quad (y^{-},\, y^{+}) = \text{band}[y]"
 
     @classmethod
     def example(cls) -> Self:

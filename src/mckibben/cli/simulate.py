@@ -52,12 +52,13 @@ def simulate(
     """
     from dataclasses import asdict
 
-    from mckibben.bands.beyond import beyond_calibrated
     from mckibben.blocks.saving import load
     from mckibben.control.beyond import beyond_known
+    from mckibben.diagnosis.bands import outside
     from mckibben.files import write
     from mckibben.metrics import score
     from mckibben.outputs import claim_recording
+    from mckibben.report.words import outside_calibration
 
     claim_recording(out, inputs=[model, file], force=force)
     banded, block = _parted(load(model), interval)
@@ -86,8 +87,13 @@ def simulate(
     if banded is not None:
         if initial == "model" and all(c.name in recording for c in block.outputs):
             notes += _started_elsewhere(block, recording)
-        samples = modelled.matrix(channel.name for channel in banded.band.inputs)
-        notes += beyond_calibrated(banded.band, samples, recording.name)
+        band = banded.band
+        known = {channel.name: channel for channel in (*band.driving, *band.given)}
+        ranges = dict(zip(known, zip(*band.ends, strict=True), strict=True))
+        notes += [
+            outside_calibration(recording.name, known[name], share, modelled[name], ranges[name])
+            for name, share in outside(band, modelled.matrix(known)).items()
+        ]
     metrics: dict[str, dict[str, float]] = {}
     for channel in block.outputs:
         name = f"{channel.name}_model"

@@ -59,17 +59,15 @@ def study(
         ran = [None if path is None else saved(path) for path in (model, compensator)]
         given = [path for path in (model, compensator) if path is not None]
         begun = asked.begin(files, reading, folder, study_files, beside=given)
+        from mckibben.diagnosis.review import REFERENCE
         from mckibben.recording import notes_by_file
         from mckibben.report import StudyFolder
         from mckibben.report.commands import Typed
-        from mckibben.studying.log import REFERENCE
         from mckibben.studying.study import study as find
 
         wished = any(name.startswith(REFERENCE) for run in begun.every for name in run.channels)
         if wished and not given and not asked.as_json:
-            say(
-                "A reference is recorded: --compensator inverse.json, what ran, tells why it was missed."
-            )
+            say("A reference is recorded: --compensator inverse.json, shows why it was missed.")
         results = StudyFolder(
             begun.results or folder,
             Typed(
@@ -111,8 +109,8 @@ def study(
 
 def _say(study: Study, folder: Path) -> None:
     """Print what the muscle and a loop do, before any model is fitted."""
+    from mckibben.diagnosis.refit import Refit
     from mckibben.report import words
-    from mckibben.studying.refitting import Refit
 
     if study.characterization is not None:
         for sentence in words.characterization_sentences(study.characterization):
@@ -121,7 +119,8 @@ def _say(study: Study, folder: Path) -> None:
         say(f"- {words.gap_sentence(gap)} {words.gap_run(gap)}")
     if study.review is not None:
         say()
-        say(str(study.review))
+        for sentence in words.reviewed(study.review):
+            say(sentence)
         if isinstance(study.review.refit, Refit):
             say(f"Written: {folder / 'refit.json'}")
             if study.review.refit.recommended:

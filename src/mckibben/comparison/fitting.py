@@ -11,7 +11,6 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
-from mckibben.bands.held import Held
 from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import Mask, run_free
 from mckibben.comparison import backends
@@ -20,6 +19,7 @@ from mckibben.comparison.choosing import CONSTANT, skill_of
 from mckibben.comparison.leaderboard import Row
 from mckibben.comparison.memory_test import Memory, memory_test
 from mckibben.comparison.splits import Fold, Split
+from mckibben.diagnosis.bands import Held
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.optimisers.tracker import Progress, whole_searches
 from mckibben.metrics import Scores, mean_scores, score
@@ -70,7 +70,6 @@ class Data:
                 run.matrix(self.channels.outputs),
                 rows,
                 run.sample_time,
-                place,
             )
             for place, fold in enumerate(self.folds)
             for run, rows, modelled in zip(

@@ -12,9 +12,9 @@ import numpy as np
 from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.blocks.inverse import Inverse
-from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.choosing import CONSTANT, Against, order, recommended
 from mckibben.comparison.memory_test import Memory
+from mckibben.diagnosis.bands import TestedBand
 from mckibben.errors import MckibbenError
 from mckibben.estimators.catalogue import caution
 from mckibben.metrics import Scores

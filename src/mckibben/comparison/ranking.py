@@ -12,7 +12,6 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.checkpoints import Checkpoints, source
-from mckibben.comparison.banding import tested_band
 from mckibben.comparison.channels import Names
 from mckibben.comparison.choosing import CONSTANT
 from mckibben.comparison.fitting import (
@@ -27,6 +26,7 @@ from mckibben.comparison.fitting import (
 )
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
+from mckibben.diagnosis.bands import tested_band
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.statistics import (

@@ -1,13 +1,13 @@
 """A twin: a fitted model where a plant stands, scattering as its band says.
 
-    y[t] = P[u][t] + m(z) + s(z) w sign(g[t]) Q(|g[t]|),   (1 - r / q)² g = c n
+    y[t] = P[u][t] + s sign(g[t]) Q(|g[t]|),   (1 - r / q)² g = c n
 
-where P is the model; m, s, w and z are its band's (`mckibben.blocks.bands`), Q gives the score that
+where P is the model; s = 1 + k |dy/dt| is its band's (`mckibben.blocks.bands`), Q gives the score that
 the share of |g| below it reaches, n is white and normal, 1 / q delays, and c makes g of variance 1. So
 the band at any level holds that share of the samples, or more, and r keeps them alike for as long as the
-misses were that calibration saw. No muscle jumps, so what is drawn does not either: Q rises straight
-between levels, where the scores of few runs are stairs, and m and s follow what the band says within as
-long as misses stay alike.
+errors of the calibration were. No muscle jumps, so what is drawn does not either: Q rises straight
+between levels, where the scores of few runs are stairs, and s follows the band within as long as errors
+stay alike.
 Without a band nothing scatters, and outputs are those of ``model.simulate``, to the bit.
 """
 
@@ -270,7 +270,7 @@ class Twin:
             self._scatter = _Scatter(
                 self.model.band, self.sample_time, rng, round(self.scatter_after / self.sample_time)
             )
-            self._stream = Banded(self.forward, self._scatter.wide).stream(self.sample_time)
+            self._stream = Banded(self.forward, self._scatter.unit_band).stream(self.sample_time)
         else:
             self._stream = self.forward.stream(self.sample_time)
 
@@ -316,36 +316,35 @@ class Twin:
 class _Scatter:
     """What is drawn beside a model's outputs.
 
-    The band's shift and scale are read off one so wide that neither end is cut off at the model.
+    The band's scale is read off one of score 1.
     """
 
     def __init__(
         self, band: Band, sample_time: float, rng: np.random.Generator, quiet: int
     ) -> None:
-        shifts, logs = np.array(band.limits)[:, :2], np.array(band.limits)[:, 2]
-        self._times = 1.0 + 2.0 * float((np.abs(shifts).max(axis=1) / np.exp(logs)).max())
         n = len(band.given)
-        self.wide = replace(band, scores=((self._times, self._times),) * n, level=0.5)
+        self.unit_band = replace(band, scores=((1.0, 1.0),) * n, level=0.5)
         self._quantiles = [_quantiles(np.array(row)) for row in band.scores]
-        samples = band.memory / (sample_time if band.times else 1.0)
-        self._keeps = r = _keeping(samples)
+        self._keeps = r = _keeping(band.memory / sample_time)
         self._unit = sqrt((1.0 - r * r) ** 3 / (1.0 + r * r))
         self._rng, self._quiet = rng, quiet
         first, second = np.zeros((2, n)) if quiet else rng.standard_normal((2, n))
         # as after a long time; after a quiet one it grows from nothing
         once = first / sqrt(1.0 - r * r)
         self._once, self._twice = once, (once + r * second / sqrt(1.0 - r * r)) / (1.0 - r * r)
-        self._slow = np.zeros((2, n)) if quiet else None
+        self._scale = np.zeros(n) if quiet else None
         self.drawn = np.zeros(n)
 
     def on(self, found: Array) -> Array:
         """Return a sample of outputs with what is drawn, and move on."""
-        y, lower, upper = found.reshape(-1, 3).T
+        y, _, upper = found.reshape(-1, 3).T
         if self._quiet > 0:
             self._quiet -= 1
             return np.array(y)
-        told = np.array([0.5 * (lower + upper) - y, 0.5 * (upper - lower) / self._times])
-        self._slow = told if self._slow is None else told + self._keeps * (self._slow - told)
+        scale = upper - y
+        if self._scale is not None:
+            scale = scale + self._keeps * (self._scale - scale)
+        self._scale = scale
         scores = [
             np.copysign(np.interp(erf(abs(g) / sqrt(2.0)), *quantile), g)
             for g, quantile in zip(
@@ -354,7 +353,7 @@ class _Scatter:
         ]
         self._once = self._keeps * self._once + self._rng.standard_normal(self._once.size)
         self._twice = self._keeps * self._twice + self._once
-        self.drawn = self._slow[0] + self._slow[1] * np.array(scores)
+        self.drawn = scale * np.array(scores)
         return np.asarray(y + self.drawn)
 
 

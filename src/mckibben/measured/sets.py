@@ -59,12 +59,17 @@ class Set:
                 read_in = read(path, gaps=self.split.gaps, informative=False)
                 step = self.split.resample
                 found += read_in if step is None else [resample(one, step) for one in read_in]
-        return found if self.split.period is None else _periods(found, self.split.period)
+        if self.split.period is None:
+            return found
+        cut = [one for one in found if matches(one.name, self.split.periodic)]
+        return [*_periods(cut, self.split.period), *(one for one in found if one not in cut)]
 
     def tasks(self) -> Iterator[tuple[str, Task]]:
         """Give every task with what is left out, if it leaves out in turn: then it is several."""
+        names = [path.stem for path in self.folder.iterdir()]
         for task in self.split.tasks:
-            yield from task.parts()
+            if not task.optional or any(map(task.tests, names)):
+                yield from task.parts()
 
 
 def sets_in(folder: Path) -> list[Set]:

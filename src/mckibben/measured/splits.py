@@ -41,6 +41,8 @@ class Task(_Strict):
     ----------
     name : str
         Heading of the page's section; default the folder's title.
+    optional : bool
+        Whether it is left out where none of the files that it is tested on is there.
     files : list of str
         Names of the recordings that take part, with ``*`` and ``?`` for letters; default all.
     test : list of str
@@ -54,6 +56,7 @@ class Task(_Strict):
     """
 
     name: str = ""
+    optional: bool = False
     files: list[str] = ["*"]
     test: list[str] = []
     leave_out: list[str] = []
@@ -104,6 +107,8 @@ class Split(_Strict):
     period : int, optional
         Samples after which the motion repeats itself: recordings are cut into periods, of each of which
         no start counts.
+    periodic : list of str
+        Names of the recordings that do, with ``*`` and ``?`` for letters; default all.
     tasks : list of Task
         Default one, with the last quarter to test on.
     """
@@ -113,6 +118,7 @@ class Split(_Strict):
     resample: Annotated[float, Field(gt=0)] | None = None
     gaps: Literal["error", "split", "interpolate"] = "interpolate"
     period: Annotated[int, Field(ge=FEWEST)] | None = None
+    periodic: list[str] = ["*"]
     tasks: Annotated[list[Task], Field(min_length=1)] = [Task()]
 
     @field_validator("tasks")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mckibben.diagnosis.check import Validation
-from mckibben.report.wording import number, of_test_range, percent
+from mckibben.report import words
+from mckibben.report.wording import number, of_test_range
 from mckibben.report.words import check_sentences, check_verdict, gap_run, gap_sentence
 
 if TYPE_CHECKING:
@@ -13,10 +14,6 @@ if TYPE_CHECKING:
 
 MOST = 2
 """Things said of each."""
-
-
-SHORT = 0.03
-"""By which a band may hold less of the test than it should, unsaid."""
 
 
 def right(study: Study) -> list[str]:
@@ -46,24 +43,7 @@ def how_far(study: Study) -> list[str]:
             "around it: mckibben calibrate, on runs that it was not fitted to.",
             largest,
         ]
-    said = []
-    for name, width in band.width.items():
-        of = f"{name} was" if len(band.width) > 1 else "the muscle was"
-        inside, asked = percent(band.coverage[name]), percent(band.level)
-        scaled = width < 0.95 * band.constant_width[name]
-        by = ", narrower and wider by the state of motion" if scaled else ""
-        around = f"within about ±{number(width / 2, 2)} {board.unit} of the model{by}"
-        if band.coverage[name] < band.level - SHORT:
-            said.append(
-                f"Further than its errors in cross-validation say: a band for {asked} of the samples "
-                f"held {inside} of the test, where {of} to be {around}. Calibrate it on runs like "
-                "those to come: mckibben calibrate."
-            )
-        else:
-            said.append(
-                f"In {inside} of the test's samples {of} {around}, a band for {asked}. Expect the like "
-                "of runs like the test."
-            )
+    said = words.band_on_test(band.level, band.coverage, band.width, band.unit_of_width)
     return [*said, largest]
 
 

@@ -105,6 +105,7 @@ def page(study: Study, typed: Typed | None = None) -> str:
         checked=checked(study),
         description=study.description,
         review=study.review,
+        reviewed=[] if study.review is None else words.reviewed(study.review),
     )
 
 
@@ -170,7 +171,7 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
         figures["inverse"] = [interactive.plots(model_subjects.inverse_check(study.inverse, timed))]
     for followed in () if study.review is None else study.review.outputs:
         figures[f"review {followed.output}"] = [
-            interactive.plots(review_subjects.causes(followed, points))
+            interactive.plots(review_subjects.parts(followed, points))
         ]
     for name in study.leaderboard.outputs if study.loops else ():
         drawing = model_subjects.tracking(study.loops, name, points)

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mckibben.blocks.saving import to_text
+from mckibben.diagnosis.refit import Refit
 from mckibben.outputs import Results
 from mckibben.report.commands import Typed
 from mckibben.report.page import page
-from mckibben.studying.refitting import Refit
 from mckibben.system.atomic import to_json
 
 if TYPE_CHECKING:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mckibben.report.drawing import (
-    N_COLOURS,
     POINTS,
     Curve,
     Drawing,
@@ -16,21 +15,17 @@ from mckibben.report.drawing import (
 )
 
 if TYPE_CHECKING:
-    from mckibben.studying.reviewing import Followed
-
-SHOWN = 0.01
-"""Share, on either side of zero, from which a cause is drawn."""
+    from mckibben.diagnosis.review import Followed
 
 
-def causes(one: Followed, points: int = POINTS) -> Drawing:
-    """Draw reference and measured motion, and below the error with the part of every cause."""
+def parts(one: Followed, points: int = POINTS) -> Drawing:
+    """Draw reference and measured motion, and below the error with its parts."""
     wanted = over_time(one.time, one.reference, points)
     got = over_time(one.time, one.measured, points)
     error = over_time(one.time, one.measured - one.reference, points)
-    parts = [cause for cause in one.causes if abs(cause.share) >= SHOWN][:N_COLOURS]
     curves = [
-        Curve(*over_time(one.time, cause.signal, points), cause.kind, series_colour(place))
-        for place, cause in enumerate(parts)
+        Curve(*over_time(one.time, part, points), kind, series_colour(place))
+        for place, (kind, part) in enumerate(one.parts.items())
     ]
     above = (Curve(*wanted, "reference", style="broad"), Curve(*got, "recorded", "series-1"))
     below = (Curve(*error, "error", style="broad"), *curves)

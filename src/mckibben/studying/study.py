@@ -20,13 +20,13 @@ from mckibben.diagnosis import Characterization, characterize
 from mckibben.diagnosis.check import Validation
 from mckibben.diagnosis.data_gaps import Gap, data_gaps
 from mckibben.diagnosis.description import ModelDescription, describe
+from mckibben.diagnosis.review import Review, review
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
 from mckibben.rigs import load_rig
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, named, recorded_rig
-from mckibben.studying.reviewing import Review, review
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
 

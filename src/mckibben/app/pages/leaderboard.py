@@ -38,7 +38,7 @@ from mckibben.estimators.catalogue import caution as model_caution
 from mckibben.estimators.catalogue import full_name
 from mckibben.numerals import numeral, typeset
 from mckibben.recording import Recording
-from mckibben.report import subjects, wording
+from mckibben.report import subjects, wording, words
 from mckibben.report.columns import Column, columns_of
 from mckibben.report.drawing import series_colour
 from mckibben.report.words import CHOICES
@@ -259,10 +259,13 @@ async def _closer(
         errors = "; ".join(f"{name} {wording.number(rmse, 3)} {unit}" for name, rmse in off.items())
         where = " of that part" if one.part is not None else ""
         named(ui.label(f"On {one.title}. RMSE{where}: {errors}."), "closer-on")
-        said = {row["name"]: (row["band"] or {}).get("said") for row in desk.results()}
-        for name in bands:
-            if said.get(name):
-                named(ui.label(f"{name}: {said[name]}.").classes("text-sm"), "closer-band")
+        tested = {row["name"]: row["band"] for row in desk.results() if row["band"]}
+        for name in (name for name in bands if name in tested):
+            band = tested[name]
+            for sentence in words.band_on_test(
+                band["level"], band["coverage"], band["width"], band["unit_of_width"]
+            ):
+                named(ui.label(f"{name}: {sentence}").classes("text-sm"), "closer-band")
         drawings = []
         for output, pair in enumerate(pairs):
             own = {name: found[:, output] for name, found in outputs.items()}
@@ -301,8 +304,7 @@ def _bands(desk: Desk, recording: Recording, modelled: dict[str, Array]) -> dict
         # of a band of other channels, nothing is told of these
         if band is None or tuple(c.name for c in band.given) != tuple(desk.outputs):
             continue
-        given = np.hstack([recording.matrix(c.name for c in band.driving), outputs])
-        ends = band.simulate(given, sample_time=recording.sample_time)
+        ends = band.simulate(outputs, sample_time=recording.sample_time)
         found[name] = ends.reshape(*outputs.shape, 3)[:, :, 1:]
     return found
 

@@ -88,18 +88,20 @@ def _look_back(desk: Desk, model: str, form: str, log: str, *, refit: bool) -> N
 def _shown(desk: Desk, name: str, one: Reviewed) -> None:
     """Show what a log said."""
     ui.label(f"{one.log}, with the compensator of {one.model}").classes("text-base mt-2")
-    ui.label(one.verdict).classes("text-sm")
+    sizes = {
+        "achieved": one.achieved,
+        "predicted for the commands": one.predicted,
+        "of measured pressures beside the commands": one.pressure,
+        "residual of the model": one.residual,
+    }
     rows = [
-        {"what": "achieved", "value": f"{wording.number(one.achieved, 3)} {one.unit}"},
-        {"what": "predicted", "value": f"{wording.number(one.predicted, 3)} {one.unit}"},
-        *(
-            {"what": cause.kind, "value": f"{100 * (cause.share or 0.0):.0f} %", "said": cause.said}
-            for cause in one.causes
-        ),
+        {"what": what, "value": f"{wording.number(size, 3)} {one.unit}"}
+        for what, size in sizes.items()
+        if size is not None
     ]
     columns = [
         {"name": key, "field": key, "label": label, "align": "left"}
-        for key, label in (("what", "Error, RMS; then its causes"), ("value", ""), ("said", "why"))
+        for key, label in (("what", "Error"), ("value", "RMS"))
     ]
     table = ui.table(rows=rows, columns=columns, row_key="what").props("dense flat wrap-cells")
     labelled(named(table, f"review-{name}"), "aria-label", "Where the error comes from")

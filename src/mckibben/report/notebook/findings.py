@@ -10,13 +10,13 @@ import numpy as np
 from mckibben.control.loop import Tracked
 from mckibben.diagnosis.characterization import Characterization
 from mckibben.diagnosis.check import OutputCheck, Validation
+from mckibben.diagnosis.review import Review
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
 from mckibben.report import check_subjects, model_subjects, review_subjects, words
 from mckibben.report.drawing import Curve, Drawing, Panel, axis_label
 from mckibben.report.notebook.card import Card
 from mckibben.report.notebook.face import Draw, Face
-from mckibben.studying.reviewing import Review
 
 QUANTITIES = (
     *("loop width e_w", "mean branch gap", "asymmetry", "dead zone after upper reversals", "gain"),
@@ -102,22 +102,21 @@ class ReviewFace(Face):
         self.found = found
 
     def card(self) -> Card:
-        """Return its verdict, and every cause that counts."""
-        said = (self.found.verdict, *self.found.sentences)
-        return Card("Review", said, notes=self.found.notes)
+        """Return its numbers in sentences."""
+        return Card("Review", words.reviewed(self.found))
 
     def drawings(self, choices: Mapping[str, Any]) -> Mapping[str, Draw]:
         """Return reference, motion, and what the error is made of."""
-        return {"causes": self.causes}
+        return {"parts": self.parts}
 
-    def causes(self, output: str | None = None) -> Drawing:
-        """Draw reference and motion, and below the error with the part of every cause."""
+    def parts(self, output: str | None = None) -> Drawing:
+        """Draw reference and motion, and below the error with its parts."""
         by_name = {one.output: one for one in self.found.outputs}
         if output is not None and output not in by_name:
             raise DataError(
                 "this was not followed", channel=output, remedy=f"use {', '.join(by_name)}"
             )
-        return review_subjects.causes(by_name[output or next(iter(by_name))])
+        return review_subjects.parts(by_name[output or next(iter(by_name))])
 
 
 class ValidationFace(Face):

@@ -1,0 +1,134 @@
+"""The same kind of model fitted to a log, compared with the old one on parts held out."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from mckibben import registry
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Series
+from mckibben.blocks.free_run import Mask, run_free
+from mckibben.blocks.inverse import Inverse
+from mckibben.comparison.splits import folds
+from mckibben.errors import MckibbenError, ModelWarning
+from mckibben.estimators.catalogue import declared
+from mckibben.recording import Recording
+from mckibben.statistics import BlockBootstrap, correlation_length, interval
+
+N_FOLDS = 4
+"""Parts of a log held out in turn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """The same kind of model, fitted to the log and to older data where there are any.
+
+    Parameters
+    ----------
+    model : Block
+    old, new : float
+        Root mean square error, running free, on parts held out, of the old model and of models fitted
+        to the rest; of several outputs that of each over its range, on the mean.
+    ratio : (float, float)
+        95 % interval of new over old, by a paired block bootstrap.
+    n_folds : int
+        Parts.
+    older : int
+        Recordings of older data.
+    """
+
+    model: Block = field(repr=False)
+    old: float
+    new: float
+    ratio: tuple[float, float]
+    n_folds: int
+    older: int
+
+    @property
+    def recommended(self) -> bool:
+        """Whether it is better than the old model by more than chance."""
+        return self.ratio[1] < 1
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON, without the model."""
+        return {
+            "kind": self.model.kind,
+            "old_rmse": self.old,
+            "new_rmse": self.new,
+            "ratio_interval": list(self.ratio),
+            "n_folds": self.n_folds,
+            "older_recordings": self.older,
+            "recommended": self.recommended,
+        }
+
+
+def refitted(
+    old: Block, logs: Sequence[Recording], older: Sequence[Recording], *, seed: int = 0
+) -> Refit | str:
+    """Fit the same kind of model to logs, or say why that cannot be done.
+
+    ``older`` recordings are fitted beside the logs; those without its channels are left out.
+    """
+    kinds = " ".join(_kinds(old))
+    known = map(declared, registry.names("estimators"))
+    estimator = next((one for one in known if kinds in one.makes), None)
+    if estimator is None:
+        return f"No estimator makes models of kind {old.kind!r}."
+    inputs, outputs = ([c.name for c in channels] for channels in (old.inputs, old.outputs))
+    whole = [log.select([*inputs, *outputs]) for log in logs]
+    beside = [
+        one.select([*inputs, *outputs])
+        for one in older
+        if all(name in one for name in (*inputs, *outputs))
+    ]
+    driving = [name for name in inputs if name not in old.scheduling]
+    settings = {"seed": seed} | estimator.channel_settings(driving, outputs, old.scheduling)
+    for part in old.parts if isinstance(old, Series) else (old,):
+        thresholds = getattr(part, "thresholds", None)
+        if thresholds is not None and "n_operators" in {one.name for one in fields(estimator)}:
+            settings["n_operators"] = len(thresholds) - (thresholds[0] == 0)
+
+    def fitted(recordings: Sequence[Recording], rows: Sequence[Mask]) -> Block:
+        masks = [*rows, *(np.ones(len(one), dtype=bool) for one in beside)]
+        found: Block = estimator(**settings).fit([*recordings, *beside], rows=masks).model_
+        return found
+
+    def missed(block: Block, log: Recording) -> Array:
+        return np.asarray(run_free(block, log, outputs) - log.matrix(outputs))
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ModelWarning)
+            before = [missed(old, log) for log in whole]
+            after = [errors.copy() for errors in before]
+            parts = list(folds(whole, driving[0], N_FOLDS))
+            for fold in parts:
+                other = fitted(fold.train, fold.train_rows)
+                for log, rows in zip(fold.test, fold.test_rows, strict=True):
+                    place = next(k for k, own in enumerate(whole) if own is log)
+                    after[place][rows] = missed(other, log)[rows]
+            new = fitted(whole, [np.ones(len(log), dtype=bool) for log in whole])
+    except MckibbenError as error:
+        return f"No model could be fitted to the log: {error}"
+    spans = np.ptp(np.concatenate([log.matrix(outputs) for log in whole]), axis=0)
+    sizes = spans if len(outputs) > 1 else np.ones(1)
+    squares = [((errors / sizes) ** 2).mean(axis=1) for errors in after]
+    bootstrap = BlockBootstrap([len(log) for log in whole], seed, correlation_length(squares))
+    old_errors, new_errors = np.concatenate(before) / sizes, np.concatenate(after) / sizes
+    tiny = np.finfo(float).tiny
+    ratios = bootstrap.rmse(new_errors) / np.maximum(bootstrap.rmse(old_errors), tiny)
+    rms = [float(np.sqrt((e**2).mean(axis=0)).mean()) for e in (old_errors, new_errors)]
+    return Refit(new, rms[0], rms[1], interval(ratios), len(parts), len(beside))
+
+
+def _kinds(block: Block) -> list[str]:
+    """Return the kinds of a model's parts in their order."""
+    if isinstance(block, Series):
+        return [kind for part in block.parts for kind in _kinds(part)]
+    return [f"{block.forward.kind}-inverse" if isinstance(block, Inverse) else block.kind]

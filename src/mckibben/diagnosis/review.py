@@ -1,0 +1,417 @@
+"""A robot's own log: how far the loop was off its reference, and by how much each link of it.
+
+With M the model, running free, the error is, sample by sample, what the model misses of the measured
+pressures (y - M[p]), what these do otherwise than the commands (M[p] - M[c]), and what the commands
+leave of the reference according to the model (M[c] - r).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.bands import inside
+from mckibben.blocks.base import Block
+from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
+from mckibben.blocks.free_run import measured_start
+from mckibben.comparison.shared_rows import check_shared
+from mckibben.control.twin import COMMAND
+from mckibben.diagnosis.refit import Refit, refitted
+from mckibben.errors import DataError, ModelError, ModelWarning
+from mckibben.recording import Recording, listed
+from mckibben.statistics import NORMAL_95, block_length, correlation_length
+from mckibben.system.showing import DrawsItself
+
+REFERENCE = "reference_"
+"""What the names of channels begin with that hold a desired motion."""
+
+LONGEST = 1.0
+"""Delay that is looked for [s]; an eighth of the log at most."""
+
+HELD = 3
+"""Samples in a row at an extreme, while the reference moves, from which a command is at a limit."""
+
+ROUNDING = 1e-9
+"""Share of a range up to which values are equal."""
+
+
+@dataclass(frozen=True)
+class Delay:
+    """How much later one signal is than another, by dead time and lag together.
+
+    Parameters
+    ----------
+    where : str
+        Which is later than which.
+    seconds : float
+        Positive where the first comes later [s].
+    interval : (float, float)
+        Of 95 % [s].
+    """
+
+    where: str
+    seconds: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """How one output followed its reference: root mean squares, in its unit.
+
+    Parameters
+    ----------
+    output, unit : str
+        Channel.
+    achieved : float
+        Measured less reference.
+    predicted, pressure : float or None
+        What the model gives for the commands, less reference; and what it gives for measured pressures
+        less that. None where commands are not known.
+    residual : float
+        Measured less what the model gives for measured pressures.
+    drift, drift_interval : float, (float, float)
+        Slope of the residual over time [unit/s], and its interval of 95 %.
+    time, reference, measured : array, shape (n,)
+        At the scored samples of all logs, which follow one another.
+    parts : mapping of str to array, shape (n,)
+        ``model``, ``pressure`` and ``command``, which add up to the error.
+    """
+
+    output: str
+    unit: str
+    achieved: float
+    predicted: float | None
+    pressure: float | None
+    residual: float
+    drift: float
+    drift_interval: tuple[float, float]
+    time: Array = field(repr=False)
+    reference: Array = field(repr=False)
+    measured: Array = field(repr=False)
+    parts: Mapping[str, Array] = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Review(DrawsItself):
+    """What a robot's log says of the compensator that ran.
+
+    Parameters
+    ----------
+    logs : tuple of str
+        Names of the recordings.
+    model : str
+        Kind of the model.
+    outputs : tuple of Followed
+    delays : tuple of Delay
+        Of measured pressures after commands, and of measured after modelled motion, log by log.
+    clipped, n_samples : int
+        Scored samples with a command at a limit, and all.
+    judged_by : {"command", "compensator", ""}
+        Where commands come from: the log, or what the compensator gives for the reference.
+    refit : Refit, str or None
+        A model fitted again to the log, or why there is none; None where none was asked for.
+    """
+
+    face: ClassVar[str] = "review"
+
+    logs: tuple[str, ...]
+    model: str
+    outputs: tuple[Followed, ...]
+    delays: tuple[Delay, ...]
+    clipped: int
+    n_samples: int
+    judged_by: str
+    refit: Refit | str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything for JSON, without samples."""
+        shown = {one.name: getattr(self, one.name) for one in fields(self)}
+        outputs = [
+            {one.name: getattr(each, one.name) for one in fields(each) if one.repr}
+            for each in self.outputs
+        ]
+        refit = self.refit.to_dict() if isinstance(self.refit, Refit) else self.refit
+        delays = [asdict(delay) for delay in self.delays]
+        return shown | {"outputs": outputs, "delays": delays, "refit": refit}
+
+
+def review(
+    log: Recording | Sequence[Recording],
+    *,
+    model: Block | None = None,
+    compensator: Block | None = None,
+    refit: bool = True,
+    seed: int = 0,
+) -> Review:
+    """Find how far a loop was off its reference, by which link, and whether a refit is better.
+
+    Parameters
+    ----------
+    log : Recording or sequence of Recording
+        With ``reference_...`` channels beside what is measured, such as `track` writes; with
+        ``command_...`` channels where commands are logged. Recordings without any reference are older
+        data, which a refit is given beside the log.
+    model : Block, optional
+        What ran; default what the compensator undoes.
+    compensator : Block, optional
+        What ran; default the model's inverse.
+    refit : bool
+        Whether the same kind of model is fitted to the log, and compared with the old one.
+    seed : int
+        Of the refit.
+
+    Raises
+    ------
+    DataError
+        On logs without reference, time or channels of the model.
+    ModelError
+        Where no model is given, or model and compensator do not belong together.
+    """
+    every = listed(log)
+    logs = [one for one in every if has_reference(one)]
+    model, compensator = _ran(model, compensator)
+    inputs = [c.name for c in model.inputs if c.name not in model.scheduling]
+    outputs = [c for c in model.outputs if all(REFERENCE + c.name in one for one in logs)]
+    _check(logs, model, inputs, bool(outputs))
+    check_shared({"review": logs}, inputs, [channel.name for channel in model.outputs])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        links = [_Links(one, model, compensator, inputs) for one in logs]
+    found = Review(
+        logs=tuple(one.name for one in logs),
+        model=model.kind,
+        outputs=tuple(_followed(links, channel.name, channel.unit) for channel in outputs),
+        delays=tuple(delay for link in links for delay in link.delays([c.name for c in outputs])),
+        clipped=sum(link.clipped for link in links),
+        n_samples=sum(len(link.log) for link in links),
+        judged_by=links[0].judged_by,
+    )
+    if not refit or all(one.achieved <= ROUNDING * np.ptp(one.reference) for one in found.outputs):
+        return found
+    older = [one for one in every if not has_reference(one)]
+    again = refitted(model, [link.log for link in links], older, seed=seed)
+    return replace(found, refit=again)
+
+
+def has_reference(recording: Recording) -> bool:
+    """Tell whether a recording is a loop's log."""
+    return any(name.startswith(REFERENCE) for name in recording.channels)
+
+
+def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block | None]:
+    """Return the model and the compensator that ran; None where the model has no inverse."""
+    if isinstance(compensator, FeedforwardFeedback):
+        compensator = compensator.compensator
+    if model is None and compensator is not None:
+        model = compensator.forward_model
+    if model is None:
+        raise ModelError(
+            "it is not known which model was in the loop. Remedy: give the model too, with --model."
+        )
+    model = inside(model)
+    if compensator is None:
+        try:
+            compensator = model.inverse()
+        except ModelError:
+            return model, None
+    driven = {c.name for c in model.inputs}.difference(model.scheduling)
+    if {c.name for c in compensator.outputs} != driven:
+        raise ModelError(
+            f"the compensator gives {', '.join(c.name for c in compensator.outputs)}, but the model "
+            f"takes {', '.join(sorted(driven))}. Remedy: give a compensator and the model that it "
+            "undoes."
+        )
+    return model, compensator
+
+
+def _check(logs: Sequence[Recording], model: Block, inputs: Sequence[str], followed: bool) -> None:
+    """Refuse logs in which something is absent."""
+    if not logs or not followed:
+        name = REFERENCE + model.outputs[0].name
+        raise DataError(
+            f"there is no {name} beside what the model gives",
+            file=logs[0].source if logs else None,
+            remedy=f"map its column, as in --column {name}=COLUMN",
+        )
+    for log in logs:
+        if log.sample_time is None:
+            raise DataError("the log has no time", file=log.source, remedy="add a time column")
+        for channel in (*model.inputs, *model.outputs):
+            if channel.name in inputs and COMMAND + channel.name in log:
+                continue
+            log[channel.name]  # which says what is absent
+
+
+class _Links:
+    """What the model makes of one log, at its scored samples.
+
+    ``modelled`` has its outputs for measured pressures, ``commanded`` those for commands or None.
+    """
+
+    def __init__(
+        self, log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
+    ) -> None:
+        names = [channel.name for channel in model.outputs]
+        sent, self.judged_by = _commands(log, model, compensator, inputs)
+        blind = [name for name in inputs if name not in log]
+        given = log.with_channels(**{n: _shifted(log[COMMAND + n], 1.0) for n in blind})
+        # the first measured output has noise, so its start counts where it leaves less of the log
+        first = given.matrix(channel.name for channel in model.inputs)[0]
+        starts = [model.initial_state(first), measured_start(model, given, names)]
+        runs = [model.simulate(given, initial=start.tolist()) for start in starts]
+        left = [np.sum((run.matrix(names) - given.matrix(names)) ** 2) for run in runs]
+        modelled, start = runs[int(np.argmin(left))], starts[int(np.argmin(left))].tolist()
+        # all counts from time zero on; `track` begins before it
+        begin = int(np.argmax(log.time >= -ROUNDING))
+        self.step, self.log = float(log.sample_time or 1.0), given.slice(begin, len(log))
+        self.modelled = modelled.slice(begin, len(log))
+        self.commanded: Recording | None = None
+        self.pressures: dict[str, tuple[Array, Array]] = {}
+        self.clipped = 0
+        if sent is None:
+            return
+        # whatever was commanded at first, the muscle was where it was measured
+        whole = {n: np.append(given[n][:1], sent[n][1:]) for n in inputs}
+        commanded = model.simulate(given.with_channels(**whole), initial=start)
+        self.commanded = commanded.slice(begin, len(log))
+        self.pressures = {n: (sent[n][begin:], log[n][begin:]) for n in inputs if n in log}
+        references = [x[begin:] for n, x in log.channels.items() if n.startswith(REFERENCE)]
+        limits = [_at_limit(sent[n][begin:], references) for n in inputs]
+        self.clipped = int(np.any(limits, axis=0).sum())
+
+    def delays(self, outputs: Sequence[str]) -> list[Delay]:
+        """Return how late pressures and outputs are."""
+        pairs = {f"{n} after command": pair for n, pair in self.pressures.items()} | {
+            f"measured after modelled {n}": (self.modelled[n], self.log[n]) for n in outputs
+        }
+        found = [_delay(where, *pair, self.step) for where, pair in pairs.items()]
+        return [delay for delay in found if delay is not None]
+
+
+def _commands(
+    log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
+) -> tuple[dict[str, Array] | None, str]:
+    """Return the commands by input, logged or given by the compensator, and which; None if unknown."""
+    if all(COMMAND + name in log for name in inputs):
+        sent = {name: log[COMMAND + name] for name in inputs}
+        later = {name: _shifted(values, 1.0) for name, values in sent.items()}
+
+        def off(way: Mapping[str, Array]) -> float:
+            return float(sum(np.sum((way[n] - log[n]) ** 2) for n in inputs if n in log))
+
+        # a command is logged when it is sent, before what it did is measured, or beside that
+        return min((later, sent), key=off), "command"
+    wanted = [channel.name for channel in model.outputs]
+    if compensator is None or any(REFERENCE + name not in log for name in wanted):
+        return None, ""
+    if any(channel.name.endswith(MEASURED) for channel in compensator.inputs):
+        return None, ""  # it also depends on what was measured, when it was measured
+    ahead = compensator.samples_ahead
+    desired = log.with_channels(**{n: _shifted(log[REFERENCE + n], -ahead) for n in wanted})
+    given = compensator.simulate(desired.select([c.name for c in compensator.inputs]))
+    return {name: given[name] for name in inputs}, "compensator"
+
+
+def _at_limit(command: Array, references: Sequence[Array]) -> Array:
+    """Return where a command stays at an extreme while a reference moves, bool (n,)."""
+    found = np.zeros(command.size, dtype=bool)
+    near = ROUNDING * max(float(np.ptp(command)), 1.0)
+    for extreme in (command.min(), command.max()):
+        flat = np.concatenate([[0], np.abs(command - extreme) <= near, [0]])
+        edges = np.flatnonzero(np.diff(flat))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            moves = any(np.ptp(r[begin:end]) > ROUNDING * np.ptp(r) for r in references)
+            found[begin:end] |= end - begin >= HELD and moves
+    return found
+
+
+def _followed(links: Sequence[_Links], name: str, unit: str) -> Followed:
+    logs, step = [link.log for link in links], links[0].step
+    measured, reference = (
+        np.concatenate([log[prefix + name] for log in logs]) for prefix in ("", REFERENCE)
+    )
+    pairs = [(link.modelled[name], link.log[name]) for link in links]
+    modelled = np.concatenate([model for model, _ in pairs])
+    parts = {"model": measured - modelled}
+    given = [link.commanded[name] for link in links if link.commanded is not None]
+    if len(given) == len(links):
+        commanded = np.concatenate(given)
+        parts |= {"pressure": modelled - commanded, "command": commanded - reference}
+    least = ROUNDING * float(np.ptp(reference))
+    sizes = {kind: size if (size := _rms(part)) > least else 0.0 for kind, part in parts.items()}
+    slope, half = _slope([got - model for model, got in pairs], step)
+    time = logs[0].time if len(logs) == 1 else step * np.arange(measured.size)
+    return Followed(
+        output=name,
+        unit=unit,
+        achieved=_rms(measured - reference),
+        predicted=sizes.get("command"),
+        pressure=sizes.get("pressure"),
+        residual=sizes["model"],
+        drift=slope,
+        drift_interval=(slope - half, slope + half),
+        time=np.asarray(time),
+        reference=reference,
+        measured=measured,
+        parts=parts,
+    )
+
+
+def _slope(series: Sequence[Array], step: float) -> tuple[float, float]:
+    """Return the common slope of series over time, and half of its 95 % interval."""
+    times = [step * (np.arange(y.size) - 0.5 * (y.size - 1)) for y in series]
+    power = sum(float(t @ t) for t in times)
+    slope = sum(float(t @ y) for t, y in zip(times, series, strict=True)) / power
+    left = [y - y.mean() - slope * t for y, t in zip(series, times, strict=True)]
+    variance = float(np.var(np.concatenate(left))) * correlation_length(left)
+    return slope, NORMAL_95 * float(np.sqrt(variance / power))
+
+
+def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
+    """Return by how much a signal is later than another, of any gain and level, by least squares.
+
+    The standard error is that of sums over blocks that are long against the correlation of errors.
+    """
+    most = min(round(LONGEST / step), len(first) // 8)
+    if most < 1 or np.ptp(first) == 0 or np.ptp(then) == 0:
+        return None
+    inner = slice(most, len(first) - most)
+    got = then[inner] - then[inner].mean()
+
+    def later(samples: float) -> tuple[Array, Array]:
+        moved = _shifted(first, samples)
+        x, slope = moved[inner], -np.gradient(moved)[inner]
+        return x - x.mean(), slope - slope.mean()
+
+    def explained(samples: float) -> float:
+        x = later(samples)[0]
+        return float((x @ got) ** 2 / (x @ x))
+
+    late, gain = float(max(range(-most, most + 1), key=explained)), 1.0
+    for _ in range(3):
+        gain, change = np.linalg.lstsq(np.column_stack(later(late)), got, rcond=None)[0]
+        late = float(np.clip(late + change / gain, -most, most))
+    x, slope = later(late)
+    alone = slope - x * (x @ slope) / (x @ x)
+    product = alone * (got - gain * x)
+    block = block_length(product.size, correlation_length([product]))
+    sums = [part.sum() for part in np.array_split(product, max(product.size // block, 2))]
+    half = NORMAL_95 * float(np.linalg.norm(sums) / (abs(gain) * (alone @ alone)))
+    # decimals behind the ninth of a sample are rounding
+    low, middle, high = (round(samples, 9) * step for samples in (late - half, late, late + half))
+    return Delay(where, middle, (low, high))
+
+
+def _shifted(x: Array, samples: float) -> Array:
+    """Return a signal (n,) so many samples later; beyond its ends it is as there."""
+    at = np.arange(len(x)) - samples
+    return np.interp(at, np.arange(len(x)), x)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -20,12 +20,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from mckibben.comparison.offered import objections
 from tests.plants import PLANTS, Plant
 
 from mckibben import Recording, registry
 from mckibben.blocks.bands import Banded
 from mckibben.comparison.channels import Channels
+from mckibben.comparison.planning import objections
 from mckibben.diagnosis.bands import calibration, held_of
 from mckibben.errors import MckibbenError
 

@@ -41,3 +41,28 @@ def typeset(text: str) -> str:
     ('−1.5e−12', '–')
     """
     return "–" if text == "-" else text.replace("-", "−")
+
+
+ROUNDING = 1e-9
+"""Share that is rounding, and shown as none."""
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number to so many significant digits, as it is printed.
+
+    >>> number(-12345.6), number(None)
+    ('−12346', '–')
+    """
+    return typeset(numeral(value, digits))
+
+
+def percent(value: float | None, digits: int = 2) -> str:
+    """Return a share as a percentage.
+
+    >>> percent(0.0123), percent(-1.8e-15), percent(None)
+    ('1.2 %', '0 %', '–')
+    """
+    if value is None:
+        return "–"
+    shown = 0.0 if abs(value) < ROUNDING else value
+    return f"{number(100 * shown, digits)} %"

@@ -22,6 +22,7 @@ from mckibben.blocks.fields import Channel
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.diagnosis.description import describe
+from mckibben.numerals import number, percent
 from mckibben.outputs import Results
 from mckibben.papers.reproduction import Reproduction
 from mckibben.recording import Recording
@@ -30,7 +31,6 @@ from mckibben.report.commands import Typed, commands
 from mckibben.report.description_subjects import figures
 from mckibben.report.page import page
 from mckibben.report.reproduction import reproduction_page
-from mckibben.report.wording import number, percent
 from mckibben.studying.study import Study
 from tests.report.studies_by_hand import measured, renamed, study
 

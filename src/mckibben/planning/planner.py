@@ -20,10 +20,10 @@ from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.equations import quantities
 from mckibben.blocks.running import run_many
-from mckibben.comparison.offered import default_model
 from mckibben.diagnosis.data_gaps import Gap, excitation, gaps_of
 from mckibben.diagnosis.excitation import Excitation
 from mckibben.errors import DataError, MckibbenError, ModelError
+from mckibben.estimators.catalogue import default_model
 from mckibben.estimators.core.uncertainty import (
     LARGEST,
     autoregressions,

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mckibben.diagnosis.check import Validation
+from mckibben.numerals import number
 from mckibben.report import words
-from mckibben.report.wording import number, of_test_range
+from mckibben.report.wording import of_test_range
 from mckibben.report.words import check_sentences, check_verdict, gap_run, gap_sentence
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
-from mckibben.numerals import typeset, typeset_within
-from mckibben.report import interactive, wording
+from mckibben.numerals import number, percent, typeset, typeset_within
+from mckibben.report import interactive
 from mckibben.report.mathematics import mathml
 
 if TYPE_CHECKING:
@@ -81,8 +81,8 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {
-        "number": wording.number,
-        "percent": wording.percent,
+        "number": number,
+        "percent": percent,
         "typeset": typeset,
         "typeset_within": typeset_within,
         "mathml": mathml,

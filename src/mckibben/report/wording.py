@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.comparison.choosing import acceptable
 from mckibben.metrics import Scores
-from mckibben.numerals import numeral, typeset
+from mckibben.numerals import number, numeral, percent
 from mckibben.report import words
 
 if TYPE_CHECKING:
@@ -30,30 +30,6 @@ MISLEADING = 0.05
 
 MISSING = 0.1
 """Largest error of an inverse over the range, on its own model, from which it is no feedforward."""
-
-ROUNDING = 1e-9
-"""Share that is rounding, and shown as none."""
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """Return a number to so many significant digits, as it is printed.
-
-    >>> number(-12345.6), number(None)
-    ('−12346', '–')
-    """
-    return typeset(numeral(value, digits))
-
-
-def percent(value: float | None, digits: int = 2) -> str:
-    """Return a share as a percentage.
-
-    >>> percent(0.0123), percent(-1.8e-15), percent(None)
-    ('1.2 %', '0 %', '–')
-    """
-    if value is None:
-        return "–"
-    shown = 0.0 if abs(value) < ROUNDING else value
-    return f"{number(100 * shown, digits)} %"
 
 
 def of_test_range(test: Scores) -> str:

@@ -11,9 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from mckibben.numerals import numeral
+from mckibben.numerals import numeral, percent
 from mckibben.recording import standard_unit
-from mckibben.report.wording import percent
 
 if TYPE_CHECKING:
     from mckibben.arrays import Array

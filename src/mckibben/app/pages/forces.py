@@ -15,6 +15,7 @@ from mckibben.app.pages.taking_code import hand_over
 from mckibben.comparison.channels import FORCE
 from mckibben.comparison.splits import tested_from
 from mckibben.errors import DataError, MckibbenError
+from mckibben.numerals import number, percent
 from mckibben.report import wording
 
 
@@ -139,7 +140,7 @@ def _forgets(desk: Desk, model: str) -> str:
     if ratio is None or ratio >= wording.FORGETFUL:
         return ""
     return (
-        f"{model} keeps only {wording.percent(ratio)} of the gap between rising and falling branches: "
+        f"{model} keeps only {percent(ratio)} of the gap between rising and falling branches: "
         "where its inputs turn back or are held, do not rely on what it estimates."
     )
 
@@ -150,8 +151,8 @@ def _shown(desk: Desk, name: str, one: Estimated) -> None:
     if one.rmse is not None:
         share = f", {100 * one.rmse / one.span:.1f} % of the measured range" if one.span else ""
         said = (
-            f"RMSE {wording.number(one.rmse, 3)} {one.unit}{share}; "
-            f"largest {wording.number(one.largest, 3)} {one.unit}."
+            f"RMSE {number(one.rmse, 3)} {one.unit}{share}; "
+            f"largest {number(one.largest, 3)} {one.unit}."
         )
     else:
         said = "The recording has no measured force to compare with."

@@ -7,7 +7,7 @@ from typing import Any
 
 from mckibben.app.desk import against, not_recommended
 from mckibben.comparison.choosing import USEFUL
-from mckibben.report import wording
+from mckibben.numerals import number
 from mckibben.report.words import CHOICES
 
 RUNS = 2.0
@@ -20,8 +20,8 @@ def judged(results: Sequence[dict[str, Any]]) -> list[str]:
     doubted: dict[str, list[str]] = {}
     for result in results:
         constant = result.get("constant") or {}
-        tested = wording.number((constant.get("test") or {}).get("rmse"))
-        validated = wording.number(constant.get("validation_rmse"))
+        tested = number((constant.get("test") or {}).get("rmse"))
+        validated = number(constant.get("validation_rmse"))
         if constant:
             heading, _ = CHOICES[result["chosen_by"]]
             said.append(

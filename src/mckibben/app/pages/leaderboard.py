@@ -36,9 +36,9 @@ from mckibben.comparison.splits import Split, tested_from
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.estimators.catalogue import caution as model_caution
 from mckibben.estimators.catalogue import full_name
-from mckibben.numerals import numeral, typeset
+from mckibben.numerals import number, numeral, typeset
 from mckibben.recording import Recording
-from mckibben.report import subjects, wording, words
+from mckibben.report import subjects, words
 from mckibben.report.columns import Column, columns_of
 from mckibben.report.drawing import series_colour
 from mckibben.report.words import CHOICES
@@ -256,7 +256,7 @@ async def _closer(
 
     def draw() -> None:
         next_steps.buttons(desk, names[0])
-        errors = "; ".join(f"{name} {wording.number(rmse, 3)} {unit}" for name, rmse in off.items())
+        errors = "; ".join(f"{name} {number(rmse, 3)} {unit}" for name, rmse in off.items())
         where = " of that part" if one.part is not None else ""
         named(ui.label(f"On {one.title}. RMSE{where}: {errors}."), "closer-on")
         tested = {row["name"]: row["band"] for row in desk.results() if row["band"]}
@@ -274,11 +274,11 @@ async def _closer(
                 subjects.fit_loops(recording, *pair, own),
                 subjects.residuals(recording, *pair, own, one.part),
             ]
-        for number, drawing in enumerate(drawings):
+        for index, drawing in enumerate(drawings):
             with ui.row().classes("w-full"):
                 for place, figure in enumerate(plots.figures(drawing, height=360)):
                     # over time: the first drawing of an output, and the last half of its residuals
-                    output, kind = divmod(number, 3)
+                    output, kind = divmod(index, 3)
                     for name, ends in bands.items() if (kind, place) in ((0, 0), (2, 1)) else ():
                         centre = outputs[name][:, output] if kind else 0.0
                         low, high = ends[:, output].T - centre

@@ -15,7 +15,7 @@ from mckibben.app.kept import Reviewed
 from mckibben.app.pages.kept_curves import drawn, showing
 from mckibben.app.reading import read_upload
 from mckibben.errors import DataError
-from mckibben.report import wording
+from mckibben.numerals import number
 from mckibben.system.atomic import replacing
 from mckibben.system.ordinary import read_bytes
 
@@ -95,7 +95,7 @@ def _shown(desk: Desk, name: str, one: Reviewed) -> None:
         "residual of the model": one.residual,
     }
     rows = [
-        {"what": what, "value": f"{wording.number(size, 3)} {one.unit}"}
+        {"what": what, "value": f"{number(size, 3)} {one.unit}"}
         for what, size in sizes.items()
         if size is not None
     ]

@@ -16,9 +16,9 @@ from mckibben.app.pages.cutting import time_plot
 from mckibben.app.together import obstacle
 from mckibben.comparison.channels import any_moves
 from mckibben.errors import MckibbenError
-from mckibben.numerals import typeset_within
+from mckibben.numerals import number, typeset_within
 from mckibben.recording import Recording
-from mckibben.report import coupling_subjects, subjects, wording
+from mckibben.report import coupling_subjects, subjects
 
 SMALL_HEIGHT = 150
 """Of a small picture [px]."""
@@ -141,7 +141,7 @@ def _small(
         figure["layout"][axis] = figure["layout"][axis] | few
     row, column = found.outputs.index(wanted), found.inputs.index(given)
     effect = found.effects[row, column]
-    told = f": {wording.number(effect)}\xa0{found.units[row]}" if np.isfinite(effect) else ""
+    told = f": {number(effect)}\xa0{found.units[row]}" if np.isfinite(effect) else ""
     with ui.column().classes("gap-0 min-w-0"):
         button = ui.button(f"{given} → {wanted}{told}", on_click=lambda: enlarge(given, wanted))
         named(button.props("flat dense no-caps").classes("text-xs"), f"pair-{given}-{wanted}")
@@ -254,8 +254,8 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
             rows = [
                 {
                     "what": name,
-                    "value": wording.number(value) if isinstance(value, float) else value,
-                    "limits": " to ".join(map(wording.number, limits or ())),
+                    "value": number(value) if isinstance(value, float) else value,
+                    "limits": " to ".join(map(number, limits or ())),
                     "unit": unit,
                     "note": note,
                 }

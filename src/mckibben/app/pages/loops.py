@@ -17,7 +17,7 @@ from mckibben.app.pages.leaderboard import STAYING
 from mckibben.arrays import Array
 from mckibben.errors import MckibbenError
 from mckibben.files import read
-from mckibben.report import wording
+from mckibben.numerals import number
 from mckibben.report.drawing import series_colour
 
 DRAWN = 4
@@ -188,7 +188,7 @@ def _table(runs: dict[str, Followed], motions: dict[str, str], titles: dict[str,
         {"name": name, "title": titles[name], "motion": motions[run.reference]}
         | {"rmse": _listed(run.rmse, run.units), "without": _listed(run.uncompensated, run.units)}
         | {"largest": _listed(run.largest, run.units), "clipped": run.clipped}
-        | {"step": wording.number(run.step_us, 2)}
+        | {"step": number(run.step_us, 2)}
         for reference in motions
         for name, run in runs.items()
         if run.reference == reference
@@ -203,9 +203,7 @@ def _table(runs: dict[str, Followed], motions: dict[str, str], titles: dict[str,
 
 
 def _listed(values: dict[str, float | None], units: dict[str, str]) -> str:
-    known = [
-        f"{wording.number(value, 3)}\xa0{units.get(name, '')}" for name, value in values.items()
-    ]
+    known = [f"{number(value, 3)}\xa0{units.get(name, '')}" for name, value in values.items()]
     return ", ".join(text.strip() for text in known) or "none"
 
 

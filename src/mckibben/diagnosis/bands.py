@@ -29,7 +29,7 @@ from mckibben.statistics import block_length, correlation_length
 from mckibben.system.progress import Tell, one_by_one, telling
 
 if TYPE_CHECKING:
-    from mckibben.comparison.trying import Data
+    from mckibben.comparison.fitting import Data
 
 Unit = Literal["auto", "run", "block"]
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mckibben.report import words
 from mckibben.report.wording import number, of_test_range
+from mckibben.report.words import gap_run, gap_sentence
 from mckibben.validation.results import Validation
 
 if TYPE_CHECKING:
@@ -48,11 +49,11 @@ def how_far(study: Study) -> list[str]:
 
 def record_next(study: Study) -> list[str]:
     """Return which runs would tell most of what is not known yet."""
-    gaps = [f"{gap.sentence} {gap.remedy}" for gap in study.untold[:MOST]]
+    gaps = [f"{gap_sentence(gap)} {gap_run(gap)}" for gap in study.untold[:MOST]]
     if not gaps:
-        gaps = ["Nothing that these recordings could tell of a muscle is missing from them."]
+        gaps = ["No data gaps were found."]
     if study.leaderboard.best is not None:
-        gaps.append("mckibben plan finds the motion that tells most; its command is at the end.")
+        gaps.append("mckibben plan writes that motion; its command is at the end.")
     return gaps
 
 

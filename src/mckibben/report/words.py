@@ -6,27 +6,216 @@ a room, so that all of it can be read, counted and tested on plants where it is 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mckibben.numerals import numeral
-from mckibben.report.wording import percent
+from mckibben.recording import standard_unit
 
 if TYPE_CHECKING:
     from mckibben.arrays import Array
     from mckibben.blocks.fields import Channel
+    from mckibben.comparison.choosing import Against, Choice
+    from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.diagnosis.bands import Calibration
+    from mckibben.diagnosis.data_gaps import Gap
     from mckibben.diagnosis.review import Review
 
-
 # --- Comparison -------------------------------------------------------------------------------------
+
+CHOICES = {
+    "cross-validation": ("CV RMSE", "cross-validation on the training side"),
+    "validation": (
+        "validation RMSE",
+        "the last part of the training data, left out of a fit for it",
+    ),
+    "given": ("validation RMSE", "runs given for it, to which nothing is fitted"),
+    "fit": ("fit RMSE", "the error on the data fitted, for want of a validation"),
+}
+"""What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
+
+STARTED = (
+    "Memory starts as training left it where the test continues from there; else, with one driving "
+    "input, from the excursion that best explains the first measured output (--initial measured)."
+)
+"""How models are run free in a comparison."""
+
+LEVEL = (
+    "not distinguished from the chosen model by this test: the interval of the difference holds 0"
+)
+"""Of a model that is `level`."""
+
+CAREFUL = "good only near the motions fitted, so its error counts twice in the order"
+"""Of a model with a caution."""
+
+
+def chosen(board: Leaderboard) -> str:
+    """Return which model is chosen and by what, its test error, and the lowest; empty without any."""
+    best, lowest = board.best, board.lowest
+    if board.not_recommended is not None and board.constant is not None:
+        first = next(row for row in board.rows if row.reason is None)
+        given = first.to_dict(), board.constant.to_dict()
+        return not_recommended(board.not_recommended, *given, board.unit)
+    if best is None or lowest is None:
+        return ""
+    heading, by = CHOICES["fit" if best.validation_rmse is None else board.chosen_by]
+    own, least, error = (
+        f"{numeral(value, 3)} {board.unit}".strip()
+        for value in (best.test_error, lowest.test_error, best.chosen_by)
+    )
+    end = "the lowest." if lowest is best else f"lowest test RMSE: {lowest.model}, {least}."
+    return f"Chosen by {by}: {best.model}, {heading} {error}; its test RMSE {own}, {end}"
+
+
+def not_recommended(
+    where: Against, row: Mapping[str, Any], constant: Mapping[str, Any], unit: str
+) -> str:
+    """Return why a model, the first in the order of the choice, is not recommended.
+
+    Parameters
+    ----------
+    where : {"validation", "test"}
+        Where it does not beat the constant.
+    row, constant : mapping
+        Their rows, as files hold them.
+    unit : str
+        Of errors.
+    """
+    on_test = where == "test"
+    errors = [one["test"]["rmse"] if on_test else one["validation_rmse"] for one in (row, constant)]
+    own, mean = (f"{numeral(error, 3)} {unit}".strip() for error in errors)
+    on = "the test data" if on_test else "what was left out to validate"
+    return (
+        f"No model is recommended: on {on}, {row['model']} is off by {own} RMSE, and the mean of the "
+        f"training output by {mean}."
+    )
+
+
+def comparison(board: Leaderboard) -> list[str]:
+    """Return what is to be said of a comparison beside its table."""
+    best, choice = board.best, board.choice
+    said = list(board.shared)
+    if board.loads:
+        said.append(f"Given to models beside the inputs: {', '.join(board.loads)}.")
+    said += [
+        f"{name} varies, and no model is given it: see --input and --load."
+        for name in board.ignored
+    ]
+    said += [
+        f"{name} is outside its training range in {numeral(100 * share, 2)} % of the test samples."
+        for name, share in board.outside.items()
+    ]
+    if best is not None and choice is not None:
+        said.append(cost_of_choice(choice, board.unit))
+    if best is not None:
+        said += [f"{best.model}: {note}." for note in best.diagnostics.get("notes", ())]
+    return said
+
+
+def cost_of_choice(choice: Choice, unit: str) -> str:
+    """Return what choosing among models by their errors costs."""
+    own, fair = (f"{numeral(e, 3)} {unit}".strip() for e in (choice.error, choice.expected))
+    picked = ", ".join(
+        f"{model} in {numeral(100 * share, 2)} %"
+        for model, share in choice.picked.items()
+        if share >= 0.01
+    )
+    return (
+        f"Chosen among {choice.among} models: the least error of cross-validation is {own}, and {fair} "
+        f"is to be expected of data that did not choose. Resampled data choose {picked}."
+    )
+
+
+def not_validated(board: Leaderboard) -> list[str]:
+    """Return which models' validation failed, and why."""
+    return [
+        f"{row.model}: not chosen, as its validation failed: {row.validation_failed}"
+        for row in board.rows
+        if row.reason is None and row.validation_failed
+    ]
+
 
 # --- What the muscle does ---------------------------------------------------------------------------
 
 # --- Residual check ---------------------------------------------------------------------------------
 
 # --- Data gaps and plans ----------------------------------------------------------------------------
+
+GAPS = {
+    "still": "Nothing can be identified: {channels} moves by no more than its noise.",
+    "hysteresis": "Hysteresis cannot be identified: {channels} has {value} turning points.",
+    "minor loops": "Minor loops cannot be identified: {value} turning points of {channels} lie "
+    "inside its range on one side, where {needed} are needed.",
+    "coupling": "Effects of {channels} cannot be separated: one follows from the others (R² = {value}).",
+    "spring load": "Load and stiffness cannot be separated: {channels} are proportional (R² = {value}).",
+    "resting": "The effect of {channels} cannot be identified: constant at {levels}.",
+    "together": "Joint effects cannot be identified: {channels} are off their rest together in "
+    "{percent} of the samples.",
+    "range": "Behaviour beyond the recorded range of {channels} cannot be identified: tests go further "
+    "by {percent} of it.",
+    "rate": "Rate dependence cannot be identified: similar branches of {channels} differ in speed by a "
+    "factor of {value}, where {needed} is needed.",
+    "creep": "Creep cannot be identified: the longest hold lasts {value} s, where {needed} s "
+    "are needed.",
+    "time": "Rate dependence and creep cannot be identified: {percent} of the recordings have time.",
+    "sampling": "Shapes of branches cannot be identified: {channels} has {value} samples a "
+    "branch, where {needed} are needed.",
+    "resolution": "Loops below {percent} of the range of {channels} cannot be identified: noise or the "
+    "steps of the sensor are that large.",
+    "clipped": "Behaviour beyond {levels} cannot be identified: {channels} stays at a limit for {value} "
+    "samples.",
+    "repeats": "Repeatability cannot be identified: {value} cycles of {channels} are recorded twice.",
+}
+GAPS["load"] = GAPS["resting"]
+RUN = "Record {what}."
+RUNS = {
+    "random": "all inputs and loads moving at random over {levels}",
+    "speeds": "the same motion at a third of the speed, and three times as fast",
+    "holds": "holds of 30 s at several levels",
+    "repeats": "one run twice",
+    "time": "time, or give the rate",
+    "sampling": "at a higher rate",
+    "sensor": "with a finer or wider sensor",
+}
+
+
+def gap_sentence(gap: Gap) -> str:
+    """Return what recordings cannot identify, with the number that shows it."""
+    return GAPS[gap.what].format(
+        channels=listing(gap.channels),
+        value=numeral(gap.value, 2),
+        needed=numeral(gap.needed, 2),
+        percent=f"{numeral(100 * gap.value, 2)} %",
+        levels=_levels(gap),
+    )
+
+
+def gap_run(gap: Gap) -> str:
+    """Return the run that would identify it."""
+    return RUN.format(what=RUNS[gap.run].format(levels=_levels(gap)))
+
+
+def _levels(gap: Gap) -> str:
+    """Return the recorded ranges of the channels of a gap."""
+    return listing(
+        [
+            " to ".join(dict.fromkeys(f"{end:.3g}" for end in ends))
+            + f" {standard_unit(name) or ''}"
+            for name, ends in gap.ranges.items()
+        ]
+    ).strip()
+
+
+def listing(names: Sequence[str]) -> str:
+    """Return names as a sentence has them.
+
+    >>> listing(["a", "b", "c"])
+    'a, b and c'
+    """
+    *most, last = names
+    return f"{', '.join(most)} and {last}" if most else last
+
 
 # --- Bands and log reviews --------------------------------------------------------------------------
 
@@ -36,8 +225,8 @@ def band_on_test(
 ) -> list[str]:
     """Return, an output a sentence, the share of the test's samples inside of a band, and its width."""
     return [
-        f"The band for {percent(level, 3)} holds {percent(coverage[name], 3)} of the test's samples of "
-        f"{name}; its half width is {numeral(wide / 2, 2)} {unit} on average."
+        f"The band for {_percent(level, 3)} holds {_percent(coverage[name], 3)} of the test's samples "
+        f"of {name}; its half width is {numeral(wide / 2, 2)} {unit} on average."
         for name, wide in width.items()
     ]
 
@@ -45,10 +234,10 @@ def band_on_test(
 def calibrated(found: Calibration) -> list[str]:
     """Return what a band rests on, and how wide it is."""
     band, n = found.band, found.band.units
-    said = [f"Calibrated on {n} {band.unit}s, which allow levels up to {percent(n / (n + 1), 3)}."]
+    said = [f"Calibrated on {n} {band.unit}s, which allow levels up to {_percent(n / (n + 1), 3)}."]
     for channel, width, ratio in zip(band.given, found.widths, found.over_constant, strict=True):
         said.append(
-            f"{channel.name}: the band for {percent(band.level, 3)} is {numeral(width, 3)} "
+            f"{channel.name}: the band for {_percent(band.level, 3)} is {numeral(width, 3)} "
             f"{channel.unit} wide on average in cross-validation, {numeral(ratio, 2)} of a band of "
             "constant width."
         )
@@ -71,7 +260,7 @@ def outside_calibration(
     low, high = (numeral(end, 3) for end in ends)
     return (
         f"In {run}, {channel.name} goes from {least} to {most} {channel.unit}, the calibration from "
-        f"{low} to {high}: beyond it, in {percent(share, 3)} of the samples, the level of the band is "
+        f"{low} to {high}: beyond it, in {_percent(share, 3)} of the samples, the level of the band is "
         "not guaranteed."
     )
 
@@ -104,12 +293,16 @@ def reviewed(found: Review) -> list[str]:
     if isinstance(found.refit, str):
         said.append(found.refit)
     elif found.refit is not None:
-        low, high = (percent(end, 2) for end in found.refit.ratio)
+        low, high = (_percent(end, 2) for end in found.refit.ratio)
         said.append(
-            f"The model fitted again to the log has {percent(found.refit.new / found.refit.old, 2)} of "
+            f"The model fitted again to the log has {_percent(found.refit.new / found.refit.old, 2)} of "
             f"the old one's error on {found.refit.n_folds} parts held out (95 %: {low} to {high})."
         )
     return said
+
+
+def _percent(share: float, digits: int) -> str:
+    return f"{numeral(100 * share, digits)} %"
 
 
 def _size(unit: str, value: float) -> str:

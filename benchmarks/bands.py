@@ -29,7 +29,7 @@ from mckibben.comparison.planning import objections
 from mckibben.diagnosis.bands import calibration, held_of
 from mckibben.errors import MckibbenError
 
-MODELS = ("pi", "gpi", "coupled-memory", "arx", "linear-memory")
+MODELS = ("pi", "gpi", "coupled-memory", "arx")
 SAME = "patterns"
 """Kind of test motion that is like that of training."""
 

@@ -74,6 +74,28 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "data"
 
 
+def test_an_optional_task_is_there_with_its_files_and_what_is_not_periodic_stays_whole(
+    tmp_path: Path,
+) -> None:
+    write(recorded(1), tmp_path / "waves.csv")
+    (tmp_path / "channels.toml").write_text(
+        """
+        [split]
+        period = 500
+        periodic = ["waves"]
+        [[split.tasks]]
+        name = "sweep"
+        optional = true
+        test = ["sweep"]
+        """
+    )
+    (waves,) = sets_in(tmp_path)
+    assert list(waves.tasks()) == []
+    write(recorded(2), tmp_path / "sweep.csv")
+    assert [task.name for _, task in waves.tasks()] == ["sweep"]
+    assert sorted(len(run) for run in waves.recordings()) == [500, 500, 500, 1500]
+
+
 def test_every_task_is_the_comparison_it_says(folder: Path) -> None:
     plain, volts = sets_in(folder)
     done = {one.label: one for one in outcomes([volts], jobs=1)}

@@ -69,7 +69,12 @@ def test_the_delay_of_motion_or_pressure_is_in_its_interval() -> None:
     late = found_in(logged(0, late=8, noise=0.05)[0]).delays[-1]
     assert within(late, 8 * STEP)
     assert late.interval[1] - late.interval[0] < STEP
-    assert found_in(logged(0, dead=8, noise=0.05)[0]).delays[0].seconds == pytest.approx(8 * STEP)
+    log = logged(0, dead=8, noise=0.05)[0]
+    assert found_in(log).delays[0].seconds == pytest.approx(8 * STEP)
+    # whether commands are logged when they are sent, or beside their reference
+    beside = np.append(log["command_pressure"][:1], log["command_pressure"][:-1])
+    found = found_in(log.with_channels(command_pressure=beside))
+    assert found.delays[0].seconds == pytest.approx(8 * STEP)
 
 
 def test_intervals_of_delay_and_drift_hold_zero_where_there_is_none() -> None:

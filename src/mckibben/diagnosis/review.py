@@ -297,24 +297,33 @@ def _commands(
     log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
 ) -> tuple[dict[str, Array] | None, str]:
     """Return the commands by input, logged or given by the compensator, and which; None if unknown."""
-    if all(COMMAND + name in log for name in inputs):
-        sent = {name: log[COMMAND + name] for name in inputs}
-        later = {name: _shifted(values, 1.0) for name, values in sent.items()}
+    asked = _asked(log, model, compensator, inputs)
+    if any(COMMAND + name not in log for name in inputs):
+        return asked, "" if asked is None else "compensator"
+    sent = {name: log[COMMAND + name] for name in inputs}
+    later = {name: _shifted(values, 1.0) for name, values in sent.items()}
+    beside = asked or {name: log[name] for name in inputs if name in log}
 
-        def off(way: Mapping[str, Array]) -> float:
-            return float(sum(np.sum((way[n] - log[n]) ** 2) for n in inputs if n in log))
+    def off(way: Mapping[str, Array]) -> float:
+        return float(sum(np.sum((way[name] - values) ** 2) for name, values in beside.items()))
 
-        # a command is logged when it is sent, before what it did is measured, or beside that
-        return min((later, sent), key=off), "command"
+    # a command is logged when it is sent, for the reference of the next sample, or beside that
+    return min((later, sent), key=off), "command"
+
+
+def _asked(
+    log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
+) -> dict[str, Array] | None:
+    """Return what a compensator gives for the reference; None where that is not all it takes."""
     wanted = [channel.name for channel in model.outputs]
     if compensator is None or any(REFERENCE + name not in log for name in wanted):
-        return None, ""
+        return None
     if any(channel.name.endswith(MEASURED) for channel in compensator.inputs):
-        return None, ""  # it also depends on what was measured, when it was measured
+        return None
     ahead = compensator.samples_ahead
     desired = log.with_channels(**{n: _shifted(log[REFERENCE + n], -ahead) for n in wanted})
     given = compensator.simulate(desired.select([c.name for c in compensator.inputs]))
-    return {name: given[name] for name in inputs}, "compensator"
+    return {name: given[name] for name in inputs}
 
 
 def _at_limit(command: Array, references: Sequence[Array]) -> Array:

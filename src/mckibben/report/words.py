@@ -425,7 +425,7 @@ _ADVICE = {
 
 def _residual(one: OutputCheck) -> str:
     size = f"{numeral(one.rmse, 2)} {one.unit}".rstrip()
-    of_range = f"{_percent(one.rmse / one.span)} of its range"
+    of_range = f"{percent(one.rmse / one.span)} of its range"
     if one.exact:
         return f"The residual of {one.output}, {size} RMS, is within rounding or the sensor's step."
     if one.useless:
@@ -438,7 +438,7 @@ def _residual(one: OutputCheck) -> str:
         return f"{residual} follows none of {one.n_tests} causes tested."
     first = one.missing[0]
     return (
-        f"{residual} follows {missed(one, first)}: {_percent(first.share)} of its variance, "
+        f"{residual} follows {missed(one, first)}: {percent(first.share)} of its variance, "
         f"{_p(first.p_value)}."
     )
 
@@ -447,7 +447,7 @@ def _missed(one: OutputCheck, finding: Finding) -> str:
     what = missed(one, finding)
     return (
         f"{what[0].upper()}{what[1:]}: {numeral(finding.size, 2)} {one.unit} RMS, "
-        f"{_percent(finding.share)} of the residual's variance ({_p(finding.p_value)})."
+        f"{percent(finding.share)} of the residual's variance ({_p(finding.p_value)})."
     )
 
 
@@ -457,10 +457,6 @@ def _advice(first: Finding) -> str:
 
 def _p(value: float) -> str:
     return "p < 0.000001" if value < 1e-6 else f"p = {numeral(value, 2)}"
-
-
-def _percent(share: float) -> str:
-    return f"{numeral(100 * share, 2)} %"
 
 
 # --- Data gaps and plans ----------------------------------------------------------------------------
@@ -562,8 +558,8 @@ def band_on_test(
 ) -> list[str]:
     """Return, an output a sentence, the share of the test's samples inside of a band, and its width."""
     return [
-        f"The band for {percent(level, 3)} holds {percent(coverage[name], 3)} of the test's samples of "
-        f"{name}; its half width is {numeral(wide / 2, 2)} {unit} on average."
+        f"The band for {percent(level, 3)} holds {percent(coverage[name], 3)} of the test's samples "
+        f"of {name}; its half width is {numeral(wide / 2, 2)} {unit} on average."
         for name, wide in width.items()
     ]
 

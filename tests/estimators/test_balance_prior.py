@@ -10,6 +10,7 @@ import pytest
 from mckibben import ModelError, Recording, muscles
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.balance import balance_in
+from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.muscles import Prior, Sheet
 from mckibben.muscles.prior import of_muscles
@@ -79,3 +80,18 @@ def test_a_prior_is_of_one_muscle() -> None:
     }
     with pytest.raises(ModelError, match="one muscle"):
         BalanceEstimator(prior=without_rail()).fit(Recording(both, STEP))
+
+
+def test_one_held_length_and_a_prior_give_forces_at_others() -> None:
+    time = np.arange(600) * STEP
+    pressure = 5.5 * np.minimum(time / 10.0, (30.0 - time) / 20.0)
+
+    def held(length: float) -> Recording:
+        given = Recording({"pressure": pressure, "displacement": np.full(600, length)}, STEP)
+        found = np.maximum(load_of(TRUTH.inverse()).simulate(given)["force"], 0.0)
+        return given.with_channels({"force": "N"}, force=found)
+
+    model = load_of(fitted(held(12.0), without_rail()))
+    for run in map(held, (0.0, 25.0)):
+        found = model.simulate(run.select(["pressure", "displacement"]))["force"]
+        assert np.sqrt(np.mean((found - run["force"]) ** 2)) < 0.1 * held(0.0)["force"].max()

@@ -32,6 +32,7 @@ from mckibben.estimators.coupled.balance_bench import (
     directions,
     from_zero,
     one_speed,
+    only_forces,
     varying,
     with_loads,
     without_held,
@@ -116,7 +117,8 @@ class BalanceEstimator(CoupledEstimator):
         Default: recordings without the force that others have did; of a muscle alone, where none has
         any, if this makes the model much better.
     of_force : bool
-        Whether errors of the one load are made least, not those of displacements.
+        Whether errors of the one load are made least, not those of displacements: so they are where
+        nothing moves in any recording.
     steps : int
         Most Gauss-Newton steps.
     prior : str, Path, Sheet or Prior, optional
@@ -232,8 +234,9 @@ class BalanceEstimator(CoupledEstimator):
         check_numbers(data)
         if self.prior is not None:
             check_alone(data)
-        data, behind, ways = from_zero(data, np.eye(1) if self.of_force else directions(data))
-        bench = replace(bench_of(data, ways, tare=self.tare), of_force=self.of_force)
+        of_force = self.of_force or only_forces(data)
+        data, behind, ways = from_zero(data, np.eye(1) if of_force else directions(data))
+        bench = replace(bench_of(data, ways, tare=self.tare), of_force=of_force)
         if not bench.tare:
             lacking = without_load(data, every=bool(self.unknown_load))
             bench = replace(bench, unmeasured=lacking)
@@ -341,7 +344,7 @@ class BalanceEstimator(CoupledEstimator):
         self, data: TrainingData, structure: Structure, belief: Belief | None, tracker: Tracker
     ) -> tuple[Search, Array]:
         """Return the search of the terms chosen, and what they are."""
-        few = compared(coarser(data, FEW), FEW, of_force=self.of_force)
+        few = compared(coarser(data, FEW), FEW, of_force=structure.bench.of_force)
         search = Search(few, structure, self._first(structure, belief), belief)
         z = self._balanced(search, tracker)
         if belief is not None:
@@ -377,7 +380,7 @@ class BalanceEstimator(CoupledEstimator):
         if structure.n == 1 and self.unknown_load is None:
             search, z = self._own_loads(search, z, data)
         z = search.descend(z, self.steps, tracker.part(0.5, 0.7))
-        whole = compared(coarser(data, MOST_SAMPLES), MOST, of_force=self.of_force)
+        whole = compared(coarser(data, MOST_SAMPLES), MOST, of_force=structure.bench.of_force)
         search = replace(search, problem=whole)
         for _ in range(1 if belief is None else REFINED):
             search = search.weighed(z)
@@ -415,6 +418,8 @@ class BalanceEstimator(CoupledEstimator):
         for place, term in enumerate(structure.terms):
             if term.kind == "loads":
                 z[place] = 1.0 / belief.prior.sheet.area
+            elif term[:2] == ("areas", 0):
+                z[place] = belief.prior.sheet.area
         alone = replace(search, problem=replace(problem, data=replace(problem.data, runs=())))
         return alone.descend(z, TOWARDS, Tracker())
 

@@ -78,6 +78,12 @@ def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
     )
 
 
+def only_forces(data: TrainingData) -> bool:
+    """Tell whether one coordinate is held in every run, so that its one load is all that is known."""
+    loads = sum(channel.unit in LOADS for channel in data.scheduled)
+    return loads == len(data.outputs) == 1 and all(held(data, run) for run in data.runs)
+
+
 def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
     """Return data without loads and schedules that never change, loads last; and what was left out."""
     kept, constant = list[int](), list[int]()

@@ -23,8 +23,8 @@ from mckibben.muscles.traits import TIMES, traits
 STEP = 1e-5
 """Change of a number, relative to what is much of it, by which traits' slopes are found."""
 
-FIRST_NOISE = 0.01
-"""Error relative to the range, of independent samples, before any is known."""
+LEAST_NOISE = 0.01
+"""Error relative to the range, of independent samples, by which any model of a muscle is off."""
 
 ZERO_STEPS = 6
 """To where displacements are likely to count from."""
@@ -49,7 +49,7 @@ class Belief:
     """
 
     prior: Prior
-    noise: float = FIRST_NOISE
+    noise: float = LEAST_NOISE
 
     @cached_property
     def weights(self) -> Array:
@@ -61,10 +61,13 @@ class Belief:
     ) -> tuple[Array, Array]:
         """Return how far terms are from what is likely, and the slopes by those wanted, others 0.
 
-        Where displacements count from is as likely makes them most so (variable projection).
+        Where displacements count from is as likely makes them most so (variable projection). Traits are
+        values at a few places; between them areas are smooth, no coefficient beyond that at rest.
         """
         sheet, weights, unsure = self.prior.sheet, self.noise * self.weights, self.prior.zero
         terms, scales = z[: len(structure.terms)], structure.scales()
+        narrowing = np.array([kind == "areas" and which > 0 for kind, which, _ in structure.terms])
+        curved = np.where(narrowing, self.noise / scales, 0.0)
 
         def away(free: Array, zero: float) -> Array:
             block = structure.block(structure.expanded(free))
@@ -78,15 +81,16 @@ class Belief:
             step = -float(by_zero @ now) / float(by_zero @ by_zero)
             zero += min(max(step, -unsure), unsure)
         now = away(terms, zero)
+        far = np.append(now, curved * terms)
         if wanted is None:
-            return now, np.zeros((0, terms.size))
+            return far, np.zeros((0, terms.size))
         slopes = np.zeros((now.size, terms.size))
         for place in np.flatnonzero(wanted).tolist():
             moved = terms.copy()
             moved[place] += (step := STEP * scales[place])
             slopes[:, place] = (away(moved, zero) - now) / step
         slopes -= np.outer(by_zero, by_zero @ slopes) / float(by_zero @ by_zero)
-        return now, slopes
+        return far, np.concatenate([slopes, np.diag(curved)])
 
 
 def told_by(given: Any) -> Prior:
@@ -116,7 +120,8 @@ def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
     shortest, longest = bench.lag_range
     return replace(
         bench,
-        hull=np.array([[bench.hull[0, 0], max(bench.hull[0, 1], prior.sheet.stroke)]]),
+        hull=np.array([[min(bench.hull[0, 0], 0.0), max(bench.hull[0, 1], prior.sheet.stroke)]]),
         highest=max(bench.highest, prior.sheet.max_pressure_bar),
+        heaviest=max(bench.heaviest, prior.sheet.force),
         lag_range=(min(shortest, SHORTEST_LAG), max(longest, TIMES[-1])),
     ), Belief(prior)

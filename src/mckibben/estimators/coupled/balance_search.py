@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask
-from mckibben.estimators.coupled.balance_prior import FIRST_NOISE, Belief
+from mckibben.estimators.coupled.balance_prior import LEAST_NOISE, Belief
 from mckibben.estimators.coupled.balance_problem import MOST_CUTS, Problem, bounded_least_squares
 from mckibben.estimators.coupled.balance_structure import Structure, Term
 from mckibben.estimators.coupled.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.statistics import autoregression
 
 BLOCKS, FOLDS = 20, 5
 """About how many blocks all runs are cut into, and in how many parts they are left out in turn."""
@@ -48,9 +49,6 @@ FAR, APART = 0.5, 0.7
 
 NO_GAIN = 1e-6
 """Gain by a term, relative to the squared errors, that is rounding."""
-
-NOISES = tuple(np.geomspace(1e-4, FIRST_NOISE, 7).tolist())
-"""Noise of recordings, relative to the range, by which a belief may be weighed."""
 
 SLOW, SLOWEST = 1e-3, 2
 """Relative gain of a step that is slow, and how many of them end a descent."""
@@ -95,15 +93,13 @@ class Search:
         return np.append(errors, far), np.concatenate([slopes, whole])
 
     def weighed(self, z: Array) -> Search:
-        """Return the search in which the belief has the weight that finds what is left out best."""
+        """Return the search in which the belief is weighed by the noise of independent errors."""
         if self.belief is None:
             return self
-        free = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool))
-        bounded = self._bounded(z.size)
-        grams = self._grams(z, self.active)
-        likely = self._likely(z, self.active) / self.belief.noise**2
-        missed = [_left_out(grams, free, z, bounded, noise**2 * likely).sum() for noise in NOISES]
-        return replace(self, belief=replace(self.belief, noise=NOISES[int(np.argmin(missed))]))
+        parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
+        model, count = autoregression(parts), sum(part.size for part in parts)
+        noise = np.sqrt(model.variance * count / model.effective_sample_size(count))
+        return replace(self, belief=replace(self.belief, noise=max(float(noise), LEAST_NOISE)))
 
     def cost(self, z: Array) -> float:
         """Return the root mean square of the errors."""

@@ -86,16 +86,17 @@ class Autoregression:
 
     def whitened(self, series: Array) -> Array:
         """Return the innovations of a series (n, ...)."""
-        from scipy.signal import lfilter
-
-        return np.asarray(lfilter(self._whitener, [1.0], series, axis=0))
+        found = np.array(series, dtype=np.float64)
+        for lag, coefficient in enumerate(self.coefficients.tolist(), start=1):
+            found[lag:] -= coefficient * series[:-lag]
+        return found
 
     def coloured(self, slopes: Array) -> Array:
         """Return L' J, shape (n, k), whose product with itself is J' R J, R the covariance."""
-        from scipy.signal import lfilter
+        from scipy.linalg import solve_banded
 
-        back = lfilter([1.0], self._whitener, slopes[::-1], axis=0)[::-1]
-        return np.asarray(self.innovation * back)
+        bands = np.tile(self._whitener[::-1, np.newaxis], len(slopes))
+        return np.asarray(self.innovation * solve_banded((0, len(bands) - 1), bands, slopes))
 
     def effective_sample_size(self, n: int) -> float:
         """Return how many independent samples determine the mean as well as n of these."""

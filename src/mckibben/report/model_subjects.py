@@ -135,18 +135,19 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
     (wanted,), (given,) = check.inverse.inputs[:1], check.inverse.outputs[:1]
     label = "time [s]" if timed else "sample"
     t = check.time
-    error = over_time(t, check.output - check.reference)
+    reference, output = check.reference[:, 0], check.output[:, 0]
+    error = over_time(t, output - reference)
     plain = check.uncompensated
-    without = [] if plain is None else [over_time(t, plain)]
+    without = [] if plain is None else [over_time(t, plain[:, 0])]
     return Drawing(
         (
             Panel(
                 label,
                 axis_label(wanted.name, wanted.unit),
                 (
-                    Curve(*over_time(t, check.reference), "reference", style="broad"),
+                    Curve(*over_time(t, reference), "reference", style="broad"),
                     *(Curve(*each, "no compensation", "series-2") for each in without),
-                    Curve(*over_time(t, check.output), "model behind its inverse", "series-1"),
+                    Curve(*over_time(t, output), "model behind its inverse", "series-1"),
                 ),
             ),
             Panel(
@@ -155,7 +156,7 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
             Panel(
                 label,
                 axis_label(given.name, given.unit),
-                (Curve(*over_time(t, check.pressure), "", "input"),),
+                (Curve(*over_time(t, check.pressure[:, 0]), "", "input"),),
             ),
         ),
         stacked=True,

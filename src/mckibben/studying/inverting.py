@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,8 +42,8 @@ class InverseCheck:
         Short name of the model inverted.
     inverse : Block
         The compensator.
-    reference, pressure, output : array, shape (n,), or (n, k) of several
-        Wished-for output, input the inverse gives, and what the model makes of it.
+    reference, pressure, output : array, shape (n, k)
+        Desired outputs, inputs that the inverse gives, and the model's outputs for these.
     time : array, shape (n,)
         Time [s], or sample numbers.
     reachable : (float, float) or None
@@ -105,10 +105,10 @@ def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None
 
 
 def check_inverse(model: str, block: Block, recording: Recording) -> InverseCheck:
-    """Send a reference with minor loops through the inverse and back through the model.
+    """Send a reference through the inverse and back through the model.
 
-    Of a model of several inputs, the reference is the recording's own motion, which may be out of reach;
-    of one that does not say what it can reach, it is what the model makes of the recording.
+    The reference has minor loops over all that can be reached; where a model does not say what that is,
+    it is the output that the model gives for the recording, and of several inputs, the recorded motion.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
     block : Block
         The model.
     recording : Recording
-        Gives the sample time and the pace of the reference.
+        Gives the sample time, loads, and the pace of the reference.
 
     Raises
     ------
@@ -126,93 +126,66 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
         does not follow the reference.
     """
     inverse = compensator(block)
-    if len(block.inputs) > 1:
-        return _check_on_motion(model, block, inverse, recording)
-    lows, highs = block.reachable()
-    low, high = float(lows[0]), float(highs[0])
-    if np.isinf([low, high]).all():  # as far as its own inputs know
-        names = [channel.name for channel in block.inputs]
-        made = block.simulate(recording.select(names))
-        found = _check_on_motion(
-            model, block, inverse, made.select([*names, block.outputs[0].name])
-        )
-        _followed(model, found.error, NEARLY)
-        return replace(found, own=True)
-    if not (np.isfinite([low, high]).all() and low < high):
-        raise ModelError(
-            f"{model!r} has no output that it can reach whatever happened before. "
-            "Remedy: identify it on a recording that covers the range of interest."
-        )
-    phase = np.linspace(0, 1, CHECK_SAMPLES)
-    slow = 1 - np.abs(2 * ((3 * phase) % 1) - 1)
-    wave = slow * (1 - 0.5 * phase) + 0.12 * np.sin(2 * np.pi * 11 * phase) * phase
-    share = (wave - wave.min()) / np.ptp(wave)
-    reference = low + (high - low) * (0.02 + 0.96 * share)
-    step = recording.sample_time
+    step, most, reachable, own = recording.sample_time, float("inf"), None, False
+    wished = recording
+    if len(block.inputs) == 1:
+        (output,) = block.outputs
+        low, high = (float(end[0]) for end in block.reachable())
+        own, most = bool(np.isinf([low, high]).all()), NEARLY
+        if own:
+            given = recording.select([channel.name for channel in block.inputs])
+            wished = given.with_channels(**{output.name: block.simulate(given)[output.name]})
+        elif np.isfinite([low, high]).all() and low < high:
+            reachable, most = (low, high), FOLLOWED
+            wished = Recording(
+                {output.name: minor_loops(low, high)}, step, units={output.name: output.unit}
+            )
+        else:
+            raise ModelError(
+                f"{model!r} has no output that it can reach whatever happened before. "
+                "Remedy: identify it on a recording that covers the range of interest."
+            )
+    reference = wished.matrix(channel.name for channel in block.outputs)
+    span = np.ptp(reference, axis=0) if reachable is None else np.array([high - low])
+    span = np.maximum(span, np.finfo(float).tiny)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        pressure = inverse.simulate(reference, sample_time=step)
-    output = block.simulate(pressure, sample_time=step)
-    error = float(np.abs(output - reference).max() / (high - low))
-    _followed(model, error, FOLLOWED)
-    plain = _without(block, recording, reference[:, np.newaxis], step)
-    plain = None if plain is None else plain[:, 0]
-    return InverseCheck(
-        model=model,
-        inverse=inverse,
-        reference=reference,
-        pressure=pressure,
-        output=output,
-        time=np.arange(CHECK_SAMPLES, dtype=np.float64) * (1.0 if step is None else step),
-        reachable=(low, high),
-        error=error,
-        uncompensated=plain,
-        uncompensated_error=(
-            None if plain is None else float(np.abs(plain - reference).max() / (high - low))
-        ),
-    )
-
-
-def _followed(model: str, error: float, most: float) -> None:
-    """Refuse an inverse that is off by so much of a reference's range."""
+        found = inverse.simulate(wished.select([channel.name for channel in inverse.inputs]))
+        others = {c.name: wished[c.name] for c in block.inputs if c.name not in found}
+        driven = found.with_channels(**others).select([c.name for c in block.inputs])
+        output_of = block.simulate(driven).matrix(channel.name for channel in block.outputs)
+    error = float((np.abs(output_of - reference) / span).max())
     if not error <= most:
         raise ModelError(
             f"the inverse of {model!r} misses a reachable reference by {error:.1e} of its range. "
             "Remedy: invert another model."
         )
-
-
-def _check_on_motion(
-    model: str, block: Block, inverse: Block, recording: Recording
-) -> InverseCheck:
-    """Send a recording's motion through an inverse and back through the model."""
-    names = [channel.name for channel in block.outputs]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)
-        wanted = recording.select([channel.name for channel in inverse.inputs])
-        given = inverse.simulate(wanted)
-        told = {c.name: recording[c.name] for c in block.inputs if c.name not in given}
-        driven = given.with_channels(**told).select([c.name for c in block.inputs])
-        output = block.simulate(driven).matrix(names)
-    reference = recording.matrix(names)
-    span = np.maximum(np.ptp(reference, axis=0), np.finfo(float).tiny)
     commanded = inverse.outputs == block.inputs[: len(inverse.outputs)]
-    step = recording.sample_time
     plain = _without(block, recording, reference, step) if commanded else None
     return InverseCheck(
         model=model,
         inverse=inverse,
         reference=reference,
-        pressure=given.matrix([channel.name for channel in inverse.outputs]),
-        output=output,
-        time=recording.time,
-        reachable=None,
-        error=float((np.abs(output - reference) / span).max()),
+        pressure=found.matrix(channel.name for channel in inverse.outputs),
+        output=output_of,
+        time=wished.time,
+        reachable=reachable,
+        error=error,
         uncompensated=plain,
         uncompensated_error=(
             None if plain is None else float((np.abs(plain - reference) / span).max())
         ),
+        own=own,
     )
+
+
+def minor_loops(low: float, high: float) -> Array:
+    """Return a reference over a range, with minor loops on slow triangles, shape (CHECK_SAMPLES,)."""
+    phase = np.linspace(0, 1, CHECK_SAMPLES)
+    slow = 1 - np.abs(2 * ((3 * phase) % 1) - 1)
+    wave = slow * (1 - 0.5 * phase) + 0.12 * np.sin(2 * np.pi * 11 * phase) * phase
+    share = (wave - wave.min()) / np.ptp(wave)
+    return np.asarray(low + (high - low) * (0.02 + 0.96 * share))
 
 
 def _without(

@@ -202,11 +202,11 @@ def against(results: Sequence[dict[str, Any]]) -> dict[str, str]:
         row["name"]: words.not_recommended(
             "test" if row["not_recommended"] == "test" else "validation",
             row,
-            row["constant"],
+            row["constant"] or {},
             row["unit"],
         )
         for row in results
-        if row["not_recommended"] and row["constant"]
+        if row["not_recommended"]
     }
 
 

@@ -307,7 +307,8 @@ def validation_folds(
     if n >= 2:
         with suppress(DataError):  # of an input that never turns
             parts = tuple(folds(train, channel, n))
-            if all(_count(rows) >= FEWEST for p in parts for rows in (p.train_rows, p.test_rows)):
+            sizes = [sum(map(np.sum, r)) for p in parts for r in (p.train_rows, p.test_rows)]
+            if min(sizes) >= FEWEST:
                 inside = tuple(part for part in parts if _interpolates(part, channel))
                 return inside or parts, "cross-validation"
     if n >= 1:
@@ -345,10 +346,6 @@ def _interpolates(part: Fold, channel: str) -> bool:
         for runs, rows in ((part.test, part.test_rows), (part.train, part.train_rows))
     )
     return _within(tested, fitted)
-
-
-def _count(rows: Sequence[Mask]) -> int:
-    return sum(int(mask.sum()) for mask in rows)
 
 
 def _all_rows(recordings: Sequence[Recording]) -> tuple[Mask, ...]:

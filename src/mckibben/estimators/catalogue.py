@@ -146,20 +146,21 @@ def settings_of_all(models: Iterable[str], written: Sequence[str]) -> dict[str, 
         If no model has one of the settings, or it may not have that value.
     """
     estimators = {name: registry.load("estimators", name) for name in models}
+    known = {name: [one.name for one in fields(each)] for name, each in estimators.items()}
     found: dict[str, dict[str, Any]] = {name: {} for name in estimators}
     for item in written:
         named, equals, text = item.partition("=")
         owner, dot, name = named.strip().replace("-", "_").rpartition(".")
         takers = [
             model
-            for model, estimator in estimators.items()
-            if name in {field.name for field in fields(estimator)}
-            and (not dot or owner == model.replace("-", "_"))
+            for model in estimators
+            if name in known[model] and (not dot or owner == model.replace("-", "_"))
         ]
         if not (equals and takers):
+            every = sorted({setting for some in known.values() for setting in some})
             raise ModelError(
-                f"{item!r} is no setting of {', '.join(estimators)}. Remedy: give NAME=VALUE, or "
-                "MODEL.NAME=VALUE, as in mckibben info --models."
+                f"{item!r}: {', '.join(estimators)} has no setting {name!r}. Remedy: give NAME=VALUE, "
+                f"or MODEL.NAME=VALUE, of {', '.join(every)}."
             )
         for model in takers:
             found[model][name] = setting_value(text.strip())

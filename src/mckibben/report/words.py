@@ -87,7 +87,10 @@ def not_recommended(
         Of errors.
     """
     on_test = where == "test"
-    errors = [one["test"]["rmse"] if on_test else one["validation_rmse"] for one in (row, constant)]
+    errors = [
+        (one.get("test") or {}).get("rmse") if on_test else one.get("validation_rmse")
+        for one in (row, constant)
+    ]
     own, mean = (f"{numeral(error, 3)} {unit}".strip() for error in errors)
     on = "the test data" if on_test else "what was left out to validate"
     return (

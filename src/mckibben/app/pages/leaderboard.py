@@ -41,7 +41,7 @@ from mckibben.recording import Recording
 from mckibben.report import subjects, words
 from mckibben.report.columns import Column, columns_of
 from mckibben.report.drawing import series_colour
-from mckibben.report.words import CHOICES
+from mckibben.report.words import CAREFUL, CHOICES
 
 PARAMETERS = 12
 """Of a page of the table of parameters."""
@@ -60,11 +60,6 @@ ABOUT = (
     "data do, 0 where it forgot. R² counts from the test's own mean, which may lie closer where the "
     "test hardly varies. Inverse: exact by a formula, solved in every step, or none, and then "
     "there is nothing to compensate with. Select one or two models to look closer."
-)
-
-CAREFUL = (
-    "A model with an asterisk is good only near the motions it was fitted to: it stands behind the "
-    "others that do better than the constant, whatever its error. "
 )
 
 NARROW = {"classes": "!px-2", "headerClasses": "!px-2 !whitespace-normal"}
@@ -107,7 +102,8 @@ def build(desk: Desk) -> None:
         _of_other_data(results)
         table = _table(results, desk.outputs)
         heading, by = CHOICES[results[0]["chosen_by"]]
-        careful = CAREFUL if any(model_caution(result["model"]) for result in results) else ""
+        cautious = any(model_caution(result["model"]) for result in results)
+        careful = f"* {CAREFUL}. " if cautious else ""
         if none := unvalidated(results):
             heading, by = CHOICES["fit"]
         about = none + ABOUT.format(heading=heading, by=by, careful=careful)

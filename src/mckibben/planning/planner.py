@@ -65,9 +65,8 @@ LOADED = 0.3
 """Share of a muscle's largest force that it is loaded with at most, where no load is known."""
 
 GRAVITY = 9.81
-"""[m/s²]."""
 
-COARSEST = 0.02
+USUAL = 0.02
 """Sample time of a plan without recordings [s]."""
 
 
@@ -180,7 +179,7 @@ def plan(
     recorded_limits: Limits = {}
     gaps: tuple[Gap, ...] = ()
     wanted = {"holds", "repeats"}
-    step = COARSEST if plant is None else plant.sample_time
+    step = USUAL if plant is None else plant.sample_time
     if recorded:
         known = _known(recorded, plant, block)
         gaps, recorded_limits = gaps_of(known), limits_of_recordings(known)

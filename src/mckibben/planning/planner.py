@@ -246,6 +246,11 @@ def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) ->
     if block is None:
         return excitation(recordings, None if rig is None else rig.inputs)
     driven = [one.name for one in block.inputs]
+    if rig is not None and not {*driven} & {*rig.inputs}:
+        raise DataError(
+            f"the model is driven by {', '.join(driven)}, and the rig by {', '.join(rig.inputs)}",
+            remedy="give a model of the rig's own inputs, or leave --model out",
+        )
     known = excitation(recordings, driven, [one.name for one in block.outputs])
     return replace(known, loads=tuple(name for name in known.loads if name in driven))
 

@@ -23,7 +23,7 @@ from .blocks.memoryless import Polynomial as Polynomial
 from .blocks.saving import load as load
 from .characterization import characterize as characterize
 from .comparison.calibrating import calibrate as calibrate
-from .comparison.orders import identify as identify
+from .comparison.identifying import identify as identify
 from .comparison.ranking import compare as compare
 from .diagnosis.data_gaps import data_gaps as data_gaps
 from .errors import DataError as DataError

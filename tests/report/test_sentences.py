@@ -22,7 +22,8 @@ import pytest
 
 import mckibben
 from mckibben import PI, Recording
-from mckibben.comparison.row import Memory, Row
+from mckibben.comparison.leaderboard import Row
+from mckibben.comparison.memory_test import Memory
 from mckibben.control import Twin, track
 from mckibben.diagnosis.data_gaps import data_gaps
 from mckibben.report.page import page

@@ -11,12 +11,10 @@ from typing import Any, ClassVar
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.characterization import Characterization, characterize
-from mckibben.comparison.channels import Names
+from mckibben.comparison.channels import Names, moved_by
+from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import Settings, plan_of
-from mckibben.comparison.ranking import ranked
-from mckibben.comparison.recognising import moved_by
-from mckibben.comparison.results import Leaderboard
-from mckibben.comparison.standing import Standing
+from mckibben.comparison.ranking import Standing, ranked
 from mckibben.control import Tracked
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.data_gaps import Gap, data_gaps

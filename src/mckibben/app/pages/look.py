@@ -14,7 +14,7 @@ from mckibben.app.drawn import picture
 from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
 from mckibben.app.together import obstacle
-from mckibben.comparison.recognising import any_moves
+from mckibben.comparison.channels import any_moves
 from mckibben.errors import MckibbenError
 from mckibben.numerals import typeset_within
 from mckibben.recording import Recording

@@ -92,12 +92,11 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to record next.
+    """What to record next: commands over time, and what each part of them is for.
 
     Parameters
     ----------
     recording : Recording
-        The commands, with time.
     steps : tuple of Step
     parameters : tuple of Parameter
         Of the model; empty without one.
@@ -223,9 +222,6 @@ def _steps(
     return tuple(found)
 
 
-# -- models and limits -----------------------------------------------------------------------------
-
-
 def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) -> Excitation:
     """Return what recordings contain, of the channels of a model if one is given."""
     needed = [*(rig.inputs if rig is not None else ())]
@@ -302,9 +298,6 @@ def _of_muscle(given: str | Path, rig: Rig | None) -> tuple[Block, Limits]:
                 "Remedy: plan from recordings."
             )
     return block, limits
-
-
-# -- standard errors -------------------------------------------------------------------------------
 
 
 def _parameters(

@@ -2,9 +2,9 @@
 
     python benchmarks/plan.py [--seeds N] [--model NAME] [PLANT ...]
 
-Virtual plants that know no model are recorded for 20 s, and for a minute of the plan, of a random
-wave of all inputs and loads at one speed, or of triangles over the whole range, within the same limits.
-A model is fitted to both recordings. Its free-run errors on strokes, steps and fast waves, over the
+Virtual plants that know no model are recorded for 20 s, and for a minute of the plan, of a random wave
+of all inputs and loads at one speed, or of triangles over the range, within the same limits and rates. A
+model is fitted to both recordings. Its free-run errors on strokes, steps and fast waves, over the
 standard deviation of the outputs, stand in the table, with medians of the plan's over the other's.
 """
 

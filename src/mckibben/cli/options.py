@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -397,3 +397,25 @@ def chosen_models(given: str, quick: bool = False) -> str | list[str]:
     if given in ("all", "quick"):
         return "quick" if quick else given
     return [name.strip() for name in given.split(",") if name.strip()]
+
+
+def limits_in(items: Iterable[str]) -> dict[str, list[float | None]]:
+    """Return limits from texts CHANNEL=LOW:HIGH[:RATE], of which numbers may be left out.
+
+    >>> limits_in(["pressure=1:5.5", "force=::20"])
+    {'pressure': [1.0, 5.5], 'force': [None, None, 20.0]}
+    """
+    found = {}
+    for item in items:
+        name, equals, text = item.partition("=")
+        parts = text.split(":")
+        try:
+            if not (name and equals and text and 2 <= len(parts) <= 3):
+                raise ValueError
+            found[name] = [float(part) if part else None for part in parts]
+        except ValueError:
+            raise DataError(
+                f"--limits {item!r} is not of the form CHANNEL=LOW:HIGH or CHANNEL=LOW:HIGH:RATE",
+                remedy="write for instance --limits pressure=1:5.5:2, which is bar and bar/s",
+            ) from None
+    return found

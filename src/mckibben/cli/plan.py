@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mckibben.cli.grouping import spread
-from mckibben.cli.options import Force, Json, Reading, Seed
+from mckibben.cli.options import Force, Json, Reading, Seed, limits_in
 from mckibben.cli.output import print_json, print_table, say
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
@@ -63,14 +63,13 @@ def plan(
     from mckibben.blocks.saving import load
     from mckibben.files import write
     from mckibben.outputs import claim_recording
-    from mckibben.planning.limits import parsed
     from mckibben.planning.planner import plan as planned
     from mckibben.report.words import plan_sentences
 
     saved = model is not None and model.endswith(".json")
     named = [Path(name) for name in (rig, muscle, model if saved else None) if name is not None]
     claim_recording(out, inputs=[*(files or []), *named], force=force)
-    within = parsed(limits or [])
+    within = limits_in(limits or [])
     found = planned(
         reading.read(files, None, informative=False) if files else [],
         rig=rig,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mckibben import registry
-from mckibben.cli.options import Columns, Force, Json, Rate, Reading, Seed, Units
+from mckibben.cli.options import Columns, Force, Json, Rate, Reading, Seed, Units, limits_in
 from mckibben.cli.output import print_json, print_table, progress_bar, say
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
@@ -238,7 +238,6 @@ def _plant(rig: str | None, twin: Path | None, limits: list[str]) -> Plant:
     """Return what the loop is closed on."""
     from mckibben.blocks.saving import load
     from mckibben.control import Twin
-    from mckibben.planning.limits import parsed
     from mckibben.rigs import load_rig
 
     if (rig is None) == (twin is None):
@@ -251,7 +250,7 @@ def _plant(rig: str | None, twin: Path | None, limits: list[str]) -> Plant:
             raise DataError("a rig has limits of its own", remedy="leave --limits out")
         return load_rig(str(rig))
     given = {}
-    for channel, numbers in parsed(limits).items():
+    for channel, numbers in limits_in(limits).items():
         low, high, *rest = numbers
         if low is None or high is None or rest:
             raise DataError(

@@ -36,6 +36,9 @@ SIMILAR = 1.5
 LARGE = 0.25
 """Share of the range that branches cover whose speeds, or cycles, are compared."""
 
+FEWEST_BRANCHES = 4
+"""Branches of like length whose speeds are compared, at least."""
+
 OFF_REST = 0.1
 """Share of its range by which a channel stands off its most frequent value."""
 
@@ -253,16 +256,21 @@ def _inner_reversals(known: Excitation) -> Found:
 
 
 def _speed_ratio(known: Excitation) -> Found:
-    """Give how many times faster some branches of an input are than others of like length."""
+    """Give how many times faster some branches of an input are than others of like length.
+
+    Quantiles are of the time of motion, so that a few ways to where something is held do not count.
+    """
     for name in known.swinging:
         branches = [b for b in known.branches[name] if b.travel >= LARGE * known.span(name)]
         travel = np.array([branch.travel for branch in branches])
         speeds = np.array([known.speed(name, branch) for branch in branches])
+        order = np.argsort(speeds)
         ratio = 1.0
         for least in np.unique(np.quantile(travel, np.linspace(0, 1, 20))) if branches else ():
-            own = speeds[(travel >= 0.999 * least) & (travel <= SIMILAR * least)]
-            if own.size > 1:
-                slow, fast = np.quantile(own, (0.1, 0.9))
+            like = order[(travel[order] >= 0.999 * least) & (travel[order] <= SIMILAR * least)]
+            if like.size >= FEWEST_BRANCHES:
+                time = np.cumsum(travel[like] / speeds[like])
+                slow, fast = speeds[like[np.searchsorted(time, np.array([0.15, 0.85]) * time[-1])]]
                 ratio = max(ratio, float(fast / slow))
         if known.branches[name]:
             yield ratio, (name,)

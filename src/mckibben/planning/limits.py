@@ -146,25 +146,3 @@ def check_possible(limits: Limits, seconds: float, rig: Rig | None) -> None:
         raise DataError(
             f"none of {', '.join(limits)} may move", remedy="give wider limits with --limits"
         )
-
-
-def parsed(items: Iterable[str]) -> dict[str, list[float | None]]:
-    """Return limits from texts CHANNEL=LOW:HIGH[:RATE], of which numbers may be left out.
-
-    >>> parsed(["pressure=1:5.5", "force=::20"])
-    {'pressure': [1.0, 5.5], 'force': [None, None, 20.0]}
-    """
-    found = {}
-    for item in items:
-        name, equals, text = item.partition("=")
-        parts = text.split(":")
-        try:
-            if not (name and equals and text and 2 <= len(parts) <= 3):
-                raise ValueError
-            found[name] = [float(part) if part else None for part in parts]
-        except ValueError:
-            raise DataError(
-                f"--limits {item!r} is not of the form CHANNEL=LOW:HIGH or CHANNEL=LOW:HIGH:RATE",
-                remedy="write for instance --limits pressure=1:5.5:2, which is bar and bar/s",
-            ) from None
-    return found

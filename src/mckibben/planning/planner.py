@@ -65,9 +65,8 @@ LOADED = 0.3
 """Share of a muscle's largest force that it is loaded with at most, where no load is known."""
 
 GRAVITY = 9.81
-"""[m/s²]."""
 
-COARSEST = 0.02
+USUAL = 0.02
 """Sample time of a plan without recordings [s]."""
 
 
@@ -93,12 +92,11 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to record next.
+    """What to record next: commands over time, and what each part of them is for.
 
     Parameters
     ----------
     recording : Recording
-        The commands, with time.
     steps : tuple of Step
     parameters : tuple of Parameter
         Of the model; empty without one.
@@ -180,7 +178,7 @@ def plan(
     recorded_limits: Limits = {}
     gaps: tuple[Gap, ...] = ()
     wanted = {"holds", "repeats"}
-    step = COARSEST if plant is None else plant.sample_time
+    step = USUAL if plant is None else plant.sample_time
     if recorded:
         known = _known(recorded, plant, block)
         gaps, recorded_limits = gaps_of(known), limits_of_recordings(known)
@@ -224,9 +222,6 @@ def _steps(
     return tuple(found)
 
 
-# -- models and limits -----------------------------------------------------------------------------
-
-
 def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) -> Excitation:
     """Return what recordings contain, of the channels of a model if one is given."""
     needed = [*(rig.inputs if rig is not None else ())]
@@ -247,6 +242,11 @@ def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) ->
     if block is None:
         return excitation(recordings, None if rig is None else rig.inputs)
     driven = [one.name for one in block.inputs]
+    if rig is not None and not {*driven} & {*rig.inputs}:
+        raise DataError(
+            f"the model is driven by {', '.join(driven)}, and the rig by {', '.join(rig.inputs)}",
+            remedy="give a model of the rig's own inputs, or leave --model out",
+        )
     known = excitation(recordings, driven, [one.name for one in block.outputs])
     return replace(known, loads=tuple(name for name in known.loads if name in driven))
 
@@ -298,9 +298,6 @@ def _of_muscle(given: str | Path, rig: Rig | None) -> tuple[Block, Limits]:
                 "Remedy: plan from recordings."
             )
     return block, limits
-
-
-# -- standard errors -------------------------------------------------------------------------------
 
 
 def _parameters(

@@ -14,8 +14,17 @@ from mckibben import registry
 SOURCE = Path(mckibben.__file__).parent
 
 PARTS = (
-    *("recording", "signals", "metrics", "diagnosis", "files", "rigs", "environments"),
-    *("blocks", "estimators", "control", "comparison", "excitation", "validation", "muscles"),
+    *("recording", "signals", "metrics", "files", "rigs", "environments"),
+    *(
+        "blocks",
+        "estimators",
+        "control",
+        "comparison",
+        "diagnosis",
+        "planning",
+        "validation",
+        "muscles",
+    ),
     *("papers", "report", "studying", "export", "stream", "link", "simulators", "ros"),
     *("bands", "measured", "example", "errors"),
 )

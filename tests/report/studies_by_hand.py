@@ -14,9 +14,9 @@ from mckibben.blocks.fields import Channel
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI, RateDependentPI
 from mckibben.blocks.memoryless import PiecewiseLinear
-from mckibben.comparison.results import Leaderboard
-from mckibben.comparison.row import Memory, Row
-from mckibben.diagnosis import characterize
+from mckibben.comparison.leaderboard import Leaderboard, Row
+from mckibben.comparison.memory_test import Memory
+from mckibben.diagnosis.characterization import characterize
 from mckibben.metrics import score
 from mckibben.recording import Recording
 from mckibben.signals import triangle

@@ -118,7 +118,7 @@ def _say(study: Study, folder: Path) -> None:
         for sentence in words.characterization_sentences(study.characterization):
             say(sentence)
     for gap in study.untold:
-        say(f"- {gap}")
+        say(f"- {words.gap_sentence(gap)} {words.gap_run(gap)}")
     if study.review is not None:
         say()
         say(str(study.review))
@@ -136,9 +136,6 @@ def _conclude(study: Study, folder: Path) -> None:
 
     print_leaderboard(study.leaderboard)
     say()
-    for gap in study.untold:
-        if gap.what == "parameters":
-            say(f"- {gap}")
     for question, answer in answers(study):
         say(f"{question} {answer[0]}")
     if another := another_inverted(study):

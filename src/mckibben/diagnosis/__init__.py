@@ -1,5 +1,1 @@
-"""What recordings show of a muscle, as numbers with intervals."""
-
-from mckibben.diagnosis.characterization import Characterization as Characterization
-from mckibben.diagnosis.characterization import characterize as characterize
-from mckibben.diagnosis.loops import Cycle as Cycle
+"""What a muscle does, whether a model is right, and what recordings cannot identify."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import PI, DataError, Recording
-from mckibben.diagnosis import characterize
+from mckibben.diagnosis.characterization import characterize
 from mckibben.signals import irregular_triangle, sine, staircase, triangle
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import PI, DataError, Recording
-from mckibben.diagnosis import characterize
+from mckibben.diagnosis.characterization import characterize
 from mckibben.signals import staircase
 
 STEP = 0.01

@@ -37,7 +37,7 @@ def characterize(
     """Say what the muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
     others = beside or []
     recordings, given, moved = reading.read_one(files, input, output, others)
-    from mckibben.diagnosis import characterize as find
+    from mckibben.diagnosis.characterization import characterize as find
     from mckibben.recording import notes_by_file, reading_notes
     from mckibben.report import words
 

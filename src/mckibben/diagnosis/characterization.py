@@ -380,7 +380,8 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     absent = set() if followed else {*SHAPE, *BY_POSITION} - {"branch_gap"}
     if found.follows_direction:
         absent |= set(BY_POSITION)
-    if found.has_loop is False or (found.has_loop is None and found.p_loop is not None):
+    low, high = found.intervals.get("branch_gap", (1.0, 1.0))
+    if found.has_loop is False or low <= 0 <= high:
         absent |= set(SHAPE)
     kept = {name: limits for name, limits in found.intervals.items() if name not in absent}
     cycles = () if "loop_width" in absent else found.cycles

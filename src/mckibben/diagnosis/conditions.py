@@ -12,7 +12,7 @@ from mckibben.diagnosis.tracks import FEWEST, Range
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves
-from mckibben.statistics import correlation_length
+from mckibben.statistics import NORMAL_95, correlation_length
 
 ALIKE = 0.02
 """Share of all that another input does within which levels are one."""
@@ -25,8 +25,6 @@ MOST = 2000
 
 KNOTS = 12
 """Of the curve of the input beside which other inputs have an effect."""
-
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)

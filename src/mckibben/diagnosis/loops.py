@@ -122,19 +122,18 @@ def largest_of(loops: Sequence[Loop]) -> list[Loop]:
 def curve(u: Array, y: Array, levels: Array, half: float) -> Array:
     """Return the output (k,) at input levels (k,), of samples (n,) in any order; NaN beyond them.
 
-    Means over the samples within ``half`` of a level, interpolated from the mean inputs there.
+    Means over the samples within ``half`` of a level where there are three or more, interpolated from
+    the mean inputs there.
     """
     order = np.argsort(u, kind="stable")
     x, z = u[order], y[order]
     first = np.searchsorted(x, levels - half)
     count = np.searchsorted(x, levels + half, side="right") - first
-    near = count > 2
-    if not near.any():
-        return np.interp(levels, x, z, left=np.nan, right=np.nan)
-    places, heights = (
-        (total[first + count] - total[first])[near] / count[near]
-        for total in (np.concatenate([[0.0], np.cumsum(q)]) for q in (x, z))
-    )
+    sums = (np.concatenate([[0.0], np.cumsum(q)]) for q in (x, z))
+    means = [(total[first + count] - total[first]) / np.maximum(count, 1) for total in sums]
+    near, known = count > 2, (x[0] <= levels) & (levels <= x[-1])
+    places = np.where(near, means[0], levels)[known]
+    heights = np.where(near, means[1], np.interp(levels, x, z))[known]
     # the ends as they are, so that nothing is cut off within half a window of them
     places, which = np.unique(np.concatenate([places, x[[0, -1]]]), return_index=True)
     heights = np.concatenate([heights, z[[0, -1]]])[which]
@@ -159,13 +158,16 @@ class Branches:
 
 
 def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
-    """Return the curves of all major branches of three samples or more."""
+    """Return the curves of all major branches of three samples or more.
+
+    The first of five or more of a recording, which starts from an unknown memory, is left out.
+    """
     levels = scale.u_low + SHARES * scale.u_span
     half = _half(scale, scale.u_span)
     found = [
         (curve(track.u[part], track.y[part], levels, half), way, number)
         for number, track in enumerate(tracks)
-        for part, way in track.branches
+        for part, way in track.branches[len(track.branches) > 4 and not track.periodic :]
         if part.stop - part.start >= 3
     ]
     curves, ways, owners = zip(*found, strict=True) if found else ((), (), ())
@@ -190,23 +192,31 @@ class Gaps:
 def gaps_of(found: Branches, sign: float) -> Gaps:
     """Return how far branches are from the mean of those before and after, so that drift cancels.
 
-    The error is that of branches which differ as much as those of one direction do: a t-test.
+    The error is that of branches which differ as much as those of one direction do: a t-test. That
+    direction counts in which they differ less, as branches of loops that turn at different peaks differ
+    after the peak.
     """
     from scipy.special import fdtrc, stdtrit
 
-    gaps, repeats, pairs = [], [], []
+    gaps: list[float] = []
+    pairs: list[float] = []
+    repeats: dict[float, list[float]] = {1.0: [], -1.0: []}
     for k in range(found.ways.size - 1):
         if found.owners[k] == found.owners[k + 1]:
             pairs += _mean(found.ways[k + 1] * (found.curves[k] - found.curves[k + 1]))
             if k and found.owners[k - 1] == found.owners[k]:
                 before, here, after = found.curves[k - 1 : k + 2]
                 gaps += _mean(found.ways[k] * (0.5 * (before + after) - here))
-                repeats += _mean(np.where(np.isfinite(here), after - before, np.nan))
+                repeats[found.ways[k]] += _mean(np.where(np.isfinite(here), after - before, np.nan))
     gap, n = sign * float(np.mean(gaps or pairs or [np.nan])), len(gaps)
     if n < 2:
         return Gaps(gap if gaps or pairs else None)
     # of independent branches, gaps vary by 3/2, their mean by 4/n and repeats by 2 times their variance
-    error, freedom = float(np.sqrt(2 * np.mean(np.square(repeats)) / n)), max(n / 1.5, 1.0)
+    error, freedom = min(
+        (float(np.sqrt(2 * np.mean(np.square(x)) / n)), float(len(x)))
+        for x in repeats.values()
+        if x
+    )
     half = error * float(stdtrit(freedom, 0.975))
     p = float(fdtrc(1.0, freedom, (gap / error) ** 2)) if error > 0 else float(gap == 0)
     return Gaps(gap, (gap - half, gap + half), p)

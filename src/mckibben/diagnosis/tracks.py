@@ -64,7 +64,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class Track:
-    """One recording: input and output, (n,) each, as moving averages over ``window`` samples.
+    """One recording: input and output, (n,) each, as moving averages where there is noise.
 
     ``u_noise`` and ``y_noise`` are the noise that is left, 0 where unknown. ``turns`` are the first
     sample, the turning points of the input and the last sample, ``major_turns`` the same without swings
@@ -74,7 +74,6 @@ class Track:
     u: Array
     y: Array
     sample_time: float | None
-    window: int
     u_noise: float
     y_noise: float
     turns: Indices
@@ -200,7 +199,7 @@ def _track(u: Array, y: Array, sample_time: float | None, scale: Scale) -> Track
     threshold = swing_threshold(u_noise, scale.u_span, u.size)
     turns = reversals(u, threshold)
     major_turns = reversals(u, max(threshold, MAJOR * scale.u_span))
-    return Track(u, y, sample_time, window, u_noise, y_noise, turns, major_turns, periodic)
+    return Track(u, y, sample_time, u_noise, y_noise, turns, major_turns, periodic)
 
 
 def _closes(x: Array, noise: float) -> bool:

@@ -220,7 +220,7 @@ def _by_rate(recording: Recording, given: str, wanted: str) -> plots.Json:
 
 
 def _words(desk: Desk, given: str, wanted: str) -> None:
-    from mckibben.diagnosis import characterize
+    from mckibben.diagnosis.characterization import characterize
     from mckibben.report import words
 
     what = f": {wanted}" if len(desk.outputs) > 1 else ""

@@ -26,7 +26,7 @@ from mckibben.files import formats
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 
 TABLE = "level,p_kPa,displacement_mm,branch\n" + "\n".join(
-    f"{k % 20},{300 + k % 40},{k % 7 - 1},up" for k in range(60)
+    f"{k % 20},{300 + max(k % 40 - 20, 0)},{k % 7 - 1},up" for k in range(60)
 )
 
 

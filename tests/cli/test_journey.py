@@ -150,10 +150,21 @@ def test_what_was_assumed_while_reading_reaches_every_result(
 
 
 def test_several_zeros_are_taken_out(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> None:
-    first = read(files[0])[0]
+    run = read(files[0])[0]
+    rests = {name: np.append(run[name], np.full(200, run[name][-1])) for name in run.channels}
+    first = Recording(rests, run.sample_time)
+    write(first, tmp_path / "first.csv")
     moved = first.with_channels(displacement=first["displacement"] + 300.0)
     write(moved, tmp_path / "moved.csv")
-    given = ("compare", files[0], tmp_path / "moved.csv", "--models", "pi", "--jobs", 1)
+    given = (
+        "compare",
+        tmp_path / "first.csv",
+        tmp_path / "moved.csv",
+        "--models",
+        "pi",
+        "--jobs",
+        1,
+    )
     errors = [
         json.loads(cli(*given, "--allow-shared", "--json", *zero).out)["rows"][0]["test"]["rmse"]
         for zero in ((), ("--zero", "displacement"))

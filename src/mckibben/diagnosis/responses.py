@@ -214,7 +214,8 @@ def _welch(
         response = cross / alone
     good = np.flatnonzero(coherence > COHERENT)[1 if coherence[0] > COHERENT else 0 :]
     angle = np.asarray(np.degrees(np.unwrap(np.angle(response[good]))), dtype=np.float64)
-    return np.fft.rfftfreq(length, step)[good], np.abs(response[good]), angle, coherence[good]
+    frequency = np.asarray(np.fft.rfftfreq(length, step), dtype=np.float64)
+    return frequency[good], np.abs(response[good]), angle, coherence[good]
 
 
 def _describing_function(

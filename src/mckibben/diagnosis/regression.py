@@ -1,11 +1,11 @@
 """Regression of residuals on what they may depend on, where neighbours are alike and variances differ.
 
 Noise is an autoregression of the greatest restricted likelihood beside *all* columns (Harville, JASA 72,
-1977), so that the freedom that columns take makes it look no rougher than it is; its order is at most that of
-Burg's method by BIC. A test has the larger p-value of two in the whitened series, as either alone
-rejects too often: the F-test, with the freedom by which that noise is known (Satterthwaite), where
+1977), so that the freedom that columns take makes it look no rougher than it is; its order is at most
+that of Burg's method by BIC. A test has the larger p-value of two in the whitened series, as either
+alone rejects too often: the F-test, with the freedom by which that noise is known (Satterthwaite), where
 variances differ; and Hotelling's T² by the covariance HC3 (MacKinnon and White, J. Econometrics 29,
-1985) where samples are few. ``benchmarks/validation.py`` measures both.
+1985) where samples are few. ``benchmarks/validation.py`` measures what comes of them.
 
 Pieces (one per recording) are whitened each by itself; nothing crosses from one into the next. Whatever
 asks whether a curve, a loop or a trend is in a recording is such a test, beside the columns that it may

@@ -26,8 +26,8 @@ import numpy as np
 
 from mckibben import compare
 from mckibben.comparison.channels import Channels
+from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import plan_of
-from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.splits import predecessor
 from mckibben.errors import MckibbenError
 from mckibben.measured.sets import Set, parted, sets_in

@@ -20,7 +20,7 @@ TAKES_RECORDINGS: list[Callable[[Any], object]] = [
     mckibben.compare,
     mckibben.study,
     mckibben.characterize,
-    mckibben.untold,
+    mckibben.data_gaps,
     mckibben.plan,
     mckibben.review,
     lambda given: mckibben.identify(given, "pi"),

@@ -15,7 +15,16 @@ SOURCE = Path(mckibben.__file__).parent
 
 PARTS = (
     *("recording", "signals", "metrics", "characterization", "files", "rigs", "environments"),
-    *("blocks", "estimators", "control", "comparison", "excitation", "validation", "muscles"),
+    *(
+        "blocks",
+        "estimators",
+        "control",
+        "comparison",
+        "diagnosis",
+        "planning",
+        "validation",
+        "muscles",
+    ),
     *("papers", "report", "studying", "export", "stream", "link", "simulators", "ros"),
     *("bands", "measured", "example", "errors"),
 )

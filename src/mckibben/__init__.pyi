@@ -23,9 +23,10 @@ from .blocks.memoryless import Polynomial as Polynomial
 from .blocks.saving import load as load
 from .characterization import characterize as characterize
 from .comparison.calibrating import calibrate as calibrate
-from .comparison.orders import identify as identify
+from .comparison.identifying import identify as identify
 from .comparison.ranking import compare as compare
 from .diagnosis.check import check as check
+from .diagnosis.data_gaps import data_gaps as data_gaps
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning
 from .errors import MckibbenError as MckibbenError
@@ -36,7 +37,6 @@ from .estimators.hysteresis.gpi import GPIEstimator as GPIEstimator
 from .estimators.hysteresis.mpi import MPIEstimator as MPIEstimator
 from .estimators.hysteresis.pi import PIEstimator as PIEstimator
 from .excitation.planning import plan as plan
-from .excitation.telling import untold as untold
 from .files import read as read
 from .files import write as write
 from .recording import Recording as Recording

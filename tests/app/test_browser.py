@@ -168,7 +168,7 @@ def test_two_windows_follow_each_other_and_panels_are_drawn_again(page: Any, add
     seen(page, "characterization").locator("li, td").first.wait_for(timeout=SLOW)
     other.get_by_label("Undo: remove").click()
     seen(other, run)
-    seen(page, "untold").locator("*").first.wait_for(timeout=SLOW)
+    seen(page, "data-gaps").locator("*").first.wait_for(timeout=SLOW)
     assert page.get_by_test_id("characterization").count() == 1
     seen(page, "tab-data").click()
     seen(page, run)

@@ -13,8 +13,8 @@ from scipy.io import savemat
 
 import mckibben
 from mckibben import GPI, DataError, Recording, characterize, compare, study
-from mckibben.comparison import trying
-from mckibben.comparison.recommending import acceptable, recommended
+from mckibben.comparison import fitting
+from mckibben.comparison.choosing import acceptable, recommended
 from mckibben.signals import irregular_triangle, triangle
 from tests.cli.conftest import cli as cli  # a fixture
 
@@ -58,7 +58,7 @@ def test_noise_is_not_recommended() -> None:
     found = study(noise(0), **QUICK)
     board = found.leaderboard.to_dict()
     assert (board["chosen"], found.inverse) == (None, None)
-    assert board["not_recommended"]
+    assert board["not_recommended"] == "validation"
     assert {row["model"] for row in board["rows"]} == {"pi", "p1", "constant"}
 
 
@@ -116,7 +116,7 @@ def muscles(seed: int, moves: bool) -> Recording:
 def test_muscles_have_to_beat_the_constant_too(moves: bool) -> None:
     train, test = [muscles(0, moves), muscles(1, moves)], [muscles(2, moves)]
     board = compare(train, test, models=["coupled-memory"], jobs=1)
-    chosen, _ = recommended(board.rows, board.constant, "mm")
+    chosen, _ = recommended(board.rows, board.constant)
     assert (chosen is not None) == moves
     assert acceptable(board.rows[0], board.constant) == moves
     with pytest.raises(DataError, match="--allow-shared"):
@@ -126,16 +126,19 @@ def test_muscles_have_to_beat_the_constant_too(moves: bool) -> None:
 def test_a_cross_validation_that_ran_away_is_not_chosen_by(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    honest = trying.try_part
+    honest = fitting.fit
 
-    def run_away(data: Any, part: Any, tell: Any) -> Any:
-        tried = honest(data, part, tell)
-        return replace(tried, squares=((float("nan"),),)) if part.name == "p1" else tried
+    def run_away(data: Any, task: Any, tell: Any) -> Any:
+        found = honest(data, task, tell)
+        if task.name != "p1":
+            return found
+        away = {k: tuple(np.inf * one for one in runs) for k, runs in found.predictions.items()}
+        return replace(found, predictions=away)
 
-    monkeypatch.setattr(trying, "try_part", run_away)
+    monkeypatch.setattr(fitting, "fit", run_away)
     board = compare(RUN, OTHER, **QUICK)
     assert board.best is not None
     assert board.best.model == "pi"
     (other,) = (row for row in board.rows if row.model == "p1")
     assert other.validation_rmse is None
-    assert other.invalid
+    assert other.validation_failed

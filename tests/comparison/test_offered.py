@@ -15,6 +15,7 @@ import mckibben
 from mckibben import ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.channels import Channels
+from mckibben.comparison.leaderboard import inverse_of
 from mckibben.comparison.offered import (
     declared,
     default_model,
@@ -25,7 +26,6 @@ from mckibben.comparison.offered import (
     settings_of_all,
     summary,
 )
-from mckibben.comparison.row import inverse_of
 from mckibben.errors import MckibbenError
 from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
 from mckibben.estimators.hysteresis.pi import PIEstimator

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,10 @@ import pytest
 
 from mckibben import GPI, DataError, ModelError, Recording, compare, registry
 from mckibben.comparison.channels import Channels
+from mckibben.comparison.choosing import USEFUL, order, recommended
 from mckibben.comparison.free_run import run_free
-from mckibben.comparison.recommending import USEFUL, recommended
-from mckibben.comparison.results import Leaderboard
-from mckibben.comparison.splits import folds, given_split, held_out_tail, validation_folds
+from mckibben.comparison.leaderboard import Leaderboard
+from mckibben.comparison.splits import folds, given_split, held_out_part, validation_folds
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.signals import irregular_triangle, triangle
 
@@ -103,7 +104,7 @@ def test_test_outputs_are_never_looked_at_while_fitting(
 
 def test_held_out_tail_is_never_looked_at(train: Recording) -> None:
     spoilt = {name: samples.copy() for name, samples in train.channels.items()}
-    start = len(held_out_tail([train], "pressure", 0.25).train[0])
+    start = len(held_out_part([train], CHANNELS, 0.25).train[0])
     for samples in spoilt.values():
         samples[start:] = samples[start:][::-1]
     clean = compare(train, models=["gpi"], n_folds=2, jobs=1)
@@ -195,19 +196,19 @@ def test_first_sample_of_a_test_that_continues_nothing_is_not_scored(train: Reco
     assert not given_split([train], [train]).test_rows[0][0]
     assert given_split([train], [later]).test_rows[0][0]
     with pytest.raises(DataError, match="--test"):
-        held_out_tail([train.slice(0, 20)], "pressure", 0.25)
+        held_out_part([train.slice(0, 20)], CHANNELS, 0.25)
 
 
 def test_held_out_tail_is_a_quarter_of_the_travel_and_not_the_rest_after_it() -> None:
     u = np.concatenate([triangle(TIME, 4.0, 5.0), np.zeros(2000)])
     noisy = u + 0.01 * np.random.default_rng(0).standard_normal(u.size)
-    split = held_out_tail([recorded(noisy)], "pressure", 0.25)
+    split = held_out_part([recorded(noisy)], CHANNELS, 0.25)
     assert len(split.train[0]) == pytest.approx(0.75 * TIME.size, rel=0.02)
 
 
 def test_whole_recordings_are_held_out_where_there_are_many(train: Recording) -> None:
     many = [train.slice(100 * k, 100 * (k + 1)) for k in range(12)]
-    split = held_out_tail(many, "pressure", 0.25)
+    split = held_out_part(many, CHANNELS, 0.25)
     assert 6 <= len(split.train) <= 10
     assert all(recording in many for recording in split.test)
     kept = sum(len(recording) for recording in split.train)
@@ -226,6 +227,30 @@ class Ranked:
 
 @pytest.mark.parametrize("share", [0.5, 0.99 * USEFUL, 1.01 * USEFUL, 2.0])
 def test_a_model_hardly_better_than_the_mean_is_not_recommended(share: float) -> None:
-    constant = Ranked("constant", 1.0)
-    assert (recommended([Ranked("pi", share)], constant, "mm")[0] is not None) == (share < USEFUL)
-    assert recommended([Ranked("pi", share)], constant, "mm", "They rest apart")[0] is None
+    rows, constant = [Ranked("pi", share)], Ranked("constant", 1.0)
+    assert recommended(rows, constant)[1] == (None if share < USEFUL else "test")
+    useless = [Ranked("pi", share, skill_least=0.0)]
+    assert recommended(useless, constant) == (None, "validation")
+
+
+def test_a_caution_does_not_outweigh_an_error_of_half() -> None:
+    errors = {"gpi": 1.0, "narx": 0.49, "state-network": 0.51, "arx": 1.1}
+    ranked = sorted(errors, key=lambda model: order(model, errors[model], None, 0.5))
+    assert ranked == ["narx", "gpi", "state-network", "arx"]
+
+
+@pytest.mark.parametrize("runs", [1, 5])
+def test_a_part_in_which_the_output_hardly_moves_is_not_the_test(runs: int) -> None:
+    u = np.concatenate([triangle(TIME, 6.0, 5.0), 1.0 + triangle(TIME, 0.5, 0.3)])
+    whole = recorded(u)
+    ends = np.linspace(0, len(whole), runs + 1).round().astype(int)
+    pieces = [whole.slice(*pair) for pair in pairwise(ends)]
+    split = held_out_part(pieces, CHANNELS, 0.25)
+    parts = zip(split.test, split.test_rows, strict=True)
+    tested = [one["displacement"][rows] for one, rows in parts]
+    moving = whole["displacement"].std()
+    assert np.concatenate(tested).std() > 0.2 * moving > whole["displacement"][1300:].std()
+    fitted = {id(one) for one in split.train}
+    assert not fitted & {id(one) for one in split.test}
+    kept = sum(len(one) for one in split.train) + sum(int(rows.sum()) for rows in split.test_rows)
+    assert len(whole) - 2 * runs <= kept <= len(whole)

@@ -151,16 +151,16 @@ def test_models_without_a_place_are_left_out_and_said() -> None:
     runs = [run(5.0), run(4.0)]
     several = plan_of(runs, run(3.0, 4), models="all", settings=None, n_folds=0, seed=0)
     assert {"balance", "tsfnn"} <= set(several.items)
-    assert "pressure_1" in several.left_out["sdchm"]
+    assert "pressure_1" in several.empty.left_out["sdchm"]
     alone = [run(5.0).with_channels(**{name: np.zeros(TIME.size)}) for name in INPUTS]
     told = plan_of([*runs, *alone], run(3.0, 4), models="all", settings=None, n_folds=0, seed=0)
     assert {"sdchm", "balance", "tsfnn"} <= set(told.items)
-    assert "gpi" in several.left_out
-    assert "mpi-narmax" in several.left_out
+    assert "gpi" in several.empty.left_out
+    assert "mpi-narmax" in several.empty.left_out
     one = run(5.0).select(["pressure_1", "displacement_1"])
     single = plan_of([one], (), models="all", settings=None, n_folds=0, seed=0)
     assert "gpi" in single.items
-    assert "sdchm" in single.left_out
+    assert "sdchm" in single.empty.left_out
 
 
 def test_outputs_of_different_units_have_no_mean() -> None:

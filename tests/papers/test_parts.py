@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from mckibben import GPI, PIEstimator, Recording, registry
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.papers.keeping import fitted, recorded
 from mckibben.papers.sdchm.models import BALANCE, LINEAR, OURS, PREDICTING, PUBLISHED, Models
@@ -57,18 +57,24 @@ def test_a_fit_is_made_once(
         return fit(self, *args, **kwargs)
 
     monkeypatch.setattr(Estimator, "fit", counted)
-    first, second = (fitted(Kept(tmp_path), "pi", PIEstimator(), recording) for _ in range(2))
+    first, second = (
+        fitted(Checkpoints(tmp_path), "pi", PIEstimator(), recording) for _ in range(2)
+    )
     assert first == second
     assert len(fits) == 1
-    fitted(Kept(tmp_path), "pi", PIEstimator(n_operators=3), recording)
-    fitted(Kept(tmp_path, "another paper"), "pi", PIEstimator(), recording)
+    fitted(Checkpoints(tmp_path), "pi", PIEstimator(n_operators=3), recording)
+    fitted(Checkpoints(tmp_path, "another paper"), "pi", PIEstimator(), recording)
     assert len(fits) == 3
 
 
 def test_recordings_are_read_back_and_damaged_ones_made_again(tmp_path: Path) -> None:
     def again() -> Recording:
         ((_, found),) = recorded(
-            Kept(tmp_path), "multistate-friction", ["isobaric-1bar"], 0, lambda share, text: None
+            Checkpoints(tmp_path),
+            "multistate-friction",
+            ["isobaric-1bar"],
+            0,
+            lambda share, text: None,
         )
         return found
 

@@ -12,7 +12,7 @@ import pytest
 
 import mckibben
 from mckibben import Recording, example
-from mckibben.comparison.results import Leaderboard
+from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.control import track
 from mckibben.system.showing import DrawsItself
 

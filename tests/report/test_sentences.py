@@ -22,10 +22,11 @@ import pytest
 
 import mckibben
 from mckibben import PI, Recording
-from mckibben.comparison.row import Memory, Row
+from mckibben.comparison.leaderboard import Row
+from mckibben.comparison.memory_test import Memory
 from mckibben.control import Twin, track
+from mckibben.diagnosis.data_gaps import data_gaps
 from mckibben.diagnosis.description import describe
-from mckibben.excitation import untold
 from mckibben.report.page import page
 from mckibben.report.wording import next_steps, verdict
 from mckibben.studying.study import Study
@@ -86,7 +87,7 @@ def one_muscle() -> Study:
     assert best.block is not None
     return replace(
         found,
-        untold=untold(found.train, ("pressure",), ("displacement",)),
+        untold=data_gaps(found.train, ("pressure",), ("displacement",)),
         check=mckibben.check(best.block, found.test),
         description=describe(best.block, found.train),
     )

@@ -17,8 +17,8 @@ from mckibben.app.fields import said
 from mckibben.app.jobs import Jobs
 from mckibben.app.news import News, Refresh
 from mckibben.app.workspace import Workspace
-from mckibben.comparison.recommending import NONE
 from mckibben.errors import DataError, MckibbenError
+from mckibben.report import words
 
 if TYPE_CHECKING:
     from nicegui.elements.upload_files import FileUpload
@@ -142,7 +142,7 @@ class Desk:
         """Why none of these models is recommended; empty where one is, or there is none.
 
         Each was fitted by itself and says so of itself; which one it depends on is a matter of all, as
-        in `mckibben.comparison.recommending.recommended`.
+        in `mckibben.comparison.choosing.recommended`.
         """
         return not_recommended(self.results())
 
@@ -173,7 +173,7 @@ class Desk:
 
     def settle_channels(self) -> None:
         """Choose inputs and outputs that the recordings have: of several muscles, all of them."""
-        from mckibben.comparison.recognising import recognised
+        from mckibben.comparison.channels import recognised
 
         known = set(self.workspace.channels())
         used = self.inputs + self.outputs
@@ -199,17 +199,21 @@ class Desk:
 def against(results: Sequence[dict[str, Any]]) -> dict[str, str]:
     """Return the models that are not recommended, each judged by itself, and why."""
     return {
-        row["name"]: row["not_recommended"].removeprefix(NONE)
+        row["name"]: words.not_recommended(
+            "test" if row["not_recommended"] == "test" else "validation",
+            row,
+            row["constant"],
+            row["unit"],
+        )
         for row in results
-        if row["not_recommended"]
+        if row["not_recommended"] and row["constant"]
     }
 
 
 def not_recommended(results: Sequence[dict[str, Any]]) -> str:
     """Return why none of some models, in the order of the choice, is recommended; empty where one is."""
     better = [result for result in results if (result["skill_least"] or 0.0) > 0]
-    first = next(iter(better or results), None)
-    return str(first["not_recommended"] or "") if first else ""
+    return "".join(against((better or list(results))[:1]).values())
 
 
 def named(element: Any, name: str) -> Any:

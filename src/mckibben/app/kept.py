@@ -151,7 +151,6 @@ class Fitted(Kept):
     test: Figures | None = None
     train: Figures | None = None
     memory: Memory | None = None
-    start: Said | None = None
     band: Said | None = None
     outputs: dict[Text, Figures] = {}
     n_parameters: Count | None = None

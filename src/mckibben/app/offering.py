@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from mckibben import registry
 from mckibben.app.desk import Desk
 from mckibben.app.together import obstacle
-from mckibben.comparison.channels import Channels
+from mckibben.comparison.channels import DRIVING, FORCE, Channels, any_moves
 from mckibben.comparison.offered import Need, ability, declared, full_name, needs, objections
-from mckibben.comparison.recognising import DRIVING, FORCE, any_moves
 from mckibben.comparison.splits import held_out
 from mckibben.errors import DataError
 from mckibben.estimators.core.estimator import InverseKind

@@ -141,7 +141,7 @@ def script(
         f"board = mckibben.compare(train, test, {_given(channels)},",
         f"    {_asked(list(best), settings, shared)})",
         'print(board.to_frame()[["model", "validation_rmse", "test.rmse"]])',
-        "print(board.chosen)",
+        "print(board)",
         "",
         "for row in board.rows:",
         "    if row.block is not None:",
@@ -156,7 +156,7 @@ def script(
     else:
         lines += [
             "if board.best is None:",
-            "    raise SystemExit(board.not_recommended)",
+            "    raise SystemExit('No model is recommended.')",
             "try:",
             "    inverse = board.best.block.inverse()",
             "except mckibben.ModelError as error:",

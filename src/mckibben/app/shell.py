@@ -325,5 +325,5 @@ window.addEventListener("popstate", () =>
 IS_DARK = "() => emit(document.body.classList.contains('body--dark'))"
 """Tells which theme is shown, which until :func:`_match` has asked is known to the browser alone."""
 
-LATER = ("mckibben.app.work", "mckibben.characterization", "mckibben.excitation")
+LATER = ("mckibben.app.work", "mckibben.characterization", "mckibben.diagnosis.data_gaps")
 """What pages import when they first need it, in threads of their own."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from mckibben.app.desk import Desk
 from mckibben.app.fields import READING
-from mckibben.comparison.recognising import recognised
+from mckibben.comparison.channels import recognised
 from mckibben.recording import Recording
 
 Kinds = dict[tuple[str, ...], list[str]]

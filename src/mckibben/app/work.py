@@ -18,7 +18,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Fit, validate and test a model as `mckibben.compare` does, and keep it with its figures."""
     from mckibben.comparison.planning import plan_of
     from mckibben.comparison.ranking import ranked
-    from mckibben.comparison.results import CHOICES
+    from mckibben.report.words import CHOICES
 
     entries = workspace.entries()
     train, test = workspace.with_role("train", entries), workspace.with_role("test", entries)

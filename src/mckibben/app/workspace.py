@@ -12,7 +12,7 @@ from mckibben.app.caching import Cache
 from mckibben.app.changing import Changing
 from mckibben.app.forms import inverse_of
 from mckibben.app.recordings import demand_text
-from mckibben.comparison.recommending import order
+from mckibben.comparison.choosing import order
 from mckibben.errors import MckibbenError
 from mckibben.numerals import numeral
 

@@ -37,8 +37,8 @@ def compare(
     folder = None if out is None else make_folder(out)
     with alone(folder), stoppable(folder):
         begun = asked.begin(files, reading, folder, lambda models: LEADERBOARD)
+        from mckibben.comparison.leaderboard import Leaderboard
         from mckibben.comparison.ranking import compare as rank
-        from mckibben.comparison.results import Leaderboard
 
         def keep(board: Leaderboard) -> None:
             if begun.results is not None:

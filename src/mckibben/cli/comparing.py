@@ -101,7 +101,7 @@ class Asked:
     @contextmanager
     def telling(self, what: str) -> Iterator[Callable[[float, str], None]]:
         """Work, on the cluster where one is named, and tell how far it is."""
-        from mckibben.comparison.cluster import on_cluster
+        from mckibben.comparison.backends import on_cluster
 
         with on_cluster(self.dask), progress_bar(what, plainly=True) as tell:
             yield tell

@@ -14,7 +14,7 @@ from mckibben.cli.output import print_json, print_table, say
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
-    from mckibben.excitation import Gap
+    from mckibben.diagnosis.data_gaps import Gap
     from mckibben.files.choosing import Seen
     from mckibben.recording import Recording
 
@@ -29,13 +29,9 @@ def info(
     models: Annotated[bool, typer.Option("--models", help="List the models and settings.")] = False,
     inputs: Inputs = None,
     outputs: Outputs = None,
-    model: Annotated[
-        Path | None,
-        typer.Option("--model", help="Model, as JSON: which of its parameters the files tell."),
-    ] = None,
     as_json: Json = False,
 ) -> None:
-    """List the models, or say what files hold, and what recordings cannot tell of a muscle."""
+    """List the models, or show what files contain, and what recordings cannot identify."""
     if models:
         _models(as_json)
     elif not files:
@@ -50,7 +46,7 @@ def info(
     else:
         named = [*(inputs or ()), *(outputs or ())] or None
         recordings, columns = reading.look(files, named)
-        gaps = _untold(recordings, inputs, outputs, model)
+        gaps = _gaps(recordings, inputs, outputs)
         _recordings(recordings, columns, gaps, as_json)
 
 
@@ -114,20 +110,16 @@ def _model(file: Path, as_json: bool) -> None:
     print_table(["", "value"], [[key, str(value)] for key, value in described.items()])
 
 
-def _untold(
-    recordings: list[Recording],
-    inputs: list[str] | None,
-    outputs: list[str] | None,
-    model: Path | None,
+def _gaps(
+    recordings: list[Recording], inputs: list[str] | None, outputs: list[str] | None
 ) -> tuple[Gap, ...] | str:
-    """Return what recordings cannot tell, or, if nothing was asked by name, why that cannot be said."""
-    from mckibben.blocks.saving import load
-    from mckibben.excitation import untold
+    """Return what recordings cannot identify, or, if nothing was asked by name, why that is unknown."""
+    from mckibben.diagnosis.data_gaps import data_gaps
 
     try:
-        return untold(recordings, inputs, outputs, None if model is None else load(model))
+        return data_gaps(recordings, inputs, outputs)
     except DataError as error:
-        if inputs or outputs or model:
+        if inputs or outputs:
             raise
         return str(error)
 
@@ -139,6 +131,7 @@ def _recordings(
     as_json: bool,
 ) -> None:
     from mckibben.files.condition import condition
+    from mckibben.report.words import gap_run, gap_sentence
 
     described: list[dict[str, Any]] = [
         {
@@ -190,13 +183,11 @@ def _recordings(
             say(f"Note: {note}")
     say()
     if isinstance(gaps, str):
-        say(f"What they cannot tell is not known: {gaps}")
+        say(f"Data gaps: unknown, {gaps}")
         return
-    say(
-        "What these recordings cannot tell:" if gaps else "These recordings tell what they need to."
-    )
+    say("Data gaps:" if gaps else "Data gaps: none")
     for gap in gaps:
-        say(f"- {gap}")
+        say(f"- {gap_sentence(gap)} {gap_run(gap)}")
 
 
 def _lag(recording: Recording) -> int | None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from mckibben.cli.output import print_table, say
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard
-    from mckibben.comparison.standing import Standing
+    from mckibben.comparison.leaderboard import Leaderboard
+    from mckibben.comparison.ranking import Standing
 
 
 PRINTED = ("chosen", "test", "interval", "rank", "gap")
@@ -43,12 +43,10 @@ def told(tell: Callable[[float, str], None], last: str = "") -> Callable[[Standi
 
 def print_leaderboard(board: Leaderboard) -> None:
     """Print a leaderboard as a table, what is chosen, and what is to be said of models that failed."""
-    from mckibben.comparison.columns import columns_of_board
-    from mckibben.comparison.free_run import STARTED
-    from mckibben.comparison.results import CHOICES, NOT_TOLD
+    from mckibben.report import words
+    from mckibben.report.columns import columns_of_board
 
     columns = [column for column in columns_of_board(board) if column.key in PRINTED]
-    heading, _ = CHOICES[board.chosen_by]
     rows = []
     for row in board.ranking:
         if row.test is not None:
@@ -58,26 +56,21 @@ def print_leaderboard(board: Leaderboard) -> None:
             rows.append([name, *(column.text(given) for column in columns)])
     say(f"Split: {board.split}.")
     print_table(["model", *(column.label for column in columns)], rows)
-    say(f"All run free. {STARTED} See simulate --initial measured.")
-    say("Rank: by test RMSE. Gap between branches kept: 100 % is right, 0 forgets.")
+    say(f"All errors are free-run simulation errors. {words.STARTED}")
+    say("Rank: by test RMSE. Gap: hysteresis width reproduced (100 % is exact).")
     if board.level:
-        say(f"≈ {NOT_TOLD}: the interval of the difference holds 0.")
+        say(f"≈ {words.LEVEL}.")
     if board.constant is not None and board.rows:
         say("constant: the mean of the training output, which every model has to beat.")
-    if board.chosen:
-        say(board.chosen)
-    careful = [row.model for row in board.rows if row.reason is None and row.caution]
-    if careful:
-        say(
-            "* Good only near the motions fitted, however small the errors, so not chosen while another "
-            f"works: {', '.join(careful)}."
-        )
-    for row in board.rows:
-        if row.reason is None and row.invalid:
-            say(f"{row.model}: not chosen, its {heading.split()[0]} failed: {row.invalid}")
+    if said := words.chosen(board):
+        say(said)
+    if any(row.reason is None and row.caution for row in board.rows):
+        say(f"* {words.CAREFUL[0].upper()}{words.CAREFUL[1:]}.")
+    for sentence in words.not_validated(board):
+        say(sentence)
     for reason, models in board.failures.items():
         say(f"{', '.join(models)}: failed, {reason}")
-    for note in (*board.notes, *board.of_models):
+    for note in (*board.notes, *words.comparison(board)):
         say(f"Note: {note}")
     if board.left_out:
-        say(f"Left out: {len(board.left_out)} models that are made for other channels.")
+        say(f"Left out: {len(board.left_out)} models do not apply to these channels.")

@@ -10,6 +10,7 @@ import typer
 from mckibben.cli.options import Force, Jobs, Json, Models, Quick, Seed, chosen_models
 from mckibben.cli.output import make_folder, print_json, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stoppable
+from mckibben.report import words
 from mckibben.system.locks import alone
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def measured(
 
 def _say(one: Outcome, *, quiet: bool) -> None:
     if not quiet:
-        say(f"{one.label}: {one.failed or (one.board.chosen if one.board else '')}")
+        say(f"{one.label}: {one.failed or (words.chosen(one.board) if one.board else '')}")
 
 
 def _told(one: Outcome) -> dict[str, object]:

@@ -237,7 +237,7 @@ class Reading:
 
             recordings = [resample(recording, self.resample) for recording in recordings]
         if self.zero:
-            from mckibben.comparison.recognising import recognised
+            from mckibben.comparison.channels import recognised
             from mckibben.signals import zeroed
 
             for place, one in enumerate(recordings):
@@ -310,7 +310,7 @@ class Reading:
 
     def _finds_its_own(self, file: Path, *, or_of_force: bool = False) -> bool:
         """Tell whether a file is of several muscles, a loop's log, or of force by length alone."""
-        from mckibben.comparison.recognising import lacks_displacement
+        from mckibben.comparison.channels import lacks_displacement
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -326,7 +326,7 @@ class Reading:
 
 def _is_held(recordings: Sequence[Recording]) -> bool:
     """Tell whether nothing moves, so that the force may be what is to be modelled."""
-    from mckibben.comparison.recognising import any_moves
+    from mckibben.comparison.channels import any_moves
 
     return not any_moves(recordings, ("displacement",))
 

@@ -19,7 +19,7 @@ from mckibben.cli.output import InterruptionError, say
 from mckibben.system.workers import leave
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard
+    from mckibben.comparison.leaderboard import Leaderboard
 
 INTERRUPTED = 130
 """Exit code."""
@@ -129,11 +129,11 @@ def _kept(folder: Path | None) -> str:
 
 def forget_kept(folder: Path | None) -> None:
     """Forget what was kept, now that everything is written; nothing interrupts that any more."""
-    from mckibben.comparison.kept import Kept
+    from mckibben.comparison.checkpoints import Checkpoints
 
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Kept(folder).clear()
+    Checkpoints(folder).clear()
 
 
 def stop_short(board: Leaderboard) -> None:

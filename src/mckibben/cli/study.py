@@ -111,13 +111,14 @@ def study(
 
 def _say(study: Study, folder: Path) -> None:
     """Print what the muscle and a loop do, before any model is fitted."""
+    from mckibben.report.words import gap_run, gap_sentence
     from mckibben.studying.refitting import Refit
 
     if study.characterization is not None:
         for sentence in study.characterization.sentences:
             say(sentence)
     for gap in study.untold:
-        say(f"- {gap}")
+        say(f"- {gap_sentence(gap)} {gap_run(gap)}")
     if study.review is not None:
         say()
         say(str(study.review))
@@ -135,9 +136,6 @@ def _conclude(study: Study, folder: Path) -> None:
 
     print_leaderboard(study.leaderboard)
     say()
-    for gap in study.untold:
-        if gap.what == "parameters":
-            say(f"- {gap}")
     for question, answer in answers(study):
         say(f"{question} {answer[0]}")
     if another := another_inverted(study):

@@ -18,7 +18,7 @@ from mckibben.errors import DataError
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
-    from mckibben.comparison.trying import Data
+    from mckibben.comparison.fitting import Data
 
 
 UNLIKE = 0.1

@@ -1,23 +1,53 @@
-"""Which channels of recordings a comparison is about."""
+"""Which channels of recordings drive, which are modelled, and which are given beside."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mckibben.comparison.recognising import FORCE, any_moves, force_over, lacks_displacement
+from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.estimators.coupled.base import driving, loads_among, moved, schedules
+from mckibben.estimators.coupled.base import loads_among, schedules
 from mckibben.recording import Recording
 
 Names = str | Sequence[str] | None
 """One channel, several, or None for what the recordings' names say."""
 
+DRIVING = ("pressure", "voltage", "command", "input", "u", "p")
+"""Names of inputs, those nearest to the muscle first."""
+
+ALONG, TURNED = ("displacement", "length", "contraction", "position"), ("angle",)
+"""Names of translations and of rotations."""
+
+COORDINATES = "[xyz]"
+"""Of one place; each is an output of its own."""
+
+MOVED = (*ALONG, *TURNED, "output", COORDINATES)
+"""Names of outputs."""
+
+UNITS_DRIVING, UNITS_MOVED = ("bar", "V"), ("mm", "rad")
+"""Units of either, where names are not recognised."""
+
+PLACES = "[a-z]|left|right|top|bottom|upper|lower|front|back|rear|flexor|extensor"
+"""Endings that distinguish channels of one quantity, where numbers do not."""
+
+DESIRED = ("reference_", "command_")
+"""Beginnings of names of what a loop is given: these are no measurements."""
+
+FORCE, PRESSURE, OF_FORCE = "force", "pressure", ("length", "displacement")
+"""Force laws are of the first of these that there is, beside the pressure."""
+
+HELD = 0.01
+"""Share of its largest value by which a length must vary for a force to be learned of it."""
+
 STEADY = 0.05
-"""What schedules is a level of its run where it varies in it by no more than this share of its range."""
+"""Largest variation within a run, over that of all runs, of a load that is a level of each run."""
+
+Sides = tuple[tuple[str, ...], tuple[str, ...]]
+"""Inputs and outputs."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +59,7 @@ class Channels:
     inputs, outputs : tuple of str
         Of every model.
     scheduling : tuple of str or None
-        Of models that can be told more; None for what they find by name.
+        Loads, for models that can take them; None for what these find by name.
     """
 
     inputs: tuple[str, ...]
@@ -47,8 +77,26 @@ class Channels:
             return self.scheduling
         return () if self.single else schedules(recordings, (*self.inputs, *self.outputs))
 
+    def known(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
+        """Return all channels that models are given; those of force by length find the pressure."""
+        names = (*self.inputs, *self.scheduled(recordings))
+        by_length = self.outputs == (FORCE,) and any(name in OF_FORCE for name in names)
+        finds = by_length and PRESSURE not in names and all(PRESSURE in one for one in recordings)
+        return (*names, PRESSURE) if finds else names
+
+    def ignored(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
+        """Return loads, and lengths that a force depends on, that vary and that no model is given."""
+        lengths = OF_FORCE if self.outputs == (FORCE,) else ()
+        others = {*self.known(recordings), *self.outputs}
+        some = dict.fromkeys([*schedules(recordings), *lengths])
+        return tuple(
+            name
+            for name in some
+            if name not in others and varies([one[name] for one in recordings if name in one])
+        )
+
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Return every output with the input that is its own: that of its number, else of its place."""
+        """Return every output with the input of its number, else of its place."""
 
         def own(place: int, output: str) -> str:
             number = re.search(r"\d*$", output)
@@ -62,48 +110,79 @@ class Channels:
 
 def channels_of(
     recordings: Sequence[Recording],
-    inputs: Names,
-    outputs: Names,
-    load: str | None,
+    inputs: Names = None,
+    outputs: Names = None,
+    load: str | None = None,
 ) -> Channels:
-    """Return the channels that a comparison is about; a force beside other inputs is a load, too.
+    """Return the channels that a comparison is about, as named, else by names and units.
 
-    Force by length is told the pressure by the models of it, so that this is no input.
+    A force beside other inputs is a load. Force is modelled over length or displacement, where that
+    varies and nothing else is moved; models of it find the pressure themselves.
 
     Raises
     ------
     DataError
         If a recording lacks the load, or a channel is named twice.
     """
-    over = None if load else force_over(recordings, _several(inputs), _several(outputs))
+    asked = [(names,) if isinstance(names, str) else names for names in (inputs, outputs)]
+    over = None if load else _force_over(recordings, *asked)
     if over is not None:
         return Channels((over,), (FORCE,))
-    usual = FORCE if lacks_displacement(recordings) else "displacement"
-    given = _named(recordings, inputs, _by_name(recordings, driving, "pressure"))
-    wanted = _named(recordings, outputs, _by_name(recordings, moved, usual))
-    found = loads_told(recordings, Channels(given, wanted, (load,) if load else None))
-    told = found.scheduling or ()
-    named = (*found.inputs, *found.outputs, *told)
+    every = list(dict.fromkeys(name for recording in recordings for name in recording.channels))
+    found = _by_name(every, _units(recordings, every))
+    usual = FORCE if lacks_displacement(recordings) else OF_FORCE[-1]
+    sides = found[0] or (PRESSURE,), found[1] or (usual,)
+    if usual == FORCE:
+        sides = sides[0], (FORCE,)
+    elif inputs is None and outputs is None and load is None:
+        sides = _over_held(recordings, sides)
+    given = _named(recordings, inputs, sides[0])
+    wanted = _named(recordings, outputs, sides[1])
+    channels = loads_told(recordings, Channels(given, wanted, (load,) if load else None))
+    told = channels.scheduling or ()
+    named = (*channels.inputs, *channels.outputs, *told)
     if twice := [name for name in named if named.count(name) > 1]:
         raise DataError(
             "the channel is named twice among inputs, outputs and load",
             channel=twice[0],
-            remedy="a model is not told what it is to give: name each channel once",
+            remedy="a model is not given what it predicts: name each channel once",
         )
     for name in told:
         for recording in recordings:
             if name not in recording:
                 raise DataError(
-                    "there is no such channel to tell the load",
+                    "there is no such channel to give the load",
                     file=recording.source,
                     channel=name,
                     remedy="name it with --column, or leave --load out",
                 )
-    return found
+    return channels
+
+
+def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Sides:
+    """Return which of some channels are taken for inputs and for outputs; of several muscles, all.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    channels : sequence of str
+        Those that all recordings have. Where none is recognised, the first drives the second.
+
+    Returns
+    -------
+    tuple of (tuple of str, tuple of str)
+        Inputs and outputs; empty where there is no channel.
+    """
+    if not channels:
+        return (), ()
+    inputs, outputs = _by_name(channels, _units(recordings, channels))
+    inputs = inputs or tuple(channels[:1])
+    rest = [name for name in channels if name not in inputs] or list(channels)
+    return _over_held(recordings, (inputs, outputs or tuple(rest[:1])))
 
 
 def loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
-    """Return channels whose forces beside other inputs schedule: nobody commands what hangs there."""
+    """Return channels whose forces beside other inputs schedule: loads are never commanded."""
     loads = loads_among(recordings, channels.inputs)
     if channels.scheduling is not None or not loads:
         return channels
@@ -112,10 +191,7 @@ def loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
 
 
 def dead_loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
-    """Return channels of one muscle with what is held at a level of its own in every recording.
-
-    Such a load moves the output from recording to recording, and no input tells a model why.
-    """
+    """Return channels of one muscle with the loads that are held at a level in every recording."""
     if not (channels.single and recordings):
         return channels
     held = [
@@ -127,33 +203,129 @@ def dead_loads_told(recordings: Sequence[Recording], channels: Channels) -> Chan
 
 
 def held_at_levels(recordings: Sequence[Recording], name: str) -> bool:
-    """Tell whether a channel differs from recording to recording, and hardly within one."""
+    """Return whether a channel differs from recording to recording, and hardly within one."""
     span = float(np.ptp(np.concatenate([one[name] for one in recordings])))
     return span > 0 and all(float(np.ptp(one[name])) <= STEADY * span for one in recordings)
 
 
-def where_held(recordings: Sequence[Recording], found: Channels) -> Channels:
-    """Return force over what is held, where nothing that is found moves while a force does."""
-    held = len(found.outputs) == 1 and not any_moves(recordings, found.outputs)
+def any_moves(recordings: Sequence[Recording], channels: Sequence[str]) -> bool:
+    """Return whether any channel moves within any recording, by more than its offset would round to."""
+    return any(
+        float(np.ptp(run[name])) > 1e-6 * (1.0 + float(np.abs(run[name]).max()))
+        for run in recordings
+        for name in channels
+        if name in run and len(run)
+    )
+
+
+def varies(lengths: Sequence[Array]) -> bool:
+    """Return whether lengths of all recordings are held at more than one, approaches excepted."""
+    samples = np.concatenate([*lengths, np.zeros(0)])
+    if not samples.size:
+        return False
+    return bool(np.ptp(np.percentile(samples, (1.0, 99.0))) > HELD * np.abs(samples).max())
+
+
+def lacks_displacement(recordings: Sequence[Recording]) -> bool:
+    """Return whether force by length and pressure is all there is to model: nothing else is moved."""
+    others = (*ALONG, *TURNED)
+    return all(
+        {OF_FORCE[0], PRESSURE, FORCE} <= {*one.channels}
+        and not any(name.startswith(others) for name in one.channels if name != OF_FORCE[0])
+        for one in recordings
+    ) and any_moves(recordings, (FORCE,))
+
+
+def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str]) -> str:
+    """Return the channel over which an output loops: its input, or where that is held what drives.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    given : str
+        The input.
+    channels : sequence of str
+        Those that may replace it.
+    """
+    if any_moves(recordings, (given,)):
+        return given
+    driving = _called(channels, DRIVING)
+    return driving[0] if driving and any_moves(recordings, driving[:1]) else given
+
+
+def _force_over(
+    recordings: Sequence[Recording], inputs: Sequence[str] | None, outputs: Sequence[str] | None
+) -> str | None:
+    """Return the length or displacement over which force is modelled, beside pressure, or None."""
+    meant = lacks_displacement(recordings) if outputs is None else tuple(outputs) == (FORCE,)
+    for name in OF_FORCE if meant else ():
+        asked = inputs is None or set(inputs) in ({name}, {name, PRESSURE})
+        there = all({name, PRESSURE, FORCE} <= {*one.channels} for one in recordings)
+        if asked and there and varies([one[name] for one in recordings]):
+            return name
+    return None
+
+
+def _over_held(recordings: Sequence[Recording], sides: Sides) -> Sides:
+    """Return force over the output found, where that is held in all recordings and the force is not."""
+    outputs = sides[1]
+    held = len(outputs) == 1 and not any_moves(recordings, outputs)
     forced = all(FORCE in one for one in recordings) and any_moves(recordings, (FORCE,))
-    return Channels(found.outputs, (FORCE,)) if held and forced else found
+    return (outputs, (FORCE,)) if held and forced and outputs != (FORCE,) else sides
 
 
-def _by_name(
-    recordings: Sequence[Recording],
-    named: Callable[[Recording], tuple[str, ...]],
-    usual: str,
+def _units(recordings: Sequence[Recording], channels: Sequence[str]) -> dict[str, str]:
+    return {
+        name: next((one.units.get(name, "") for one in recordings if name in one), "")
+        for name in channels
+    }
+
+
+def _by_name(channels: Sequence[str], units: Mapping[str, str]) -> Sides:
+    """Return inputs and outputs by name, else by unit; empty where neither is recognised.
+
+    Outputs are the first quantity, or where those are fewer than inputs, the most of a kind. Kinds are
+    not mixed: errors in mm and in rad have no mean.
+    """
+    inputs = _called(channels, DRIVING) or _in_units(channels, units, UNITS_DRIVING)
+    rest = [name for name in channels if name not in inputs]
+    outputs = _called(rest, MOVED) or _in_units(rest, units, UNITS_MOVED)
+    if len(outputs) < len(inputs):
+        along = _called(rest, (*ALONG, COORDINATES)) or _in_units(rest, units, ("mm",))
+        turned = _called(rest, TURNED) or _in_units(rest, units, ("rad",))
+        outputs = max(outputs, along, turned, key=len)
+    return inputs, outputs or ((FORCE,) if FORCE in rest else ())
+
+
+def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
+    """Return the channels that are called by the first of some words that any is: one, or several.
+
+    Several are distinguished by numbers, of which the first may be missing, or by places.
+    """
+    for word in words:
+        plain = [name for name in channels if re.fullmatch(word, name)]
+        numbered = [name for name in channels if re.fullmatch(rf"{word}_?\d+", name)]
+        placed = [name for name in channels if re.fullmatch(rf"{word}_({PLACES})", name)]
+        if word == COORDINATES or (
+            numbered and all(re.search(r"[a-z_][2-9]$", n) for n in numbered)
+        ):
+            numbered = [name for name in channels if name in (*plain, *numbered)]
+        begun = [name for name in channels if len(word) > 1 and name.startswith(f"{word}_")]
+        several = numbered or (placed if len(placed) > 1 and not plain else [])
+        if found := several or (plain or begun)[:1]:
+            return tuple(found)
+    return ()
+
+
+def _in_units(
+    channels: Sequence[str], units: Mapping[str, str], wanted: Sequence[str]
 ) -> tuple[str, ...]:
-    """Return what recordings call several muscles' channels, or one's: the usual before others."""
-    found = tuple(dict.fromkeys(name for recording in recordings for name in named(recording)))
-    several = tuple(name for name in found if name.rpartition("_")[2].isdigit())
-    if len(several) > 1 or not found:
-        return several or (usual,)
-    return (usual,) if any(usual in recording for recording in recordings) else several or found
-
-
-def _several(names: Names) -> Sequence[str] | None:
-    return (names,) if isinstance(names, str) else names
+    measured = [name for name in channels if not name.startswith(DESIRED)]
+    for unit in wanted:
+        found = tuple(name for name in measured if units.get(name) == unit)
+        if found:
+            return found
+    return ()
 
 
 def _named(

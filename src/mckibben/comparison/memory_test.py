@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.comparison.row import Memory
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.signals import branches
@@ -19,6 +19,28 @@ LEVELS = 41
 
 HOLD = 10
 """Length of the synthetic hold, relative to the ramp before it."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Whether a model keeps rising and falling branches as far apart as the data do.
+
+    Parameters
+    ----------
+    gap_ratio : float or None
+        Slope of the model's branch gaps over the measured ones, at instants with the same input
+        reached from opposite directions: 1 is exact, 0 means that the model forgot. None where the
+        data have no such pairs.
+    n_pairs : int
+        Number of pairs of instants behind it.
+    hold_ratio : float or None
+        Share of the model's own branch gap that remains after a synthetic hold on each branch; 1 for a
+        model that remembers.
+    """
+
+    gap_ratio: float | None
+    n_pairs: int
+    hold_ratio: float | None
 
 
 def memory_test(

@@ -2,48 +2,84 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.comparison.banding import tested_band
-from mckibben.comparison.bootstrap import skill_of
 from mckibben.comparison.channels import Names
-from mckibben.comparison.choosing import Choice, choice_of
-from mckibben.comparison.coverage import OffTraining
-from mckibben.comparison.drift import Drift, Stretch, drift_of
-from mckibben.comparison.kept import Kept
-from mckibben.comparison.pieces import counts_of
-from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
-from mckibben.comparison.recommending import CONSTANT
-from mckibben.comparison.resampling import Resampling
-from mckibben.comparison.results import CHOICES, Leaderboard
-from mckibben.comparison.row import Row
-from mckibben.comparison.standing import Standing
-from mckibben.comparison.starts import start_of
-from mckibben.comparison.trying import (
-    Tried,
+from mckibben.comparison.checkpoints import Checkpoints, source
+from mckibben.comparison.choosing import CONSTANT, Choice, choice_of
+from mckibben.comparison.fitting import (
+    FitResult,
+    counts_of,
     effort_of,
-    errors_on_test,
     joined,
-    outcomes,
     outputs_of,
-    parts_of,
     processes_for,
+    results,
+    row_of,
+    tasks_of,
 )
-from mckibben.errors import ModelError
+from mckibben.comparison.leaderboard import Leaderboard, Row
+from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
+from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
-from mckibben.statistics import differences, interval
+from mckibben.statistics import (
+    BlockBootstrap,
+    block_length,
+    correlation_length,
+    differences,
+    interval,
+)
 from mckibben.system.progress import telling
 from mckibben.system.workers import checked
 
 Watch = Callable[[str, float, float], None]
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How far a comparison is.
+
+    Parameters
+    ----------
+    done, total : int
+        Models.
+    fitting : tuple of str
+        Models in work, the latest last.
+    best : Row or None
+        The model that would be chosen so far.
+    unit : str
+        Of its error.
+    """
+
+    done: int
+    total: int
+    fitting: tuple[str, ...] = ()
+    best: Row | None = None
+    unit: str = ""
+
+    @property
+    def share(self) -> float:
+        """Models done, of all."""
+        return self.done / max(self.total, 1)
+
+    def __str__(self) -> str:
+        """Return it for a progress bar.
+
+        >>> str(Standing(12, 28, ("gpi",)))
+        '12 of 28, fitting gpi'
+        """
+        fitting = f", fitting {self.fitting[-1]}" if self.fitting else ""
+        best = self.best
+        so_far = "" if best is None else f"; best {best.model}, {best.chosen_by:.3g} {self.unit}"
+        return f"{self.done} of {self.total}{fitting}{so_far}".rstrip()
 
 
 def compare(
@@ -121,7 +157,7 @@ def compare(
         called again goes on from there.
     clear : bool
         Whether to forget what was kept when all is done; else the caller does, once it has written
-        what is returned, by ``Kept(folder).clear()``.
+        what is returned, by ``Checkpoints(folder).clear()``.
     progress : bool or callable, optional
         Whether to show a bar; or who is told how far it is, whenever that changes.
     found : callable, optional
@@ -177,7 +213,7 @@ def compare(
 
 @dataclass(frozen=True)
 class Ranking:
-    """A leaderboard, perhaps of a part of the models, and what they give.
+    """A leaderboard, perhaps of a part of the models, and what they predict.
 
     Parameters
     ----------
@@ -195,156 +231,151 @@ def ranked(
     plan: Plan,
     *,
     jobs: int | None,
-    kept: Kept,
+    kept: Checkpoints,
     progress: Callable[[Standing], None] | None = None,
     watch: Watch | None = None,
 ) -> Generator[Ranking]:
     """Yield the ranking whenever a model is finished, cheap models first; the last one is whole."""
     checked(jobs)
-    data = plan.data
-    finished: dict[str, Tried] = {}
-    for name, item in plan.items.items():
-        row = kept.get(name, Row, item, plan.sources[item.model])
-        if row is not None and row.model == name and row.sound:
-            assert row.block is not None
-            finished[name] = Tried(row, outputs_of(row.block, data))
-    remaining = {name: item for name, item in plan.items.items() if name not in finished}
+    data, table = plan.data, _Table(plan)
+    keys = {
+        name: (item, source(registry.load("estimators", item.model)))
+        for name, item in plan.items.items()
+    }
+    for name, reason in plan.refused.items():
+        table.add(Row(name, reason=reason), ())
+    for name in plan.items.keys() - plan.refused.keys():
+        row = kept.get(name, Row, *keys[name])
+        if row is not None and row.model == name and row.sound and row.block is not None:
+            table.add(row, outputs_of(row.block, data))
+    remaining = {name: item for name, item in plan.items.items() if name not in table.rows}
     efforts = {
         name: effort_of(item.model, data) * (1 + len(data.folds))
         for name, item in remaining.items()
     }
     workers = jobs or processes_for(sum(efforts.values()))
     large = sum(efforts.values()) / (4 * workers)
-    parts = [
-        part
+    tasks = [
+        task
         for name, item in remaining.items()
-        for part in parts_of(name, item, len(data.folds), workers > 1 and efforts[name] > large)
+        for task in tasks_of(name, item, len(data.folds), workers > 1 and efforts[name] > large)
     ]
-    resampling = Resampling(plan.n_scored, plan.seed)
+    waiting = {name: [task for task in tasks if task.name == name] for name in remaining}
     begun: list[str] = []
-
-    @cache
-    def drift(model: str) -> Drift | None:
-        return _drift(finished[model].outputs, plan)
-
-    def current() -> Ranking:
-        return _ranking(plan, finished, resampling, drift)
 
     def tell() -> None:
         if progress is not None:
-            working = tuple(model for model in begun if model not in finished)
-            progress(Standing(len(finished), len(plan.items), working, _best(plan, finished)))
+            working = tuple(name for name in begun if name in waiting)
+            best = plan.board(table.sorted()).best
+            progress(Standing(len(table.rows), len(plan.items), working, best, plan.unit))
 
-    def tell_of(index: int, *what: float) -> None:
-        model = parts[index].name
-        if not what and model not in begun:
-            begun.append(model)
+    def told(index: int, *what: float) -> None:
+        name = tasks[index].name
+        if not what and name not in begun:
+            begun.append(name)
             tell()
         if what and watch is not None:
-            watch(model, *what)
+            watch(name, *what)
 
-    if finished:
+    if table.rows:
         tell()
-        yield current()
-    pieces: dict[str, dict[int, Tried]] = {model: {} for model in remaining}
-    wanted = Counter(part.name for part in parts)
-    for outcome in outcomes(data, parts, workers, tell_of):
-        model = parts[outcome.index].name
-        if outcome.error is None:
-            pieces[model][outcome.index] = outcome.value
-        else:
-            pieces[model][outcome.index] = Tried(Row(model, reason=str(outcome.error)))
-        if len(pieces[model]) == wanted[model]:
-            whole = joined(
-                [piece for _, piece in sorted(pieces[model].items())], data.channels.outputs
-            )
-            whole = _with_skill(whole, plan)
-            finished[model] = _with_band(whole, finished, plan)
-            row = finished[model].row
-            if row is not None and row.sound:  # a failure may be the machine's, not the model's
-                item = remaining[model]
-                kept.put(model, row, item, plan.sources[item.model])
+        yield table.ranking()
+    found: dict[str, list[FitResult]] = {name: [] for name in remaining}
+    for outcome in results(data, tasks, workers, told):
+        name = tasks[outcome.index].name
+        failed = None if outcome.error is None else FitResult(reason=str(outcome.error))
+        found[name].append(failed or outcome.value)
+        if len(found[name]) == len(waiting[name]):
+            del waiting[name]
+            whole = joined(found.pop(name))
+            row = _row(plan, name, whole, table)
+            if row.sound:  # a failure may be the machine's, not the model's
+                kept.put(name, row, *keys[name])
+            table.add(row, whole.outputs)
             tell()
-            yield current()
+            yield table.ranking()
 
 
-def _with_skill(tried: Tried, plan: Plan) -> Tried:
-    """Return what came of a model with its skill over the constant, where it was cross-validated."""
-    row = tried.row
-    if row is None or row.validation_rmse is None:
-        return tried
-    pairs = [
-        (sum(own), sum(constant))
-        for own, constant in zip(tried.squares, plan.constant.squares, strict=True)
-        if own is not None and constant is not None
-    ]
-    skill, least = skill_of([one for one, _ in pairs], [other for _, other in pairs], plan.seed)
-    return replace(tried, row=replace(row, skill=skill, skill_least=least))
+def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
+    """Return the row of a model, with its band where it is the best until now, as it may be chosen."""
+    try:
+        row = row_of(plan.data, name, found, plan.constant[0], plan.seed)
+    except MckibbenError as error:  # its outputs overflow
+        return Row(name, reason=str(error))
+    better = any(other.sound and other.order < row.order for other in table.rows.values())
+    if better or not row.sound or row.block is None or row.validation_rmse is None:
+        return row
+    held = plan.data.held_out(found.predictions, row.block)
+    banded = tested_band(row.block, held, found.outputs, plan.data)
+    return row if banded is None else replace(row, banded=banded[0], band=banded[1])
 
 
-def _with_band(tried: Tried, others: Mapping[str, Tried], plan: Plan) -> Tried:
-    """Return what came of a model with its band, where it is the best until now; it may be chosen."""
-    row, held = tried.row, tried.held
-    tried = replace(tried, held=())  # they are large
-    if row is None or not row.sound or row.block is None:
-        return tried
-    if any(o.row is not None and o.row.sound and o.row.order < row.order for o in others.values()):
-        return tried
-    found = tested_band(row.block, held, tried.outputs, plan.data)
-    if found is None:
-        return tried
-    return replace(tried, row=replace(row, banded=found[0], band=found[1]))
+class _Table:
+    """Rows that are finished, and the resamples of their test errors, on the same blocks for all."""
 
+    def __init__(self, plan: Plan) -> None:
+        self.rows: dict[str, Row] = {}
+        self._plan = plan
+        self._outputs: dict[str, tuple[Array, ...]] = {}
+        self._lengths = [int(rows.sum()) for rows in plan.data.split.test_rows if rows.any()]
+        self._errors = {CONSTANT: plan.data.test_errors(plan.constant[1])}
+        self._correlation: dict[str, float] = {}
+        self._resamples: dict[tuple[str, tuple[int, ...]], Array] = {}
 
-def _ranking(
-    plan: Plan,
-    finished: Mapping[str, Tried],
-    resampling: Resampling,
-    drift: Callable[[str], Drift | None],
-) -> Ranking:
-    tested = {
-        model: tried
-        for model, tried in finished.items()
-        if tried.row is not None and tried.row.test is not None
-    }
-    errors = {model: errors_on_test(tried.outputs, plan.data) for model, tried in tested.items()}
-    samples = resampling.of(errors, CONSTANT, errors_on_test(plan.constant.outputs, plan.data))
-    done = sorted((t.row for t in tested.values() if t.row is not None), key=lambda row: row.order)
-    by_test = sorted(map(_rmse, done))
-    rows = [
-        replace(
-            row,
-            test_rank=1 + by_test.index(_rmse(row)),
-            rmse_interval=interval(samples[row.model]),
-            off_training=_off_training(row, finished[row.model].outputs, plan),
-            drift=drift(row.model),
-            start=start_of(errors[row.model], plan.data.split),
-        )
-        for row in done
-    ]
-    failed = [t.row for t in finished.values() if t.row is not None and t.row.test is None]
-    failed.sort(key=lambda row: row.model)
-    outputs = {row.model: finished[row.model].outputs for row in rows}
-    constant = plan.constant.row
-    if not rows or constant is None:
-        return Ranking(plan.board([*rows, *failed]), outputs)
-    constant = replace(constant, rmse_interval=interval(samples[CONSTANT]))
-    best = plan.board(rows).best or rows[0]
-    every = (*rows, constant)
-    apart = differences(
-        np.array([samples[row.model] for row in every]),
-        np.array([_rmse(row) for row in every]),
-        rows.index(best),
-    )
-    *rows, constant = (
-        # others have a band if they were the best when they were done, which is chance
-        replace(
-            row if row is best else replace(row, band=None, banded=None), difference_interval=ends
-        )
-        for row, ends in zip(every, apart, strict=True)
-    )
-    board = replace(plan.board([*rows, *failed]), constant=constant, choice=_choice(rows, plan))
-    return Ranking(board, outputs)
+    def add(self, row: Row, outputs: tuple[Array, ...]) -> None:
+        """Take the row of a model that is finished, and its outputs on all recordings."""
+        self.rows[row.model] = row
+        if row.test is not None:
+            errors = self._errors[row.model] = self._plan.data.test_errors(outputs)
+            self._outputs[row.model] = outputs
+            squares = errors**2 / np.maximum((errors**2).mean(axis=0), np.finfo(float).tiny)
+            ends = np.cumsum(self._lengths)[:-1]
+            self._correlation[row.model] = correlation_length(np.split(squares.mean(axis=1), ends))
+
+    def sorted(self) -> list[Row]:
+        """Return the rows that were tested, in the order of the choice."""
+        tested = [row for row in self.rows.values() if row.test is not None]
+        return sorted(tested, key=lambda row: row.order)
+
+    def ranking(self) -> Ranking:
+        """Return the leaderboard of all rows."""
+        plan, rows = self._plan, self.sorted()
+        failed = [row for row in self.rows.values() if row.test is None]
+        failed.sort(key=lambda row: row.model)
+        if not rows:
+            return Ranking(plan.board(failed), {})
+        every = [*rows, plan.constant[0]]
+        errors = np.array([row.test_error for row in every])
+        samples = np.array(self._resampled([row.model for row in every]))
+        best = plan.board(rows).best or rows[0]
+        by_test = sorted(errors[:-1])
+        ends = differences(samples, errors, rows.index(best))
+        placed = [
+            replace(
+                row,
+                test_rank=None if row.model == CONSTANT else 1 + by_test.index(row.test_error),
+                rmse_interval=interval(own),
+                difference_interval=between,
+                # others have a band if they were the best when they were done, which is chance
+                band=row.band if row is best else None,
+                banded=row.banded if row is best else None,
+            )
+            for row, own, between in zip(every, samples, ends, strict=True)
+        ]
+        board = plan.board([*placed[:-1], *failed])
+        board = replace(board, constant=placed[-1], choice=_choice(rows, plan))
+        return Ranking(board, {row.model: self._outputs[row.model] for row in rows})
+
+    def _resampled(self, models: Sequence[str]) -> list[Array]:
+        """Return resampled test RMSE of models; blocks suit the median of their correlation lengths."""
+        correlation = float(np.median(list(self._correlation.values())))
+        blocks = tuple(block_length(n, correlation) for n in self._lengths)
+        missing = [model for model in models if (model, blocks) not in self._resamples]
+        if missing:
+            bootstrap = BlockBootstrap(self._lengths, self._plan.seed, correlation)
+            for model in missing:
+                self._resamples[model, blocks] = bootstrap.rmse(self._errors[model])
+        return [self._resamples[model, blocks] for model in models]
 
 
 def _choice(rows: Sequence[Row], plan: Plan) -> Choice | None:
@@ -352,54 +383,9 @@ def _choice(rows: Sequence[Row], plan: Plan) -> Choice | None:
     rivals = [
         row
         for row in rows
-        if row.order[:3] == rows[0].order[:3] and (row.skill_least is None or row.skill_least > 0)
+        if row.order[:2] == rows[0].order[:2]
+        and bool(row.caution) == bool(rows[0].caution)
+        and (row.skill_least is None or row.skill_least > 0)
     ]
     squares = {row.model: row.squares for row in rivals if row.squares}
     return choice_of(squares, counts_of(plan.data.folds), plan.seed)
-
-
-def _off_training(row: Row, outputs: Sequence[Array], plan: Plan) -> OffTraining | None:
-    """Return how a model of local rules does off its training, if there are several inputs."""
-    if row.block is None or not row.block.of_local_rules or plan.coverage is None:
-        return None
-    errors = errors_on_test(outputs, plan.data)
-    fitted = None if row.train is None else row.train.rmse
-    return plan.coverage.of(errors, plan.data.split.test_rows, fitted, plan.unit)
-
-
-def _drift(outputs: Sequence[Array], plan: Plan) -> Drift | None:
-    """Return the slow part of a model's error on the test, of the output where that is largest."""
-    split, channels = plan.data.split, plan.data.channels
-    step = split.test[0].sample_time
-    if step is None:
-        return None
-    recordings = (*split.train, *split.test)
-    rows = [*(np.ones(len(recording), dtype=bool) for recording in split.train), *split.test_rows]
-    inputs = [recording.matrix(channels.inputs) for recording in recordings]
-    n, found = len(split.train), []
-    for place, name in enumerate(channels.outputs):
-        stretches = [
-            Stretch(recording[name] - modelled[:, place], given, counts)
-            for recording, modelled, given, counts in zip(
-                recordings, outputs, inputs, rows, strict=True
-            )
-        ]
-        found.append(drift_of(stretches[:n], stretches[n:], step, name, split.test[0].units[name]))
-    told = [drift for drift in found if drift is not None]
-    return max(told, key=lambda drift: (drift.certain, drift.share), default=None)
-
-
-def _best(plan: Plan, finished: Mapping[str, Tried]) -> str:
-    """Return in words which of the models finished would be chosen, and by what figure."""
-    rows = [t.row for t in finished.values() if t.row is not None and t.row.test is not None]
-    best = plan.board(sorted(rows, key=lambda row: row.order)).best
-    if best is None:
-        return ""
-    heading, _ = CHOICES["fit" if best.validation_rmse is None else plan.chosen_by]
-    return f"{best.model}, {heading} {best.chosen_by:.3g} {plan.unit}".strip()
-
-
-def _rmse(row: Row) -> float:
-    if row.test is None:
-        raise ModelError(f"{row.model!r} has no test score. Remedy: this is a defect; report it.")
-    return row.test.rmse

@@ -32,6 +32,9 @@ ENOUGH = 12
 PIECES = 4
 """Of a part that has pieces from all over a recording."""
 
+HARDLY = 0.2
+"""Standard deviation of an output in a part, over that in all, below which it hardly moves there."""
+
 BEYOND = 0.05
 """Share of the range of an input that a part may go beyond and still be within it: noise does."""
 
@@ -126,7 +129,7 @@ def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
         if len(recordings) >= EVERY:
             chosen = [place % EVERY == EVERY - 1 for place in range(len(recordings))]
             return _parted(recordings, chosen, "every third run held out")
-    return held_out_tail(recordings, channels.inputs[0], HELD_OUT)
+    return held_out_part(recordings, channels, HELD_OUT)
 
 
 def _held(recordings: Sequence[Recording], channel: str) -> Split | None:
@@ -151,16 +154,17 @@ def _parted(recordings: Sequence[Recording], tested: Sequence[bool], how: str) -
     return replace(split, described=f"{split.described}: {how}")
 
 
-def held_out_tail(recordings: Sequence[Recording], channel: str, share: float) -> Split:
-    """Hold out the last part of the recordings, of which nothing is seen while fitting.
+def held_out_part(recordings: Sequence[Recording], channels: Channels, share: float) -> Split:
+    """Hold out the last part of the recordings in which an output moves.
 
     Whole recordings from the end, then the tail of one. That one is run through from its start, so
-    that its memory is right, and scored on the tail only.
+    that its memory is right, and scored on the tail only. Where outputs hardly move there, the part
+    before it is held out instead, if one moves there.
 
     Parameters
     ----------
-    channel : str
-        The input, whose travel is divided: a rest at the end of a recording tests nothing.
+    channels : Channels
+        The first input, whose travel is divided: a rest at the end of a recording tests nothing.
     share : float
         Of the input's travel over all recordings to hold out, between 0 and 1.
 
@@ -169,37 +173,73 @@ def held_out_tail(recordings: Sequence[Recording], channel: str, share: float) -
     DataError
         If nothing would be left to fit, or to test.
     """
-    train = list(recordings)
-    whole: list[Recording] = []
-    travels = [_travel(recording[channel]) for recording in train]
-    wanted = share * sum(float(travel[-1]) for travel in travels)
-    while len(train) > 1 and travels[-1][-1] <= wanted:
-        wanted -= float(travels.pop()[-1])
-        whole.insert(0, train.pop())
-    last, travel = train[-1], travels[-1]
-    start = int(np.searchsorted(travel, travel[-1] - wanted))
-    if start < FEWEST and len(train) > 1:  # nearly all of it, as of recordings equally long
-        whole.insert(0, train.pop())
-    if min(start, len(last) - start) >= FEWEST:
-        tail = np.zeros(len(last), dtype=bool)
-        tail[start:] = True
-        described = f"last {len(last) - start} samples of {last.name}"
-        train[-1] = last.slice(0, start)
-        tests, rows = [last], [tail]
-    elif whole:
-        described, tests, rows = "", [], []
-    else:
+    channel, names = channels.inputs[0], channels.outputs
+    travel = share * sum(float(_travel(recording[channel])[-1]) for recording in recordings)
+    deviation = np.concatenate([recording.matrix(names) for recording in recordings]).std(axis=0)
+
+    def moves(split: Split) -> bool:
+        return bool((_scored(split, names).std(axis=0) >= HARDLY * deviation).any())
+
+    split = last = _tail(recordings, channel, travel, "all before")
+    for place in range(1, int(1 / share)):
+        if moves(split):
+            return split
+        before, partly, after = _cut(recordings, channel, place * travel)
+        if partly is not None:
+            run, start = partly
+            before, after = [*before, run.slice(0, start)], [run.slice(start, len(run)), *after]
+        with suppress(DataError):  # too little is left to fit
+            split = _tail(before, channel, travel, "the rest")
+            split = replace(split, train=(*split.train, *after))
+    return split if moves(split) else last
+
+
+def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: str) -> Split:
+    """Hold out the last so much of the input's travel."""
+    train, partly, whole = _cut(recordings, channel, travel)
+    described, tests, rows = [], [], []
+    if partly is not None:
+        run, start = partly
+        train.append(run.slice(0, start))
+        tests.append(run)
+        rows.append(np.arange(len(run)) >= start)
+        described.append(f"last {len(run) - start} samples of {run.name}")
+    elif not whole:
         raise DataError(
-            f"{len(last)} samples are too few to hold out {share:.0%} for a test",
-            file=last.source,
+            f"{len(recordings[-1])} samples are too few to hold out a part for a test",
+            file=recordings[-1].source,
             remedy="give a longer recording, or a test recording of its own with --test",
         )
     if whole:
-        rest = given_split(train, whole)
-        tests, rows = [*tests, *rest.test], [*rows, *rest.test_rows]
-        described += f"{' and ' if described else ''}the last {len(whole)} recording(s)"
-    described += " to test, all before to fit"
-    return Split(tuple(train), tuple(tests), tuple(rows), described)
+        given = given_split(train, whole)
+        tests, rows = [*tests, *given.test], [*rows, *given.test_rows]
+        described.append(f"the last {len(whole)} recording(s)")
+    words = f"{' and '.join(described)} to test, {rest} to fit"
+    return Split(tuple(train), tuple(tests), tuple(rows), words)
+
+
+def _cut(
+    recordings: Sequence[Recording], channel: str, travel: float
+) -> tuple[list[Recording], tuple[Recording, int] | None, list[Recording]]:
+    """Cut the last so much of the input's travel off: what is before, cut at a sample, and after."""
+    before, after = list(recordings), list[Recording]()
+    travels = [_travel(recording[channel]) for recording in before]
+    while len(before) > 1 and travels[-1][-1] <= travel:
+        travel -= float(travels.pop()[-1])
+        after.insert(0, before.pop())
+    run, gone = before[-1], travels[-1]
+    start = int(np.searchsorted(gone, gone[-1] - travel))
+    if start < FEWEST and len(before) > 1:  # nearly all of it, as of recordings equally long
+        return before[:-1], None, [run, *after]
+    if min(start, len(run) - start) < FEWEST:
+        return before, None, after
+    return before[:-1], (run, start), after
+
+
+def _scored(split: Split, names: Sequence[str]) -> Array:
+    """Return the outputs at all samples that are scored, shape (n, k)."""
+    runs = zip(split.test, split.test_rows, strict=True)
+    return np.concatenate([recording.matrix(names)[rows] for recording, rows in runs])
 
 
 def _travel(u: Array) -> Array:
@@ -302,7 +342,7 @@ def validation_folds(
                 return inside or parts, "cross-validation"
     if n >= 1:
         with suppress(DataError):
-            tail = held_out_tail(train, channel, HELD_OUT)
+            tail = held_out_part(train, channels, HELD_OUT)
             fold = Fold(tail.train, _all_rows(tail.train), tail.test, tail.test_rows)
             return (fold,), "validation"
     return (), "fit"

@@ -1,1 +1,1 @@
-"""Recordings and models diagnosed: what is in them, and what they miss."""
+"""What a muscle does, whether a model is right, and what recordings cannot identify."""

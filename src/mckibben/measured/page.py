@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from mckibben.comparison.columns import columns_of_board
-from mckibben.comparison.results import Leaderboard
-from mckibben.comparison.row import Row
+from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.measured.running import Outcome
 from mckibben.numerals import numeral
+from mckibben.report import words
+from mckibben.report.columns import columns_of_board
 
 SHOWN = 8
 """Models of a section, and the chosen one; the rest are in the file beside."""
@@ -97,7 +97,7 @@ def _choice(one: Outcome) -> str:
     best, lowest = board.best, board.lowest
     seconds = f"{one.seconds:.0f} s"
     if best is None or lowest is None:
-        why = _inline(board.not_recommended or one.failed)
+        why = _inline(words.chosen(board) or one.failed)
         return f"| {_inline(one.label)} | none: {why} | | | | | {seconds} |"
     above = "–" if lowest.model == best.model else f"{PER_CENT * (one.regret or 0.0):.0f} %"
     return (
@@ -164,7 +164,7 @@ def _section(one: Outcome) -> Iterator[str]:
         yield from (f"Not compared: {one.reason or 'no model has a place on these channels.'}", "")
         return
     columns = [c for c in columns_of_board(board) if c.key in KEYS]
-    yield f"Split: {board.split}. {board.chosen}"
+    yield f"Split: {board.split}. {words.chosen(board)}"
     yield ""
     yield "| model | " + " | ".join(column.label for column in columns) + " |"
     yield "|---|" + "---:|" * len(columns)
@@ -181,7 +181,7 @@ def _section(one: Outcome) -> Iterator[str]:
         yield f"| {_inline(figure.what)} (printed) | " + " | ".join(cells) + " |"
     yield ""
     failed = [f"failed: `{row.model}`: {row.reason}" for row in board.rows if row.reason]
-    notes = [*_mended(one.notes), *board.of_models, *failed]
+    notes = [*_mended(one.notes), *words.comparison(board), *failed]
     yield from (f"- {note}" for note in notes)
     if notes:
         yield ""

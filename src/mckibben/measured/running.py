@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mckibben.comparison.kept import Kept
-from mckibben.comparison.ranking import compare
-from mckibben.comparison.results import Leaderboard
-from mckibben.comparison.standing import Standing
+from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.comparison.leaderboard import Leaderboard
+from mckibben.comparison.ranking import Standing, compare
 from mckibben.errors import DataError, MckibbenError
 from mckibben.measured.sets import Set, parted
 from mckibben.measured.splits import Task
@@ -136,7 +135,7 @@ def outcomes(
                 n_folds=task.folds,
                 seed=seed,
                 jobs=jobs,
-                folder=Kept(folder).inside(f"{one.name}-{place}"),
+                folder=Checkpoints(folder).inside(f"{one.name}-{place}"),
                 clear=False,
                 progress=progress,
             )

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mckibben.blocks.base import Block
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.errors import MckibbenError
 from mckibben.estimators.optimisers.tracker import whole_searches
 from mckibben.files import read, write
@@ -44,13 +44,17 @@ class Fitted:
 
 
 def fitted(
-    kept: Kept, name: str, estimator: Any, recordings: Recording | Sequence[Recording], **how: Any
+    kept: Checkpoints,
+    name: str,
+    estimator: Any,
+    recordings: Recording | Sequence[Recording],
+    **how: Any,
 ) -> Fitted:
     """Return what an estimator finds on recordings, or found before the work was stopped.
 
     Parameters
     ----------
-    kept : Kept
+    kept : Checkpoints
         Where fits are kept.
     name : str
         Of the model.
@@ -79,7 +83,7 @@ def fitted(
 
 
 def recorded(
-    kept: Kept,
+    kept: Checkpoints,
     what: Protocol | str,
     runs: Sequence[str],
     seed: int,

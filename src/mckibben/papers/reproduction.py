@@ -12,7 +12,7 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.system.progress import telling
 from mckibben.system.threads import one_blas_thread
 
@@ -189,7 +189,7 @@ def reproduce(
         is called again goes on from there.
     clear : bool
         Whether to forget what was kept when all is done; else the caller does, once it has written
-        what is returned, by ``Kept(folder).clear()``.
+        what is returned, by ``Checkpoints(folder).clear()``.
     progress : bool or callable, optional
         Whether to show a bar; or who is told the share of the work done, and what is next.
     **own
@@ -201,7 +201,7 @@ def reproduce(
         If there is no paper of that name; the text lists those there are.
     """
     run = registry.load("papers", name)
-    kept = Kept(folder, name, quick, seed)
+    kept = Checkpoints(folder, name, quick, seed)
     with one_blas_thread(), telling(progress, name) as tell:
         found: Reproduction = run(
             quick=quick,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mckibben.diagnosis.check import Validation
 from mckibben.report.wording import number, of_test_range, percent
-from mckibben.report.words import check_sentences, check_verdict
+from mckibben.report.words import check_sentences, check_verdict, gap_run, gap_sentence
 
 if TYPE_CHECKING:
     from mckibben.studying.study import Study
@@ -69,11 +69,11 @@ def how_far(study: Study) -> list[str]:
 
 def record_next(study: Study) -> list[str]:
     """Return which runs would tell most of what is not known yet."""
-    gaps = [f"{gap.sentence} {gap.remedy}" for gap in study.untold[:MOST]]
+    gaps = [f"{gap_sentence(gap)} {gap_run(gap)}" for gap in study.untold[:MOST]]
     if not gaps:
-        gaps = ["Nothing that these recordings could tell of a muscle is missing from them."]
+        gaps = ["No data gaps were found."]
     if study.leaderboard.best is not None:
-        gaps.append("mckibben plan finds the motion that tells most; its command is at the end.")
+        gaps.append("mckibben plan writes that motion; its command is at the end.")
     return gaps
 
 

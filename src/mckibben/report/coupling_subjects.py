@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.comparison.channels import Channels
-from mckibben.comparison.recognising import any_moves, moved_by
+from mckibben.comparison.channels import Channels, any_moves, moved_by
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 from mckibben.report.drawing import (

@@ -26,7 +26,7 @@ from mckibben.report.drawing import (
 )
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard
+    from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.control import Tracked
     from mckibben.studying.inverting import InverseCheck
 

@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mckibben.comparison.channels import held_at_levels
-from mckibben.comparison.recognising import any_moves
+from mckibben.comparison.channels import any_moves, held_at_levels
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
     check_subjects,
@@ -27,8 +26,7 @@ from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard
-    from mckibben.comparison.row import Row
+    from mckibben.comparison.leaderboard import Leaderboard, Row
     from mckibben.diagnosis.check import OutputCheck
     from mckibben.recording import Recording
     from mckibben.studying.study import Study
@@ -71,9 +69,7 @@ def write_report(study: Study, path: str | Path) -> None:
 
 def page(study: Study, typed: Typed | None = None) -> str:
     """Return the report of a study as HTML, with how it was asked for on the command line, if it was."""
-    from mckibben.comparison.columns import columns_of_board
-    from mckibben.comparison.free_run import STARTED
-    from mckibben.comparison.results import CHOICES, NOT_TOLD
+    from mckibben.report.columns import columns_of_board
 
     every = shown(study)
     pictured = drawn(every)
@@ -95,14 +91,11 @@ def page(study: Study, typed: Typed | None = None) -> str:
         left_out=left_out,
         models=_models(study.leaderboard),
         explained=_explained(study.leaderboard),
-        failures=study.leaderboard.failures,
         coupling=coupled,
         coupling_of=fullest.name,
         bars=_bars(study.leaderboard),
         columns=columns_of_board(study.leaderboard),
-        choices=CHOICES,
-        not_told=NOT_TOLD,
-        started=STARTED,
+        words=words,
         reading=notes_by_file(measured),
         notes=[note for note in study.notes if note not in reading_notes(measured)],
         wording=wording,
@@ -110,7 +103,6 @@ def page(study: Study, typed: Typed | None = None) -> str:
         commands=commands(study, typed),
         answers=answers(study),
         checked=checked(study),
-        words=words,
         description=study.description,
         review=study.review,
     )

@@ -16,7 +16,7 @@ from mckibben.system.atomic import to_json
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from mckibben.comparison.results import Leaderboard
+    from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.studying.study import Study
 
 PAGE_SHARE = 0.1

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.comparison.recommending import acceptable
-from mckibben.comparison.results import NOT_TOLD
+from mckibben.comparison.choosing import acceptable
 from mckibben.metrics import Scores
 from mckibben.numerals import numeral, typeset
+from mckibben.report import words
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard
-    from mckibben.comparison.row import Row
+    from mckibben.comparison.leaderboard import Leaderboard, Row
     from mckibben.recording import Recording
     from mckibben.studying.inverting import InverseCheck
     from mckibben.studying.study import Study
@@ -73,7 +72,7 @@ def verdict(study: Study) -> list[str]:
         if board.not_recommended:
             n_ok = sum(row.reason is None for row in board.rows)
             return [
-                f"Models that worked{' so far' if board.pending else ''}: {n_ok}. {board.chosen}"
+                f"Models that worked{' so far' if board.pending else ''}: {n_ok}. {words.chosen(board)}"
             ]
         if board.pending:
             return ["No model is fitted yet."]
@@ -85,13 +84,13 @@ def verdict(study: Study) -> list[str]:
         between = f" (95 % interval {number(low)} to {number(high)} {board.unit})"
     so_far = " so far" if board.pending else ""
     sentences = [
-        f"Models that worked{so_far}: {n_ok}. {board.chosen}",
+        f"Models that worked{so_far}: {n_ok}. {words.chosen(board)}",
         f"Free-running on the test data{_untouched(board)}, {best.model} is "
         f"off by {number(best.test.rmse)} {board.unit} RMSE{between}{of_test_range(best.test)}; "
         f"at worst by {number(best.test.max_error)} {board.unit}.",
     ]
     if board.level:
-        sentences.append(f"{NOT_TOLD[0].upper()}{NOT_TOLD[1:]}: {_listed(board.level)}.")
+        sentences.append(f"{_listed(board.level)}: {words.LEVEL}.")
     if best.caution is not None:
         sentences.append(
             f"{best.model} is good only near the motions it was fitted to: {best.caution}."
@@ -106,11 +105,6 @@ def _untouched(board: Leaderboard) -> str:
 def cautions(board: Leaderboard) -> dict[str, str]:
     """Return the models of a leaderboard that are good only near what they were fitted to, and why."""
     return {row.model: row.caution for row in board.rows if row.reason is None and row.caution}
-
-
-def not_validated(board: Leaderboard) -> dict[str, str]:
-    """Return the models that cannot be chosen since their cross-validation failed, and why it did."""
-    return {row.model: row.invalid for row in board.rows if row.reason is None and row.invalid}
 
 
 def _invertibility(study: Study, best: Row) -> str:
@@ -161,11 +155,6 @@ def next_steps(study: Study) -> list[str]:
         return [
             f"Load this page again while models are fitted: {done} of {done + left} are done, "
             f"{_listed(pending)} to come. If the work was stopped, the same command goes on."
-        ]
-    if study.leaderboard.not_recommended and study.leaderboard.apart:
-        return [
-            f"{study.leaderboard.apart}. Mend that first, and fit again: --zero {study.output} gives "
-            "one zero, a channel force says what load hung there, other muscles are studied apart."
         ]
     if study.leaderboard.not_recommended:
         if others := _better_on_the_test(study.leaderboard):

@@ -11,8 +11,8 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.force.feedforward import compensator
-from mckibben.comparison.recommending import acceptable
-from mckibben.comparison.results import Leaderboard
+from mckibben.comparison.choosing import acceptable
+from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.control.uncompensated import RISE, curve
 from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.recording import Recording

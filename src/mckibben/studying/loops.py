@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from mckibben.comparison.results import Leaderboard
+from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.control import UNCOMPENSATED, Tracked, before, control_law, track, tune_pid
 from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import Recording

@@ -11,18 +11,16 @@ from typing import Any, ClassVar
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.characterization import Characterization, characterize
-from mckibben.comparison.channels import Names
+from mckibben.comparison.channels import Names, moved_by
+from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import Settings, plan_of
-from mckibben.comparison.ranking import ranked
-from mckibben.comparison.recognising import moved_by
-from mckibben.comparison.results import Leaderboard
-from mckibben.comparison.standing import Standing
+from mckibben.comparison.ranking import Standing, ranked
 from mckibben.control import Tracked
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.check import Validation
+from mckibben.diagnosis.data_gaps import Gap, data_gaps
 from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.errors import DataError
-from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording, listed
 from mckibben.rigs import load_rig
 from mckibben.studying.checking import check_on_test
@@ -60,7 +58,7 @@ class Study(DrawsItself):
     notes : tuple of str
         What was assumed or mended on the way.
     untold : tuple of Gap
-        What the recordings cannot tell, most important first.
+        Data gaps: what the recordings cannot identify, most important first.
     check : Validation, str or None
         What the chosen model misses on the test, or why that cannot be told; None without a choice.
     description : ModelDescription or None
@@ -222,7 +220,7 @@ def study(
         inverse=None,
         load=next(iter(channels.scheduling or ()), None),
         notes=(*notes, *plan.notes),
-        untold=untold(recordings, looped, channels.outputs, tests=tests),
+        untold=data_gaps(recordings, looped, channels.outputs, tests=tests),
         review=reviewed,
     )
     if found is not None:
@@ -246,7 +244,6 @@ def study(
         on_test = so_far.predictions[board.best.model][len(split.train) :]
         so_far = replace(
             so_far,
-            untold=untold(recordings, looped, names, block, tests=tests),
             check=check_on_test(block, split, on_test, names),
             description=describe(block, split.train, fitted=True),
         )

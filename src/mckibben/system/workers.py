@@ -1,7 +1,7 @@
 """Processes that work for this one: quick to start, told apart, and ended at once.
 
 joblib's cannot be stopped within a second, do not tell how far they are, and load the library each for
-themselves; it serves clusters (`mckibben.comparison.cluster`). These are forked, where the system can,
+themselves; it serves clusters (`mckibben.comparison.backends`). These are forked, where the system can,
 from a server that has loaded the library. They never run the user's script again, do not hear Ctrl-C,
 and end with the process that they work for, however that one ends.
 """

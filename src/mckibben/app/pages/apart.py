@@ -13,7 +13,6 @@ from mckibben.app.fields import READING
 from mckibben.app.kept import Step
 from mckibben.app.pages import loads
 from mckibben.app.together import differing, sample_times
-from mckibben.comparison.belonging import alike, travels, unlike
 from mckibben.estimators.coupled.base import schedules
 from mckibben.files.notices import listed
 from mckibben.signals.zeroing import apart as zeros_apart
@@ -26,7 +25,6 @@ def build(desk: Desk) -> None:
     """Show what differs, where something does."""
     loads.build(desk)
     hindering(desk)
-    _unlike(desk)
     _zeros(desk)
 
 
@@ -100,34 +98,6 @@ def _sample_times(desk: Desk) -> None:
             f"Resample all to {wanted:g} s", on_click=guarded(partial(_resample, desk, wanted))
         )
         named(button.props("outline dense no-caps"), "resample-all")
-
-
-def _unlike(desk: Desk) -> None:
-    """Show where recordings are of another muscle than others, or of another sign."""
-    used = list(desk.workspace.used().values())
-    inputs, outputs = desk.inputs, desk.outputs
-    if len(outputs) > 1 or not all(name in one for one in used for name in (*inputs, *outputs)):
-        return
-    told = schedules(used, (*inputs, *outputs))
-    names = (*inputs, *told)
-    said = list(unlike(used, names, outputs[0], told))
-    if not said:
-        return
-    with named(ui.card().classes("w-full border border-warning gap-1"), "unlike"):
-        ui.label("These recordings do not go together").classes("font-medium")
-        for one in said:
-            ui.label(f"{one[0].upper()}{one[1:]}.").classes("text-sm break-words")
-        for part in _parts(desk, names, outputs[0]):
-            _aside(desk, part, listed(part, SHOWN))
-
-
-def _parts(desk: Desk, names: tuple[str, ...], wanted: str) -> list[list[str]]:
-    """Return the recordings of which some are unlike others, in parts, by their names here."""
-    used = desk.workspace.used()
-    called = [run.with_meta(name=name) for name, run in used.items()]
-    found = [travels(some, given, wanted) for given, some in alike(called, names, wanted)]
-    apart = [one for one in found if one is not None and (one.turned or one.differs)]
-    return [[name for name, _ in part] for one in apart for part in one.parts]
 
 
 def _aside(desk: Desk, names: list[str], said: str) -> None:

@@ -19,7 +19,7 @@ from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.app.recorded import at_rest, held_for, pace, reached
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.inverse import COMMANDS
-from mckibben.comparison.recognising import FORCE
+from mckibben.comparison.channels import FORCE
 from mckibben.errors import MckibbenError
 from mckibben.files import read
 from mckibben.recording import Recording

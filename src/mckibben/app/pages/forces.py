@@ -12,7 +12,7 @@ from mckibben.app.desk import Desk, caution, guarded, named
 from mckibben.app.kept import Estimated
 from mckibben.app.pages.kept_curves import drawn, showing
 from mckibben.app.pages.taking_code import hand_over
-from mckibben.comparison.recognising import FORCE
+from mckibben.comparison.channels import FORCE
 from mckibben.comparison.splits import tested_from
 from mckibben.errors import DataError, MckibbenError
 from mckibben.report import wording

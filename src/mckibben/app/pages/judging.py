@@ -6,21 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from mckibben.app.desk import against, not_recommended
-from mckibben.comparison.recommending import USEFUL
-from mckibben.comparison.results import CHOICES
+from mckibben.comparison.choosing import USEFUL
 from mckibben.report import wording
+from mckibben.report.words import CHOICES
 
 RUNS = 2.0
 """The same beyond which an absurd error is the model's own doing."""
-
-HARDLY = 0.5
-"""Share of the constant's error above which a model tells little."""
-
-UNLIKE = (
-    "on the test off by more than half as much as the constant, or more than it, unlike in validation: "
-    "the test moves otherwise than what was trained on. Train on a recording like it, too, or take "
-    "another model."
-)
 
 
 def judged(results: Sequence[dict[str, Any]]) -> list[str]:
@@ -37,10 +28,6 @@ def judged(results: Sequence[dict[str, Any]]) -> list[str]:
                 f"constant{of_other_data(result)}, the mean of the training output: {heading} "
                 f"{validated}, test RMSE {tested}. Every model has to beat it."
             )
-        if _unlike(result):
-            doubted.setdefault(UNLIKE, []).append(f"{result['name']}{of_other_data(result)}")
-        if start := (result.get("start") or {}).get("said"):
-            doubted.setdefault(f"{start}.", []).append(f"{result['name']}{of_other_data(result)}")
         for why in result.get("shared", ()):
             doubted.setdefault(why, []).append(f"{result['name']}{of_other_data(result)}")
     if why_none := not_recommended(results):
@@ -73,16 +60,6 @@ def unvalidated(results: Sequence[dict[str, Any]]) -> str:
 
 def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
-
-
-def _unlike(result: dict[str, Any]) -> bool:
-    """Tell whether a model tells little on the test, unlike in validation."""
-    constant = result.get("constant") or {}
-    tested, least = ((one.get("test") or {}).get("rmse") for one in (result, constant))
-    validated, limit = (one.get("validation_rmse") for one in (result, constant))
-    if tested is None or least is None or validated is None or limit is None:
-        return False
-    return bool(tested > HARDLY * least and validated <= HARDLY * limit)
 
 
 def drawn_first(results: Sequence[dict[str, Any]]) -> str:

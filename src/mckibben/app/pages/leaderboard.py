@@ -31,17 +31,17 @@ from mckibben.app.pages.judging import (
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.equations import quantities
-from mckibben.comparison.columns import Column, columns_of
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.offered import caution as model_caution
 from mckibben.comparison.offered import full_name
-from mckibben.comparison.results import CHOICES
 from mckibben.comparison.splits import Mask, Split, tested_from
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.numerals import numeral, typeset
 from mckibben.recording import Recording
 from mckibben.report import subjects, wording
+from mckibben.report.columns import Column, columns_of
 from mckibben.report.drawing import series_colour
+from mckibben.report.words import CHOICES
 
 PARAMETERS = 12
 """Of a page of the table of parameters."""
@@ -175,7 +175,7 @@ def doubts(desk: Desk, *, all_refused: bool = True) -> None:
     def shown() -> None:
         _of_other_data(desk.results())
         if all_refused and (why := desk.not_recommended):
-            named(caution(fields.said(f"{why}.")), "not-recommended")
+            named(caution(fields.said(why)), "not-recommended")
 
     for topic in ("results", "channels", "recordings"):
         desk.when(topic, shown.refresh)

@@ -14,7 +14,7 @@ from mckibben.app.desk import Desk, guarded, named
 from mckibben.app.kept import Reading
 from mckibben.app.loads import Load, loads_in
 from mckibben.app.workspace import Workspace
-from mckibben.comparison.recognising import FORCE
+from mckibben.comparison.channels import FORCE
 from mckibben.files.notices import listed
 
 SHOWN = 12

@@ -14,7 +14,7 @@ from mckibben.app.drawn import picture
 from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
 from mckibben.app.together import obstacle
-from mckibben.comparison.recognising import any_moves
+from mckibben.comparison.channels import any_moves
 from mckibben.errors import MckibbenError
 from mckibben.numerals import typeset_within
 from mckibben.recording import Recording
@@ -49,7 +49,7 @@ def build(desk: Desk) -> None:
             with ui.column().classes("min-w-72 flex-[2]"):
                 for given, wanted in pairs:
                     _words(desk, given, wanted)
-                _untold(desk, pairs[0][0])
+                _gaps(desk, pairs[0][0])
 
     desk.when("recordings", shown.refresh)
     desk.when("channels", shown.refresh)
@@ -277,13 +277,14 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
     ui.timer(0.05, guarded(find, "Looking what the muscle does"), once=True)
 
 
-def _untold(desk: Desk, given: str) -> None:
-    from mckibben.excitation import untold
+def _gaps(desk: Desk, given: str) -> None:
+    from mckibben.diagnosis.data_gaps import data_gaps
+    from mckibben.report.words import gap_run, gap_sentence
 
     tested = any(entry.role == "test" for entry in desk.workspace.entries())
     which = "the recordings to train on" if tested else "these recordings"
-    ui.label(f"What {which} cannot tell").classes("text-lg")
-    place = named(ui.column().classes("w-full"), "untold")
+    ui.label(f"Data gaps of {which}").classes("text-lg")
+    place = named(ui.column().classes("w-full"), "data-gaps")
     inputs = (
         desk.sides.inputs if len(desk.sides.inputs) > 1 else (given,)
     )  # each moves every output
@@ -293,7 +294,7 @@ def _untold(desk: Desk, given: str) -> None:
         outputs = desk.outputs
         try:
             gaps = await asyncio.to_thread(
-                untold, train or test, inputs, outputs, tests=test if train else ()
+                data_gaps, train or test, inputs, outputs, tests=test if train else ()
             )
         except MckibbenError as error:
             if not place.is_deleted:
@@ -304,13 +305,13 @@ def _untold(desk: Desk, given: str) -> None:
             return
         with place:
             if not gaps:
-                ui.label("Nothing that a model would need.")
+                ui.label("None.")
             for gap in gaps:
-                ui.label(typeset_within(gap.sentence))
-                ui.label(typeset_within(said(gap.remedy))).classes("text-caption pl-4")
+                ui.label(typeset_within(gap_sentence(gap)))
+                ui.label(typeset_within(gap_run(gap))).classes("text-caption pl-4")
             desk.did(
-                "asked what the recordings cannot tell",
-                f"mckibben.untold(train, {inputs!r}, {outputs!r}, tests=test)",
+                "looked for data gaps",
+                f"mckibben.data_gaps(train, {inputs!r}, {outputs!r}, tests=test)",
             )
 
-    ui.timer(0.05, guarded(find, "Looking what cannot be told"), once=True)
+    ui.timer(0.05, guarded(find, "Looking for data gaps"), once=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.force.activation import ActivationMemory, ActivationPressure
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.estimators.force.activation import (
     ActivationMemoryEstimator,
     ActivationPressureEstimator,
@@ -69,7 +69,7 @@ class Score(NamedTuple):
 
 
 def activation_pressure(
-    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kept
+    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Checkpoints
 ) -> Reproduction:
     """Run slow cycles, sines and random waves at every force, and identify both models."""
     del jobs

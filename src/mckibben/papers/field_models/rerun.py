@@ -12,11 +12,9 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.hysteresis.pi import PI
-from mckibben.comparison.columns import columns_of_board
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
+from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.ranking import compare
-from mckibben.comparison.results import CHOICES, Leaderboard
-from mckibben.comparison.row import Row
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.metrics import score
 from mckibben.papers.field_models.affine_match import affine_match
@@ -56,9 +54,6 @@ SEEDS, QUICK_SEEDS = 10, 3
 QUICK = ("balance", "bj", "cpi", "duhem", "gpi", "mpi", "oe", "p2uz", "pi", "preisach")
 """Models of the quick run."""
 
-REPORTED = ("chosen", "train", "test", "r2", "gap", "hold", "parameters")
-"""Columns of the field's leaderboard."""
-
 N_FOLDS = 4
 """Of the cross-validation that chooses a model of the field; the quick run has none."""
 
@@ -69,7 +64,7 @@ def field_models(
     seed: int,
     jobs: int | None,
     tell: Progress,
-    kept: Kept,
+    kept: Checkpoints,
     train: Recording | None = None,
     test: Recording | None = None,
 ) -> Reproduction:
@@ -122,7 +117,7 @@ def field_models(
 
 
 def _as_published(
-    train: Recording, test: Recording, seeds: range, tell: Progress, kept: Kept
+    train: Recording, test: Recording, seeds: range, tell: Progress, kept: Checkpoints
 ) -> dict[str, Tried]:
     methods = {seed: published(seed) for seed in seeds}
     names = list(published(0))
@@ -163,7 +158,7 @@ def _errors(model: Block, train: Recording, test: Recording) -> Errors:
 def _shown(board: Leaderboard) -> dict[str, Row]:
     """Return the models of the field that the summary names, by how they were chosen."""
     named = {
-        f"Chosen from the field by {CHOICES[board.chosen_by][1]}": board.best,
+        f"Chosen from the field by {board.chosen_by}": board.best,
         "Lowest test error in the field, known only from the test itself": board.lowest,
     }
     return {how: row for how, row in named.items() if row is not None and row.sound}
@@ -185,7 +180,7 @@ def _summary(tried: Mapping[str, Tried], board: Leaderboard, n_seeds: int) -> tu
         times = "" if name is None else f", {row.test.rmse / worked[name]:.2f} times {name}'s"
         sentences.append(f"{how}: {row.model}, {row.test.rmse:.3f} mm on the test{times}.")
     if board.not_recommended:
-        sentences.append(f"{board.not_recommended}.")
+        sentences.append(f"None of the field beats the mean in {board.not_recommended}.")
     failed = [f"{name} failed in {one.reason}" for name, one in tried.items() if one.failures]
     return (*sentences, *failed)
 
@@ -262,14 +257,25 @@ def _weights(tried: Mapping[str, Tried]) -> Table:
 
 
 def _leaderboard(board: Leaderboard) -> Table:
-    columns = [column for column in columns_of_board(board) if column.key in REPORTED]
+    validated = [("CV RMSE [mm]", "validation_rmse")] if board.chosen_by != "fit" else []
+    columns = [
+        *validated,
+        ("test RMSE [mm]", "test.rmse"),
+        ("fit RMSE [mm]", "train.rmse"),
+        ("R² [%]", "test.r2"),
+        ("gap kept [%]", "memory.gap_ratio"),
+        ("kept in a hold [%]", "memory.hold_ratio"),
+        ("parameters", "n_parameters"),
+    ]
+    table = board.to_frame().set_index("model").reindex(columns=[key for _, key in columns])
+    table *= [100.0 if heading.endswith("[%]") else 1.0 for heading, _ in columns]
+    values = table.astype(object).where(table.notna(), None)
     rows: list[tuple[Cell, ...]] = []
     for row in sorted(board.rows, key=lambda row: row.test_error):
-        given = row.to_dict()
-        rows.append((row.model, *(column.value(given) for column in columns), row.reason))
+        rows.append((row.model, *values.loc[row.model], row.reason))
     return Table(
         "The whole field on the same data, lowest test error first",
-        ("model", *(column.label for column in columns), "failed because"),
+        ("model", *(heading for heading, _ in columns), "failed because"),
         tuple(rows),
         "Free-running, plain; cross-validated within the calibration run (not in the quick run). Gap "
         "kept: the model's gaps between branches over the recorded ones (100 % is perfect); kept in a "

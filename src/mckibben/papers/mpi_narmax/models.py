@@ -9,7 +9,7 @@ from typing import Any
 
 from mckibben import registry
 from mckibben.blocks.base import Block
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.errors import ModelWarning
 from mckibben.papers.keeping import fitted
 from mckibben.papers.mpi_narmax.protocol import HELD
@@ -62,7 +62,7 @@ TOLD = {
 
 
 def fit_models(
-    recordings: Mapping[str, Recording], quick: bool, seed: int, tell: Progress, kept: Kept
+    recordings: Mapping[str, Recording], quick: bool, seed: int, tell: Progress, kept: Checkpoints
 ) -> tuple[dict[str, Block], list[tuple[Cell, ...]]]:
     """Return the models by name, and what each learned from, its time and its parameters."""
     models: dict[str, Block] = {}

@@ -13,7 +13,7 @@ import numpy as np
 from mckibben import registry
 from mckibben.blocks.base import Block
 from mckibben.blocks.coupled.load_estimate import load_of
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.control import (
     BlockController,
     EstimatedLoad,
@@ -68,7 +68,7 @@ LEVEL = 0.95
 
 
 def mpi_narmax(
-    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kept
+    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Checkpoints
 ) -> Reproduction:
     """Run statuses, pulls, random and held-voltage runs, and identify models with and without force."""
     del jobs

@@ -12,7 +12,7 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.force.multistate_friction import SIZES as SIZES_OF
 from mckibben.blocks.force.multistate_friction import MultistateFriction
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.estimators.force.multistate import (
     MultistateEstimator,
     Structure,
@@ -94,7 +94,7 @@ class Model:
 
 
 def fit_models(
-    kept: Kept, loop: Recording, whole: Recording, seed: int, *, quick: bool
+    kept: Checkpoints, loop: Recording, whole: Recording, seed: int, *, quick: bool
 ) -> dict[str, Model]:
     """Fit everything twice: on the closed loop, and on the run from rest on."""
     found = {}
@@ -120,7 +120,7 @@ def fit_models(
 
 
 def other_ends(
-    kept: Kept, name: str, loop: Recording, seed: int, *, quick: bool
+    kept: Checkpoints, name: str, loop: Recording, seed: int, *, quick: bool
 ) -> list[MultistateFriction]:
     """Return what other searches end in: the cost has several minima that are about as good."""
     structure = next(key for key, told in NAMES.items() if told == name)

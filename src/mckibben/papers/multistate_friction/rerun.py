@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from mckibben import registry
 from mckibben.blocks.force.laws import ForceLaw
 from mckibben.blocks.force.multistate_friction import MultistateFriction
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.estimators.force.multistate import (
     extract_hysteresis,
 )
@@ -65,7 +65,7 @@ SOURCE = Source(
 
 
 def multistate_friction(
-    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kept
+    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Checkpoints
 ) -> Reproduction:
     """Run the isometric and isobaric protocol, and identify force laws and friction."""
     del jobs

@@ -12,7 +12,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.feedback import PIDFeedback
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.control import Controller, Tracked, control_law, track, tune_pid
 from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.fuzzy import Consequents, Search, fit_network, printed_swarm
@@ -153,7 +153,12 @@ class Loops:
 
 
 def run_loops(
-    models: Models, train: list[Recording], quick: bool, seed: int, jobs: int | None, kept: Kept
+    models: Models,
+    train: list[Recording],
+    quick: bool,
+    seed: int,
+    jobs: int | None,
+    kept: Checkpoints,
 ) -> tuple[Loops, Table | None]:
     """Return what came of all loops, and of those beyond the paper where they are run."""
     step = QUICK_CONTROL_TIME if quick else CONTROL_TIME
@@ -178,7 +183,7 @@ def _laws(compensator: Block, pid: PIDFeedback) -> dict[str, Block | Controller]
 
 
 def compensators(
-    models: Models, train: list[Recording], quick: bool, seed: int, kept: Kept
+    models: Models, train: list[Recording], quick: bool, seed: int, kept: Checkpoints
 ) -> dict[str, Block]:
     """Return all inverses, the paper's with its network trained from displacements to couplings."""
     published, individual = models[PUBLISHED], models[INDIVIDUAL]

@@ -14,7 +14,7 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.papers.keeping import fitted
 from mckibben.papers.reproduction import Progress
 from mckibben.papers.sdchm.recordings import OUTPUTS, Recordings
@@ -57,7 +57,9 @@ class Models:
         return name in self.blocks
 
 
-def fit_models(runs: Recordings, quick: bool, seed: int, tell: Progress, kept: Kept) -> Models:
+def fit_models(
+    runs: Recordings, quick: bool, seed: int, tell: Progress, kept: Checkpoints
+) -> Models:
     """Fit all models; validation patterns stop the search for antecedents of ours."""
     search: dict[str, Any] = QUICK_SEARCH if quick else {}
     swarm: dict[str, Any] = search | QUICK_SWARM if quick else {}

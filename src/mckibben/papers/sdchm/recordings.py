@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.papers.keeping import recorded
 from mckibben.papers.reproduction import Progress
 from mckibben.papers.sdchm.protocol import PERIOD
@@ -61,7 +61,7 @@ def plan(quick: bool) -> tuple[Protocol, list[str]]:
     return short, [run.name for run in short.runs if _quick(run)]
 
 
-def record_arm(quick: bool, seed: int, tell: Progress, kept: Kept) -> Recordings:
+def record_arm(quick: bool, seed: int, tell: Progress, kept: Checkpoints) -> Recordings:
     """Record the protocol on the arm."""
     what, names = plan(quick)
     return Recordings(

@@ -6,7 +6,7 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator".
 
 from __future__ import annotations
 
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.checkpoints import Checkpoints
 from mckibben.papers.reproduction import Progress, Reproduction, Source, Table
 from mckibben.papers.sdchm import printed
 from mckibben.papers.sdchm.compensation import run_loops
@@ -53,7 +53,9 @@ QUICK_NOTE = (
 )
 
 
-def sdchm(*, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kept) -> Reproduction:
+def sdchm(
+    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Checkpoints
+) -> Reproduction:
     """Run the arm's protocol, identify the coupled models, and track with their inverses."""
 
     def within(low: float, high: float) -> Progress:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mckibben.comparison.results import CHOICES, Leaderboard
-from mckibben.comparison.row import Row
+from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.errors import ModelError
 from mckibben.numerals import numeral
-from mckibben.report import figures, model_subjects
+from mckibben.report import figures, model_subjects, words
 from mckibben.report.drawing import Drawing
 from mckibben.report.notebook.card import Card
 from mckibben.report.notebook.face import Draw, Face
@@ -28,16 +27,16 @@ class LeaderboardFace(Face):
     def card(self) -> Card:
         """Return models in the order of the choice, with the test beside."""
         board = self.board
-        heading, _ = CHOICES[board.chosen_by]
+        heading, _ = words.CHOICES[board.chosen_by]
         unit = f" [{board.unit}]" if board.unit else ""
         ranked = [row for row in board.ranking if row.reason is None]
         failed = [row.model for row in board.rows if row.reason is not None]
         chosen = next((k for k, row in enumerate(ranked) if row is board.best), None)
-        notes = [f"Split: {board.split}.", *([board.chosen] if board.chosen else [])]
+        notes = [f"Split: {board.split}.", *filter(None, [words.chosen(board)])]
         notes += [f"Failed: {', '.join(failed)}."] if failed else []
         notes += [f"Pending: {', '.join(board.pending)}."] if board.pending else []
         if any(row.caution for row in board.rows if row.reason is None):
-            notes.append("* good only near the motions fitted")
+            notes.append(f"* {words.CAREFUL}")
         return Card(
             f"Leaderboard, {board.input} to {board.output}",
             headings=("rank", "model", f"{heading}{unit}", f"test RMSE{unit}", "inverse"),

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import Recording
-from mckibben.comparison.channels import Channels, channels_of, where_held
-from mckibben.comparison.recognising import recognised, varies
+from mckibben.comparison.channels import Channels, channels_of, recognised, varies
 
 T = np.linspace(0.0, 9.0, 50)
 
@@ -92,11 +91,11 @@ def test_every_output_has_an_input_of_its_own(inputs: str, outputs: str, own: st
 def test_a_comparison_of_held_lengths_is_of_force() -> None:
     names = ("pressure", "displacement", "force")
     held = [run(*names, held=("displacement",)) for _ in range(2)]
-    found = channels_of(held, None, None, None)
-    assert where_held(held, found) == Channels(("displacement",), ("force",))
-    assert where_held([*held, run(*names)], found) == found
-    slack = [run(*names, held=("displacement", "force"))]
-    assert where_held(slack, found) == found
+    found = Channels(("pressure",), ("displacement",))
+    assert channels_of(held) == Channels(("displacement",), ("force",))
+    assert channels_of(held, "pressure") == found
+    assert channels_of([*held, run(*names)]) == found
+    assert channels_of([run(*names, held=("displacement", "force"))]) == found
 
 
 @pytest.mark.parametrize(

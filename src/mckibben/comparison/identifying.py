@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -11,17 +11,17 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.splits import folds, given_split
-from mckibben.comparison.trying import (
+from mckibben.comparison.fitting import (
     Data,
+    FitResult,
     Item,
-    Part,
-    Tried,
+    Task,
     effort_of,
-    outcomes,
     processes_for,
-    rms_of,
+    results,
+    validated,
 )
+from mckibben.comparison.splits import folds, given_split
 from mckibben.errors import ModelError
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.recording import Recording, listed
@@ -30,7 +30,7 @@ from mckibben.system.workers import checked
 
 
 @dataclass(frozen=True)
-class Choice:
+class Identified:
     """What `identify` found.
 
     Parameters
@@ -57,7 +57,7 @@ def identify(
     jobs: int | None = None,
     progress: bool | Tell | None = None,
     **settings: Any,
-) -> Choice:
+) -> Identified:
     """Identify a family of models, its orders chosen by cross-validated free-run error.
 
     Parameters
@@ -79,7 +79,7 @@ def identify(
 
     Returns
     -------
-    Choice
+    Identified
 
     Raises
     ------
@@ -90,60 +90,40 @@ def identify(
     estimator_class = registry.load("estimators", family)
     grid = orders or estimator_class.param_grid
     if not grid:
-        own = _own_order(estimator_class)
-        instance = f", for instance of {own!r}" if own else ""
         raise ModelError(
-            f"there are no usual orders of {family!r}. Remedy: give orders, a setting with the values "
-            f"to try{instance}."
+            f"there are no usual orders of {family!r}. Remedy: give orders, settings with the values "
+            "to try."
         )
     runs = listed(recordings)
     channels = _channels(estimator_class(**settings), runs)
     parts = tuple(folds(runs, channels.inputs[0], max(n_folds, 2)))
     data = Data(given_split(runs, ()), parts, channels)
-    combinations = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
+    orders_tried = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     every = tuple(range(len(parts)))
-    work = [
-        Part(family, Item(family, settings | chosen), every, whole=False) for chosen in combinations
-    ]
-    n = checked(jobs) or processes_for(effort_of(family, data) * len(parts) * len(work))
-    found: dict[int, Tried] = {}
+    tasks = [Task(family, Item(family, settings | one), every, whole=False) for one in orders_tried]
+    n = checked(jobs) or processes_for(effort_of(family, data) * len(parts) * len(tasks))
+    found: dict[int, FitResult] = {}
     with telling(progress, f"identifying {family}") as tell:
-        for outcome in outcomes(data, work, n):
+        for outcome in results(data, tasks, n):
             found[outcome.index] = outcome.result()
             if tell is not None:
-                tell(len(found) / len(work), f"{len(found)} of {len(work)} orders")
-    tried = [(chosen, *_error(found[place])) for place, chosen in enumerate(combinations)]
-    chosen, lowest, reason = min(tried, key=lambda item: item[1])
+                tell(len(found) / len(tasks), f"{len(found)} of {len(tasks)} orders")
+    tried = []
+    for place, one in enumerate(orders_tried):
+        reason = found[place].invalid or found[place].reason or ""
+        errors = [np.inf] if reason else list(validated(data, found[place].predictions).values())
+        tried.append((one, float(np.mean(errors)), reason))
+    best, lowest, reason = min(tried, key=lambda item: item[1])
     if not np.isfinite(lowest):
         raise ModelError(f"every order of {family!r} failed: {reason}")
-    fitted: Estimator = estimator_class(**settings, **chosen).fit(runs)
-    return Choice(fitted, chosen, tuple(tried))
-
-
-def _own_order(estimator_class: Any) -> str:
-    """Return a setting of a model's own that counts something; empty where it has none."""
-    cls = getattr(estimator_class, "of", estimator_class)
-    bases = [base for base in cls.__mro__ if ".estimators.core." in base.__module__]
-    shared = {field.name for base in bases if is_dataclass(base) for field in fields(base)}
-    counts = [
-        field.name
-        for field in fields(cls)
-        if type(field.default) is int and field.name not in shared
-    ]
-    return next(iter(counts), "")
+    fitted: Estimator = estimator_class(**settings, **best).fit(runs)
+    return Identified(fitted, best, tuple(tried))
 
 
 def _channels(estimator: Estimator, recordings: Sequence[Recording]) -> Channels:
-    """Return what an estimator takes of recordings."""
+    """Return the channels that an estimator takes of recordings."""
     if isinstance(estimator.input, str) and isinstance(estimator.output, str):
         return Channels((estimator.input,), (estimator.output,))
     data = estimator.data(recordings)
     names = ([channel.name for channel in of] for of in (data.inputs, data.outputs, data.scheduled))
     return Channels(*map(tuple, names))
-
-
-def _error(tried: Tried) -> tuple[float, str]:
-    """Return the RMSE over all folds, infinite where one failed, and why."""
-    reason = tried.invalid or (tried.row and tried.row.reason) or ""
-    rmse = rms_of([tried])
-    return (np.inf if reason or rmse is None else rmse), reason

@@ -42,7 +42,7 @@ _OURS = re.compile(
 """Names that parts have, and what was being written when the program was killed."""
 
 
-class Kept:
+class Checkpoints:
     """What is finished of some long work.
 
     Parameters

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mckibben.comparison.results import CHOICES, Leaderboard
+from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.numerals import numeral
+from mckibben.report.words import CHOICES
 
 Given = Mapping[str, Any]
 """A row as ``leaderboard.json`` holds it."""

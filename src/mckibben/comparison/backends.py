@@ -1,0 +1,109 @@
+"""Comparisons on a joblib backend chosen outside, such as a Dask cluster: the same tasks, elsewhere.
+
+What comes back is unpickled, so a cluster is trusted as this machine is.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from mckibben.errors import DataError
+from mckibben.system.extras import demand
+from mckibben.system.threads import one_blas_thread
+from mckibben.system.workers import Outcome, Work, WorkerError, answered, said, understood
+
+PATIENCE = 30.0
+"""How long to wait for a scheduler to answer, and for its first worker [s]."""
+
+
+@contextmanager
+def on_cluster(address: str | None) -> Iterator[None]:
+    """Fit the models of comparisons within this context on a Dask cluster; without address, here.
+
+    Results are those of a serial run, to the bit.
+
+    Parameters
+    ----------
+    address : str or None
+        Of the scheduler, such as ``tcp://10.0.0.1:8786``. Its answers are unpickled: name none but your
+        own.
+
+    Raises
+    ------
+    DataError
+        If Dask is not installed, the scheduler does not answer, or it has no workers.
+    """
+    if address is None:
+        yield
+        return
+    demand("distributed", "dask", "clusters of Dask")
+    distributed: Any = import_module("distributed")
+    from joblib import parallel_config
+
+    try:
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise DataError(
+            f"no Dask scheduler answers at {address} ({type(error).__name__})",
+            remedy="start one with 'dask scheduler', and give its tcp:// address",
+        ) from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError:
+            raise DataError(
+                f"the Dask cluster at {address} has no workers",
+                remedy="start some with 'dask worker ADDRESS'",
+            ) from None
+        with parallel_config("dask", client=client):
+            yield
+
+
+def chosen() -> bool:
+    """Return whether a joblib backend of another kind than its own was chosen outside."""
+    if "joblib" not in sys.modules:
+        return False
+    from joblib.parallel import LokyBackend, get_active_backend
+
+    return not isinstance(get_active_backend()[0], LokyBackend)
+
+
+def processes() -> int:
+    """Return how many processes the backend that was chosen outside has."""
+    from joblib.parallel import get_active_backend
+
+    backend, wanted = get_active_backend()
+    return int(backend.effective_n_jobs(wanted or -1))
+
+
+def outcomes(work: Work, common: Any, items: Sequence[Any]) -> Iterator[Outcome]:
+    """Yield one outcome for every item, as it comes, whatever becomes of the workers."""
+    from joblib import Parallel, delayed
+    from joblib.parallel import get_active_backend
+
+    backend = get_active_backend()[0]
+    way = "generator_unordered" if backend.supports_return_generator else "list"
+    pool = Parallel(n_jobs=min(processes(), len(items)), return_as=way, max_nbytes=None)
+    left, failure = set(range(len(items))), "no answer came"
+    try:
+        # what is common is one argument, and the same object: Dask sends it to each worker once
+        for index, answer in pool(
+            delayed(_called)(work, common, *each) for each in enumerate(items)
+        ):
+            left.remove(index)
+            kind, what = understood(answer)
+            yield Outcome(index, **{"value" if kind == "done" else "error": what})
+    except Exception as error:  # of the backend: what came before is kept
+        failure = said(error)
+    for index in sorted(left):
+        words = f"{failure}. Remedy: see how the workers are, and call it again."
+        yield Outcome(index, error=WorkerError(words))
+
+
+def _called(work: Work, common: Any, index: int, item: Any) -> tuple[int, bytes]:
+    with one_blas_thread():
+        return index, answered(work, common, item, lambda *_: None)

@@ -1,0 +1,398 @@
+"""One model fitted, cross-validated and run free; in tasks that processes can share."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from mckibben import registry
+from mckibben.arrays import Array
+from mckibben.bands.held import Held
+from mckibben.blocks.base import Block
+from mckibben.comparison import backends
+from mckibben.comparison.channels import Channels
+from mckibben.comparison.choosing import CONSTANT, skill_of
+from mckibben.comparison.free_run import run_free
+from mckibben.comparison.leaderboard import Row
+from mckibben.comparison.memory_test import Memory, memory_test
+from mckibben.comparison.splits import Fold, Mask, Split
+from mckibben.errors import MckibbenError, unforeseen
+from mckibben.estimators.optimisers.tracker import Progress, whole_searches
+from mckibben.metrics import Scores, mean_scores, score
+from mckibben.recording import Recording
+from mckibben.system import workers
+from mckibben.system.threads import cores
+from mckibben.system.workers import Outcome
+
+TIMED_SAMPLES = 20_000
+"""Of the simulation that the time of a step is measured by."""
+
+WORTH_A_PROCESS = 4.0
+"""Seconds of work below which starting processes takes longer than it saves."""
+
+PIECES = 8
+"""Consecutive pieces of a held-out recording that squared errors are summed over, to be resampled."""
+
+
+@dataclass(frozen=True)
+class Data:
+    """What all models are given.
+
+    Parameters
+    ----------
+    split : Split
+        Data to fit and to test on.
+    folds : tuple of Fold
+        Parts of the cross-validation within the training data.
+    channels : Channels
+        What drives, what is to be modelled, and what schedules.
+    early : tuple of Recording
+        For searches that stop early.
+    """
+
+    split: Split
+    folds: tuple[Fold, ...]
+    channels: Channels
+    early: tuple[Recording, ...] = ()
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """Every training recording, then every test recording."""
+        return (*self.split.train, *self.split.test)
+
+    def test_errors(self, outputs: Sequence[Array]) -> Array:
+        """Return the errors of outputs on all recordings at the samples scored, shape (n, k)."""
+        split, names = self.split, self.channels.outputs
+        runs = zip(outputs[len(split.train) :], split.test, split.test_rows, strict=True)
+        return np.concatenate([(found - run.matrix(names))[rows] for found, run, rows in runs])
+
+    def held_out(self, predictions: Mapping[int, Sequence[Array]], block: Block) -> list[Held]:
+        """Return predictions of all folds beside what was measured."""
+        return [
+            Held(
+                run.matrix(channel.name for channel in block.inputs),
+                modelled,
+                run.matrix(self.channels.outputs),
+                rows,
+                run.sample_time,
+                place,
+            )
+            for place, fold in enumerate(self.folds)
+            for run, rows, modelled in zip(
+                fold.test, fold.test_rows, predictions[place], strict=True
+            )
+        ]
+
+
+@dataclass(frozen=True)
+class Item:
+    """A model to fit.
+
+    Parameters
+    ----------
+    model : str
+        Short name.
+    settings : mapping
+        Of its estimator.
+    only : int or None
+        Index of the only recording that it is fitted to; None for all of them.
+    """
+
+    model: str
+    settings: Mapping[str, Any]
+    only: int | None = None
+
+
+@dataclass(frozen=True)
+class Task:
+    """Folds of a model to validate on, and whether to fit to all training data and to test.
+
+    Folds come first: they load the compiled kernels, which the fit that is timed then finds ready.
+    """
+
+    name: str
+    item: Item
+    folds: tuple[int, ...]
+    whole: bool
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """What came of a task, or of all tasks of a model.
+
+    Parameters
+    ----------
+    predictions : mapping of int to tuple of array, shape (n, k)
+        Fold to the free-running outputs on its test recordings.
+    invalid : str or None
+        Why a fold could not be fitted.
+    reason : str or None
+        Why the model failed.
+    block : Block or None
+        Fitted to all training data.
+    outputs : tuple of array, shape (n, k)
+        Its free-running outputs on every training recording, then every test recording.
+    seconds, step_ns : float
+        Of that fit [s], and of one simulated sample [ns].
+    memory : Memory or None
+        The memory test, on the test recordings.
+    diagnostics : mapping
+        Of that fit.
+    """
+
+    predictions: Mapping[int, tuple[Array, ...]] = field(default_factory=dict)
+    invalid: str | None = None
+    reason: str | None = None
+    block: Block | None = None
+    outputs: tuple[Array, ...] = ()
+    seconds: float = 0.0
+    step_ns: float = 0.0
+    memory: Memory | None = None
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+
+
+def tasks_of(name: str, item: Item, n_folds: int, split: bool) -> list[Task]:
+    """Return the tasks of a model: one, or one for every fold.
+
+    What is fitted to one recording only is not validated, since no other model is on the same samples.
+    """
+    if item.only is not None or n_folds < 2 or not split:
+        folds = () if item.only is not None else tuple(range(n_folds))
+        return [Task(name, item, folds, whole=True)]
+    return [Task(name, item, (k,), whole=k == 0) for k in range(n_folds)]
+
+
+def effort_of(model: str, data: Data) -> float:
+    """Return about how many seconds a fit of a model takes."""
+    samples = sum(len(recording) for recording in data.split.train)
+    return float(registry.load("estimators", model).effort * max(samples, 2000) / 10_000)
+
+
+def processes_for(seconds: float) -> int:
+    """Return how many processes should share so much work, here or on the backend chosen outside."""
+    if backends.chosen():
+        return backends.processes()
+    return cores() if seconds > WORTH_A_PROCESS else 1
+
+
+def results(
+    data: Data, tasks: Sequence[Task], n: int, told: Callable[..., None] | None = None
+) -> Iterator[Outcome]:
+    """Yield what comes of every task, as it comes, from so many processes; see `Workers.results`."""
+    if backends.chosen():
+        return backends.outcomes(fit, data, tasks)
+    return workers.outcomes(fit, data, tasks, n, told)
+
+
+def fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
+    """Do a task; whatever goes wrong is the reason in the result."""
+    try:
+        return _fit(data, task, tell)
+    except MckibbenError as error:
+        return FitResult(reason=str(error))
+    except Exception as error:  # one model must not end the comparison, whatever it does
+        return FitResult(reason=unforeseen(error))
+
+
+def _fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
+    item, split, channels = task.item, data.split, data.channels
+    estimator_class = registry.load("estimators", item.model)
+    settings = estimator_class.channel_settings(
+        channels.inputs, channels.outputs, channels.scheduling
+    ) | dict(item.settings)
+    folds = {k: data.folds[k] for k in task.folds}
+    # what is fitted to all training data is validated as it is delivered
+    own = {k for k, fold in folds.items() if _is_whole(fold, split)}
+    n_fits = len(folds) - len(own) + task.whole
+    done = 0
+
+    def fitted(recordings: Sequence[Recording], rows: Sequence[Mask] | None = None) -> Any:
+        nonlocal done
+        place, done = done, done + 1
+        progress: Progress | None = None
+        if task.whole:  # the share of all fits that is done, by the share of one
+            progress = lambda share, cost: tell((place + share) / n_fits, cost)  # noqa: E731
+        with whole_searches():
+            return estimator_class(**settings).fit(
+                recordings, rows=rows, validation=data.early, progress=progress
+            )
+
+    predictions, invalid = {}, None
+    try:
+        for k in (k for k in folds if k not in own):
+            block = fitted(folds[k].train, folds[k].train_rows).model_
+            predictions[k] = _predicted(block, folds[k], channels.outputs)
+    except MckibbenError as error:  # a part of the data may be too little where all of it is enough
+        invalid = str(error)
+    if not task.whole:
+        return FitResult(predictions, invalid)
+    started = time.perf_counter()
+    estimator = fitted(split.train if item.only is None else (split.train[item.only],))
+    seconds = time.perf_counter() - started
+    block = estimator.model_
+    predictions |= {k: _predicted(block, folds[k], channels.outputs) for k in own}
+    outputs = outputs_of(block, data)
+    diagnostics = dict(vars(estimator.diagnostics_))
+    diagnostics.pop("uncertainty")  # it holds the recordings
+    return FitResult(
+        predictions,
+        invalid,
+        block=block,
+        outputs=outputs,
+        seconds=seconds,
+        step_ns=_step_cost(block, split.train[0]),
+        memory=memory_test(block, split.test, outputs[len(split.train) :], channels.pairs()),
+        diagnostics=diagnostics,
+    )
+
+
+def _predicted(block: Block, fold: Fold, names: Sequence[str]) -> tuple[Array, ...]:
+    """Return free-running outputs on what a fold holds out; a single recording is both sides."""
+    fitted = list(zip(fold.train, fold.train_rows, strict=True))
+    found = []
+    for recording in fold.test:
+        known = [(run, rows) for run, rows in fitted if run is recording]
+        own, own_rows = [run for run, _ in known], [rows for _, rows in known]
+        found.append(run_free(block, recording, names, own, own_rows))
+    return tuple(found)
+
+
+def outputs_of(block: Block, data: Data) -> tuple[Array, ...]:
+    """Return a model's free-running outputs on every training recording, then every test recording."""
+    split, names = data.split, data.channels.outputs
+    on_train = [run_free(block, recording, names, (recording,)) for recording in split.train]
+    on_test = [run_free(block, recording, names, split.train) for recording in split.test]
+    return (*on_train, *on_test)
+
+
+def _is_whole(fold: Fold, split: Split) -> bool:
+    return fold.train is split.train and all(rows.all() for rows in fold.train_rows)
+
+
+def _step_cost(block: Block, recording: Recording) -> float:
+    inputs = np.resize(
+        recording.matrix(channel.name for channel in block.inputs),
+        (TIMED_SAMPLES, len(block.inputs)),
+    )
+    times = []
+    for _ in range(3):
+        started = time.perf_counter()
+        block.simulate(inputs, sample_time=recording.sample_time)
+        times.append(time.perf_counter() - started)
+    return min(times) / TIMED_SAMPLES * 1e9
+
+
+def joined(tasks: Sequence[FitResult]) -> FitResult:
+    """Return what came of all tasks of a model as one."""
+    failed = next((one for one in tasks if one.reason is not None), None)
+    if failed is not None:
+        return failed
+    (whole,) = (one for one in tasks if one.block is not None)
+    predictions = {k: found for one in tasks for k, found in one.predictions.items()}
+    invalid = next((one.invalid for one in tasks if one.invalid is not None), None)
+    return replace(whole, predictions=predictions, invalid=invalid)
+
+
+def row_of(data: Data, name: str, found: FitResult, constant: Row | None, seed: int) -> Row:
+    """Return the row of a model: all its scores, and its skill over the constant.
+
+    Parameters
+    ----------
+    found : FitResult
+        Of all its tasks.
+    constant : Row or None
+        Of the mean of the training output.
+    seed : int
+        Of the resampling of blocks.
+    """
+    if found.reason is not None:
+        return Row(name, reason=found.reason)
+    names, block, n_train = data.channels.outputs, found.block, len(data.split.train)
+    rows = [*(np.ones(len(run), dtype=bool) for run in data.split.train), *data.split.test_rows]
+    measured = [run.matrix(names)[kept] for run, kept in zip(data.recordings, rows, strict=True)]
+    modelled = [given[kept] for given, kept in zip(found.outputs, rows, strict=True)]
+
+    def scores(part: slice) -> dict[str, Scores]:
+        columns = (np.concatenate(some[part]).T for some in (measured, modelled))
+        return {name: score(*pair) for name, *pair in zip(names, *columns, strict=True)}
+
+    on_train, on_test = scores(slice(n_train)), scores(slice(n_train, None))
+    invalid = found.invalid
+    squares: tuple[tuple[float, ...], ...] = ()
+    if invalid is None and found.predictions:
+        squares = squares_of(data, found.predictions)
+        if not np.isfinite(squares).all():
+            invalid = "its outputs ran away on a part of the data that it was not fitted to"
+            squares = ()
+    by_output = validated(data, found.predictions) if squares else {}
+    skill = least = None
+    if squares and constant is not None:
+        own, others = (np.sum(some, axis=1) for some in (squares, constant.squares))
+        skill, least = skill_of(own, others, seed)
+    return Row(
+        model=name,
+        n_parameters=len(names) if block is None else block.n_parameters,
+        fit_seconds=found.seconds,
+        step_ns=found.step_ns,
+        train=mean_scores(list(on_train.values())),
+        test=mean_scores(list(on_test.values())),
+        outputs=on_test,
+        validation_rmse=float(np.mean(list(by_output.values()))) if by_output else None,
+        validation_by_output=by_output,
+        validation_failed=invalid,
+        skill=skill,
+        skill_least=least,
+        squares=squares,
+        memory=found.memory,
+        block=block,
+        diagnostics=found.diagnostics,
+    )
+
+
+def constant_of(data: Data) -> tuple[Row, tuple[Array, ...]]:
+    """Return the row of the mean of the training outputs, whatever the input, and its outputs."""
+    names = data.channels.outputs
+
+    def mean(recordings: Sequence[Recording], rows: Sequence[Mask]) -> Array:
+        kept = [run.matrix(names)[mask] for run, mask in zip(recordings, rows, strict=True)]
+        return np.asarray(np.concatenate(kept).mean(axis=0))
+
+    def constant(value: Array, recordings: Sequence[Recording]) -> tuple[Array, ...]:
+        return tuple(np.tile(value, (len(recording), 1)) for recording in recordings)
+
+    train = data.split.train
+    outputs = constant(mean(train, [np.ones(len(run), bool) for run in train]), data.recordings)
+    predictions = {
+        place: constant(mean(fold.train, fold.train_rows), fold.test)
+        for place, fold in enumerate(data.folds)
+    }
+    found = FitResult(predictions, outputs=outputs)
+    return row_of(data, CONSTANT, found, None, 0), outputs
+
+
+def validated(data: Data, predictions: Mapping[int, Sequence[Array]]) -> dict[str, float]:
+    """Return the RMSE of every output over all that is held out."""
+    means = np.sum(squares_of(data, predictions), axis=0) / sum(counts_of(data.folds))
+    return dict(zip(data.channels.outputs, np.sqrt(means).tolist(), strict=True))
+
+
+def squares_of(
+    data: Data, predictions: Mapping[int, Sequence[Array]]
+) -> tuple[tuple[float, ...], ...]:
+    """Return sums of squared errors of consecutive pieces of all that is held out, by output."""
+    return tuple(
+        tuple((piece**2).sum(axis=0).tolist())
+        for place, fold in enumerate(data.folds)
+        for run, rows, modelled in zip(fold.test, fold.test_rows, predictions[place], strict=True)
+        for piece in np.array_split((modelled - run.matrix(data.channels.outputs))[rows], PIECES)
+    )
+
+
+def counts_of(folds: Sequence[Fold]) -> list[int]:
+    """Return how many samples every piece has, in the order of their squares."""
+    held_out = [int(rows.sum()) for fold in folds for rows in fold.test_rows]
+    return [len(piece) for n in held_out for piece in np.array_split(np.empty(n), PIECES)]

@@ -1,0 +1,374 @@
+"""What a comparison finds: a row for every model, and all of them in the order of the choice."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+
+from mckibben.blocks.base import Block
+from mckibben.blocks.force.feedforward import compensator
+from mckibben.blocks.inverse import Inverse
+from mckibben.comparison.banding import TestedBand
+from mckibben.comparison.choosing import CONSTANT, Against, Choice, order, recommended
+from mckibben.comparison.memory_test import Memory
+from mckibben.comparison.offered import caution
+from mckibben.errors import MckibbenError
+from mckibben.metrics import Scores
+from mckibben.system.showing import DrawsItself
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Row:
+    """One model of a leaderboard.
+
+    Parameters
+    ----------
+    model : str
+        Short name of the model.
+    reason : str or None
+        Why it failed, or None where it did not.
+    n_parameters : int
+        Numbers identified.
+    fit_seconds : float
+        Wall time of the fit on the whole training set.
+    step_ns : float
+        Time of one sample in a long simulation [ns].
+    train, test : Scores or None
+        Free-running scores, in the unit of the output; test is on data not used to fit or choose. Of
+        several outputs, the means of theirs, and the largest of their largest errors.
+    outputs : mapping of str to Scores
+        The same on the test data, of every output.
+    validation_rmse : float or None
+        Cross-validated RMSE within the training set, by which models are chosen; None where that
+        failed or was not asked for. Of several outputs, the mean of theirs.
+    validation_by_output : mapping of str to float
+        The same of every output.
+    validation_failed : str or None
+        Why a part of the cross-validation failed, or None.
+    skill : float or None
+        Share of the squared error of the constant, the mean of what is fitted to, that the model removes
+        in the cross-validation: 1 is perfect, 0 no better.
+    skill_least : float or None
+        What 99 % of resamples of its blocks exceed; a model is recommended only where that is above 0.
+    squares : tuple of tuple of float
+        Sums of squared errors of the cross-validation by piece and output; none where models are not
+        validated on the same.
+    memory : Memory or None
+        The memory test, on the test set.
+    band : TestedBand or None
+        How its band does on the test, of the chosen model.
+    block, banded : Block or None
+        The model identified, and with that band.
+    diagnostics : mapping
+        What the estimator reports of the fit.
+    test_rank : int or None
+        Place by test RMSE, from 1; nothing is chosen by it.
+    rmse_interval : (float, float) or None
+        95 % moving-block bootstrap interval of the test RMSE.
+    difference_interval : (float, float) or None
+        Of its test RMSE less the chosen model's, paired on the same blocks; the intervals of all models
+        hold at once in 95 %.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
+
+    model: str
+    reason: str | None = None
+    n_parameters: int = 0
+    fit_seconds: float = float("nan")
+    step_ns: float = float("nan")
+    train: Scores | None = None
+    test: Scores | None = None
+    outputs: Mapping[str, Scores] = field(default_factory=dict)
+    validation_rmse: float | None = None
+    validation_by_output: Mapping[str, float] = field(default_factory=dict)
+    validation_failed: str | None = None
+    skill: float | None = None
+    skill_least: float | None = None
+    squares: tuple[tuple[float, ...], ...] = field(default=(), repr=False)
+    memory: Memory | None = None
+    band: TestedBand | None = None
+    block: Block | None = field(default=None, repr=False)
+    banded: Block | None = field(default=None, repr=False)
+    diagnostics: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    test_rank: int | None = None
+    rmse_interval: tuple[float, float] | None = None
+    difference_interval: tuple[float, float] | None = None
+
+    @property
+    def sound(self) -> bool:
+        """Whether there is a model with finite scores."""
+        known = self.reason is None and self.block is not None
+        scores = [one.rmse for one in (self.train, self.test) if one is not None]
+        return known and len(scores) == 2 and bool(np.isfinite(scores).all())
+
+    @property
+    def test_error(self) -> float:
+        """RMSE on the test data, infinite where there is none."""
+        return float("inf") if self.test is None else self.test.rmse
+
+    @property
+    def chosen_by(self) -> float:
+        """The error that the model is chosen by: the validated one, else that of the fit."""
+        fitted = float("inf") if self.train is None else self.train.rmse
+        return fitted if self.validation_rmse is None else self.validation_rmse
+
+    @property
+    def order(self) -> tuple[bool, bool, float, str]:
+        """What rows are sorted by."""
+        fitted = None if self.train is None else self.train.rmse
+        return order(self.model, self.validation_rmse, fitted, self.skill_least)
+
+    @cached_property
+    def inverse(self) -> Block | None:
+        """The inverse of the model, or None where there is none."""
+        try:
+            return None if self.block is None else compensator(self.block)
+        except MckibbenError:
+            return None
+
+    @property
+    def level(self) -> bool:
+        """Whether the interval of the difference to the chosen model holds 0."""
+        ends = self.difference_interval
+        return self.reason is None and ends is not None and ends[0] <= 0 <= ends[1]
+
+    @property
+    def caution(self) -> str | None:
+        """Why the model is good only near what it was trained on, or None."""
+        return caution(self.model)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the row as the leaderboard files hold it."""
+        if self.reason is not None:
+            return {"model": self.model, "status": "failed", "reason": self.reason}
+        test = None
+        if self.test is not None:
+            test = asdict(self.test) | {
+                "rank": self.test_rank,
+                "rmse_interval": _listed(self.rmse_interval),
+                "difference_to_chosen_interval": _listed(self.difference_interval),
+                "level_with_chosen": self.level,
+            }
+        return {
+            "model": self.model,
+            "status": "baseline" if self.model == CONSTANT else "ok",
+            "n_parameters": self.n_parameters,
+            "fit_seconds": self.fit_seconds,
+            "step_ns": self.step_ns,
+            "train": None if self.train is None else asdict(self.train),
+            "test": test,
+            "validation_rmse": self.validation_rmse,
+            "validation_failed": self.validation_failed,
+            "outputs": {
+                name: asdict(scores) | {"validation_rmse": self.validation_by_output.get(name)}
+                for name, scores in self.outputs.items()
+            },
+            "skill": _finite(self.skill),
+            "skill_least": _finite(self.skill_least),
+            "memory": None if self.memory is None else asdict(self.memory),
+            "band": None if self.band is None else self.band.to_dict(),
+            "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
+            "invertible": self.inverse is not None,
+            "inverse": inverse_of(self.inverse),
+            "caution": self.caution,
+        }
+
+
+def inverse_of(inverse: Block | None) -> Literal["exact", "solved", "none"]:
+    """Return how an inverse is found: by a formula, by solving in every step, or not at all.
+
+    Parameters
+    ----------
+    inverse : Block or None
+        Of a model; None where it has none.
+    """
+    if inverse is None:
+        return "none"
+    return "solved" if _solves(inverse) else "exact"
+
+
+def _solves(block: Block) -> bool:
+    if isinstance(block, Inverse):
+        return block.forward.solved
+    parts = [getattr(block, name, None) for name in block.parameters]
+    nested = [part for some in parts for part in (some if isinstance(some, tuple) else (some,))]
+    return any(_solves(part) for part in nested if isinstance(part, Block))
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and np.isfinite(value) else None
+
+
+def _listed(interval: tuple[float, float] | None) -> list[float] | None:
+    return None if interval is None else list(interval)
+
+
+@dataclass(frozen=True, repr=False)
+class Leaderboard(DrawsItself):
+    """Models chosen on the training side, and their errors on data not used to fit or to choose.
+
+    Parameters
+    ----------
+    inputs, outputs : tuple of str
+        Channels.
+    unit : str
+        Unit of the outputs and of every RMSE.
+    rows : tuple of Row
+        Sorted by what they are chosen by; those for which it failed behind, models that failed last.
+    split : str
+        What was used to fit, to choose, and to test.
+    seed : int
+        The seed of everything random.
+    n_train, n_test : int
+        Samples.
+    chosen_by : {"cross-validation", "validation", "given", "fit"}
+        What the model is chosen by: parts of the training data left out in turn, the last of them,
+        recordings given for it, or, for want of these, the error on the data fitted; never the test.
+    left_out : mapping of str to str
+        Models that were not asked for by name and do not apply to these channels, and why.
+    pending : tuple of str
+        Models that were not finished when this was made.
+    notes : tuple of str
+        What was done to the recordings before.
+    stopped : bool
+        Whether the work was interrupted, be it after the last model.
+    constant : Row or None
+        The mean of the training output as a model: what every model has to beat.
+    shared : tuple of str
+        Where recordings to fit to and to test on are the same data, which the user insisted on.
+    choice : Choice or None
+        What choosing among so many costs; None without a cross-validation to resample.
+    loads : tuple of str
+        Channels given to models beside the inputs, and never commanded.
+    ignored : tuple of str
+        Loads that vary in the recordings and that no model is given.
+    outside : mapping of str to float
+        Channel to the share of the samples tested on that are outside of its range in training.
+    """
+
+    face: ClassVar[str] = "leaderboard"
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    unit: str
+    rows: tuple[Row, ...]
+    split: str
+    seed: int
+    n_train: int
+    n_test: int
+    chosen_by: str = "cross-validation"
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    pending: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    stopped: bool = False
+    constant: Row | None = None
+    shared: tuple[str, ...] = ()
+    choice: Choice | None = None
+    loads: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+    outside: Mapping[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    @property
+    def input(self) -> str:
+        """The input, or all of them."""
+        return ", ".join(self.inputs)
+
+    @property
+    def output(self) -> str:
+        """The output, or all of them."""
+        return ", ".join(self.outputs)
+
+    @property
+    def best(self) -> Row | None:
+        """The model chosen, or None where none is worth recommending; see `recommended`.
+
+        It has the least cross-validated error on the training side. One whose cross-validation failed
+        is chosen only if every other's did. The test has no part in it, except that nothing is
+        recommended where the choice is no better there than the constant.
+        """
+        return recommended(self.rows, self.constant)[0]
+
+    @property
+    def not_recommended(self) -> Against | None:
+        """Where the constant is not beaten, so that no model is recommended though some worked."""
+        return recommended(self.rows, self.constant)[1]
+
+    @property
+    def level(self) -> tuple[str, ...]:
+        """The models that the test does not distinguish from the chosen one."""
+        best = self.best
+        return tuple(r.model for r in self.rows if best is not None and r is not best and r.level)
+
+    @property
+    def ranking(self) -> tuple[Row, ...]:
+        """The rows with the constant in its place: behind all that are known to be better."""
+        if self.constant is None or not self.rows:
+            return self.rows
+        order = self.constant.order
+        place = sum(
+            row.test is not None and ((row.skill_least or 0) > 0 or row.order <= order)
+            for row in self.rows
+        )
+        return (*self.rows[:place], self.constant, *self.rows[place:])
+
+    @property
+    def failures(self) -> dict[str, list[str]]:
+        """Every reason for which models failed, once, with those models."""
+        found: dict[str, list[str]] = {}
+        for row in self.rows:
+            if row.reason is not None or row.test is None or row.train is None:
+                found.setdefault(row.reason or "no scores", []).append(row.model)
+        return found
+
+    @property
+    def lowest(self) -> Row | None:
+        """The row with the least test error, which is nothing to choose by, or None."""
+        tested = [row for row in self.rows if row.test is not None]
+        return min(tested, key=lambda row: row.test_error, default=None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the leaderboard as ``leaderboard.json`` holds it."""
+        best, lowest = self.best, self.lowest
+        return {
+            "input": self.inputs[0] if len(self.inputs) == 1 else list(self.inputs),
+            "output": self.outputs[0] if len(self.outputs) == 1 else list(self.outputs),
+            "loads": list(self.loads),
+            "unit": self.unit,
+            "split": self.split,
+            "seed": self.seed,
+            "n_train": self.n_train,
+            "n_test": self.n_test,
+            "chosen_by": self.chosen_by,
+            "chosen": None if best is None else best.model,
+            "not_recommended": self.not_recommended,
+            "choice": None if self.choice is None else self.choice.to_dict(),
+            "lowest_on_test": None if lowest is None else lowest.model,
+            "left_out": dict(self.left_out),
+            "pending": list(self.pending),
+            "notes": list(self.notes),
+            "shared": list(self.shared),
+            "ignored": list(self.ignored),
+            "outside": dict(self.outside),
+            "rows": [row.to_dict() for row in self.ranking],
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the leaderboard as a table, one row a model, nested names joined by dots.
+
+        Where tests are shared with training, a column says so.
+        """
+        import pandas as pd
+
+        table = pd.json_normalize([row.to_dict() for row in self.ranking])
+        return table.assign(shared=" ".join(self.shared)) if self.shared else table

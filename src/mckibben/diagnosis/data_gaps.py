@@ -1,0 +1,398 @@
+"""Data gaps: what recordings cannot identify, the number that shows it, and the run that would.
+
+Every rule is a function of the excitation of the recordings and gives a number by channels; the table
+`RULES` says from which value on nothing is missing.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mckibben.comparison.channels import channels_of
+from mckibben.comparison.shared_rows import without_copies
+from mckibben.diagnosis.excitation import Excitation, extremes, third_differences
+from mckibben.errors import DataError
+from mckibben.estimators.coupled.base import schedules
+from mckibben.recording import Recording, listed
+
+if TYPE_CHECKING:
+    from mckibben.comparison.channels import Names
+
+FEWEST_SAMPLES = 10
+"""Samples of a recording."""
+
+AT_END = 0.1
+"""Turning points this close to an end of the range, as a share of it, are at the end."""
+
+SIMILAR = 1.5
+"""Speeds are compared between branches that differ in length by this factor at most."""
+
+LARGE = 0.25
+"""Share of the range that branches cover whose speeds, or cycles, are compared."""
+
+OFF_REST = 0.1
+"""Share of its range by which a channel stands off its most frequent value."""
+
+MOST_SAMPLES = 20_000
+"""Samples in which correlations and sensor steps are looked for."""
+
+REPEATED, LASTING = 0.02, 1.1
+"""Share of its range within which a channel, and factor within which a time, are the same again."""
+
+CYCLE_POINTS = 9
+"""Points of a cycle that are compared."""
+
+OWN_NOISE = 3.0
+"""Scatter of an output over that of the inputs, in shares of their ranges, that is noise of its own."""
+
+Found = Iterator[tuple[float, tuple[str, ...]]]
+"""A number and the channels that it is of."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Something that recordings cannot identify.
+
+    Parameters
+    ----------
+    what : str
+        Name of the rule: "rate", "creep", "minor loops" and so on.
+    value, needed : float
+        The number that shows it, and the value from which, or up to which, nothing is missing.
+    channels : tuple of str
+        Those concerned.
+    ranges : mapping of str to (float, float)
+        Lowest and highest value of each in the recordings.
+    run : str
+        Kind of run that would identify it: a key of `planning.RUNS`, or what has to change.
+    severity : float
+        From 0 to 1: how wrong a model from these recordings may be.
+    """
+
+    what: str
+    value: float
+    needed: float
+    channels: tuple[str, ...]
+    ranges: Mapping[str, tuple[float, float]]
+    run: str
+    severity: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A row of the table: a gap is named where a number is beyond what is needed.
+
+    Parameters
+    ----------
+    what, run, severity
+        As of `Gap`.
+    number : callable
+        Gives numbers by channels.
+    beyond : callable
+        ``beyond(number, needed)`` says whether there is a gap.
+    needed : float
+    timed : bool
+        Whether it needs time.
+    """
+
+    what: str
+    number: Callable[[Excitation], Found]
+    beyond: Callable[[float, float], bool]
+    needed: float
+    run: str
+    severity: float
+    timed: bool = False
+
+
+def data_gaps(
+    recordings: Recording | Sequence[Recording],
+    inputs: Names = None,
+    outputs: Names = None,
+    *,
+    tests: Sequence[Recording] = (),
+) -> tuple[Gap, ...]:
+    """Return what recordings cannot identify of a muscle, most important first.
+
+    Parameters
+    ----------
+    recordings : Recording or sequence of Recording
+        To which a model is to be fitted.
+    inputs, outputs : str or sequence of str, optional
+        Channels; default those of pressures and displacements, or of pressure, length and force.
+        Loads and stiffening pressures are found beside them.
+    tests : sequence of Recording
+        On which the model is to be used.
+
+    Returns
+    -------
+    tuple of Gap
+        Empty where nothing is missing.
+
+    Raises
+    ------
+    DataError
+        On no recordings, absent channels, or fewer than ten samples.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mckibben import Recording
+    >>> from mckibben.signals import triangle
+    >>> pressure = triangle(np.arange(4001) / 100, period=10.0, peaks=4.0)
+    >>> run = Recording({"pressure": pressure, "displacement": 3 * pressure}, 0.01)
+    >>> [gap.what for gap in data_gaps(run)]
+    ['rate', 'minor loops', 'creep']
+    """
+    known = excitation(recordings, inputs, outputs, tests)
+    found = [gap for rule in RULES if known.timed or not rule.timed for gap in _gaps(rule, known)]
+    return tuple(sorted(found, key=lambda gap: -gap.severity))
+
+
+def excitation(
+    recordings: Recording | Sequence[Recording],
+    inputs: Names = None,
+    outputs: Names = None,
+    tests: Sequence[Recording] = (),
+) -> Excitation:
+    """Return what recordings contain; parameters and errors are those of `data_gaps`."""
+    every = listed(recordings)
+    if not every:
+        raise DataError("there are no recordings to judge", remedy="give at least one")
+    found = channels_of(every, inputs, outputs, None)
+    names = (*found.inputs, *found.outputs)
+    for recording in every:
+        if len(recording) < FEWEST_SAMPLES:
+            raise DataError(
+                f"{len(recording)} samples identify nothing",
+                file=recording.source,
+                remedy=f"give recordings of {FEWEST_SAMPLES} samples or more",
+            )
+        if absent := [name for name in names if name not in recording]:
+            raise DataError(
+                f"it is not among its channels, {', '.join(recording.channels)}",
+                file=recording.source,
+                channel=absent[0],
+                remedy="name them with --input and --output, or give recordings with the same channels",
+            )
+    told = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
+    loads = [name for name in told if all(name in recording for recording in every)]
+    kept = without_copies(every, found.inputs, found.outputs)
+    return Excitation(tuple(kept), tuple(tests), found.inputs, tuple(loads), found.outputs)
+
+
+def _gaps(rule: Rule, known: Excitation) -> Iterator[Gap]:
+    """Give the gap of a rule: its worst number, with the channels of all that are beyond."""
+    beyond = [
+        (value, names) for value, names in rule.number(known) if rule.beyond(value, rule.needed)
+    ]
+    if not beyond:
+        return
+    values = [value for value, _ in beyond]
+    worst = min(values) if rule.beyond(-np.inf, rule.needed) else max(values)
+    channels = tuple(dict.fromkeys(name for _, names in beyond for name in names))
+    ranges = {name: known.ranges[name] for name in channels}
+    yield Gap(rule.what, worst, rule.needed, channels, ranges, rule.run, rule.severity)
+
+
+# -- rules -----------------------------------------------------------------------------------------
+
+
+def _still(known: Excitation) -> Found:
+    """Give the range of outputs that do not move, or of inputs where none does."""
+    names = [name for name in known.outputs if not known.moves(name)]
+    for name in names or ([] if known.moving else known.driven):
+        yield 0.0, (name,)
+
+
+def _constant(channels: Callable[[Excitation], Sequence[str]]) -> Callable[[Excitation], Found]:
+    """Return the rule of channels that stay at one value, beside others that move."""
+
+    def number(known: Excitation) -> Found:
+        for name in channels(known) if known.moving else ():
+            yield float(known.moves(name)), (name,)
+
+    return number
+
+
+def _reversals(known: Excitation) -> Found:
+    """Give the number of turning points of every input."""
+    for name in known.swinging:
+        yield sum(turns.size - 2 for turns in known.turns[name]), (name,)
+
+
+def _inner_reversals(known: Excitation) -> Found:
+    """Give the number of turning points inside the range, upper or lower, whichever are fewer."""
+    for name in known.swinging:
+        counts = np.zeros(2, dtype=int)
+        for recording, turns in zip(known.recordings, known.turns[name], strict=True):
+            heights = (recording[name][turns] - known.ranges[name][0]) / known.span(name)
+            inner = (heights > AT_END) & (heights < 1 - AT_END)
+            upper = np.diff(heights) > 0
+            counts += [int((inner[1:-1] & (upper[:-1] == way)).sum()) for way in (True, False)]
+        if sum(turns.size - 2 for turns in known.turns[name]):
+            yield int(counts.min()), (name,)
+
+
+def _speed_ratio(known: Excitation) -> Found:
+    """Give how many times faster some branches of an input are than others of like length."""
+    for name in known.swinging:
+        branches = [b for b in known.branches[name] if b.travel >= LARGE * known.span(name)]
+        travel = np.array([branch.travel for branch in branches])
+        speeds = np.array([known.speed(name, branch) for branch in branches])
+        ratio = 1.0
+        for least in np.unique(np.quantile(travel, np.linspace(0, 1, 20))) if branches else ():
+            own = speeds[(travel >= 0.999 * least) & (travel <= SIMILAR * least)]
+            if own.size > 1:
+                slow, fast = np.quantile(own, (0.1, 0.9))
+                ratio = max(ratio, float(fast / slow))
+        if known.branches[name]:
+            yield ratio, (name,)
+
+
+def _hold(known: Excitation) -> Found:
+    """Give the longest hold [s]."""
+    if known.moving:
+        yield known.longest_hold, known.moving
+
+
+def _beyond_range(known: Excitation) -> Found:
+    """Give how far tests go beyond the range of an input or a load, as a share of it."""
+    for name in known.moving:
+        if any(name in test for test in known.tests):
+            (low, high), (lowest, highest) = known.ranges[name], extremes(known.tests, name)
+            yield max(low - lowest, highest - high) / known.span(name), (name,)
+
+
+def _dependence(known: Excitation) -> Found:
+    """Give the share of the variance of inputs and loads that follows from the others (R²)."""
+    if len(known.moving) < 2:
+        return
+    samples = known.pooled(known.moving)
+    together = np.corrcoef(samples[:: max(1, len(samples) // MOST_SAMPLES)].T)
+    inflation = np.diag(np.linalg.pinv(together + 1e-9 * np.eye(len(together))))
+    for name, factor in zip(known.moving, inflation.tolist(), strict=True):
+        yield 1.0 - 1.0 / max(factor, 1.0), (name,)
+
+
+def _load_by_output(known: Excitation) -> Found:
+    """Give the share of a load's variance that is linear in one output (R²), as a spring's."""
+    for load in known.loads:
+        for output in known.outputs:
+            if known.moves(load) and known.moves(output):
+                together = np.corrcoef(known.pooled([load, output]).T)
+                yield float(together[0, 1] ** 2), (load, output)
+
+
+def _together(known: Excitation) -> Found:
+    """Give the share of samples in which two channels are both off their most frequent values."""
+    samples = known.pooled(known.moving)[:: max(1, sum(map(len, known.recordings)) // MOST_SAMPLES)]
+    off = np.empty(samples.shape, dtype=bool)
+    for place, name in enumerate(known.moving):
+        counts, edges = np.histogram(samples[:, place], bins=50)
+        rest = float(edges[counts.argmax() : counts.argmax() + 2].mean())
+        off[:, place] = np.abs(samples[:, place] - rest) > OFF_REST * known.span(name)
+    for one, other in combinations(range(len(known.moving)), 2):
+        share = float((off[:, one] & off[:, other]).mean())
+        yield share, (known.moving[one], known.moving[other])
+
+
+def _samples_of_branch(known: Excitation) -> Found:
+    """Give the samples of a branch, as the median over the way that an input goes."""
+    for name in known.swinging:
+        branches = sorted(known.branches[name], key=lambda branch: branch.last - branch.first)
+        way = np.cumsum([branch.travel for branch in branches])
+        if branches:
+            middle = branches[int(np.searchsorted(way, 0.5 * way[-1]))]
+            yield middle.last - middle.first, (name,)
+
+
+def _resolution(known: Excitation) -> Found:
+    """Give the noise of an output, or the step of its sensor if larger, as a share of its range."""
+    for name in known.outputs if known.moving else ():
+        if known.moves(name):
+            span = known.span(name)
+            follows = max(
+                third_differences(one[u])[0] / known.span(u)
+                for one in known.recordings[:1]
+                for u in known.moving
+            )
+            noisy = third_differences(known.recordings[0][name])[0] / span > OWN_NOISE * follows
+            values = known.pooled([name])[:, 0]
+            levels = np.unique(values[:: max(1, values.size // MOST_SAMPLES)])
+            stepped = 2 < levels.size < min(values.size, MOST_SAMPLES) / 5
+            step = float(np.quantile(np.diff(levels), 0.1)) if stepped else 0.0
+            yield max(known.noise[name] if noisy else 0.0, step) / span, (name,)
+
+
+def _clipped(known: Excitation) -> Found:
+    """Give the samples in a row at one end of the range of a channel that has noise elsewhere."""
+    for name in (*known.moving, *known.outputs):
+        steps = np.abs(np.diff(known.pooled([name])[:MOST_SAMPLES, 0]))
+        if known.moves(name) and known.noise[name] > steps[steps > 0].min(initial=np.inf):
+            ends = known.ranges[name]
+            yield (
+                max(_longest(one[name] == end) for one in known.recordings for end in ends),
+                (name,),
+            )
+
+
+def _longest(true: Any) -> int:
+    edges = np.flatnonzero(np.diff(true.astype(np.int8), prepend=0, append=0))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def _untimed(known: Excitation) -> Found:
+    """Give the share of recordings with time."""
+    yield float(np.mean([one.sample_time is not None for one in known.recordings])), known.inputs
+
+
+def _repeated_cycles(known: Excitation) -> Found:
+    """Give the number of cycles of an input that come again, with all else that drives as before."""
+    from scipy.spatial import cKDTree
+
+    pairs = 0
+    for name in known.swinging:
+        cycles = []
+        large = LARGE * known.span(name)
+        for one, other in pairwise(known.branches[name]):
+            follows = one.recording == other.recording and one.last == other.first
+            if follows and min(one.travel, other.travel) > large:
+                recording = known.recordings[one.recording]
+                at = np.linspace(one.first, other.last, CYCLE_POINTS).round().astype(int)
+                path = [recording[u][at] / known.span(u) / REPEATED for u in known.moving]
+                seconds = (other.last - one.first) * (recording.sample_time or 1.0)
+                cycles.append([*np.concatenate(path), np.log(seconds) / np.log(LASTING)])
+        pairs += len(cKDTree(cycles).query_pairs(1.0, p=np.inf)) if cycles else 0
+    if known.swinging:
+        yield pairs, known.swinging
+
+
+RULES = (
+    Rule("still", _still, operator.lt, 1.0, "random", 1.0),
+    Rule("hysteresis", _reversals, operator.lt, 1, "random", 0.95),
+    Rule("coupling", _dependence, operator.gt, 0.9, "random", 0.9),
+    Rule("resting", _constant(lambda known: known.inputs), operator.lt, 1.0, "random", 0.9),
+    Rule("together", _together, operator.lt, 0.02, "random", 0.85),
+    Rule("range", _beyond_range, operator.gt, 0.05, "random", 0.85),
+    Rule("time", _untimed, operator.lt, 1.0, "time", 0.8),
+    Rule("rate", _speed_ratio, operator.lt, 3.0, "speeds", 0.8, timed=True),
+    Rule("minor loops", _inner_reversals, operator.lt, 3, "random", 0.75),
+    Rule("load", _constant(lambda known: known.loads), operator.lt, 1.0, "random", 0.6),
+    Rule("spring load", _load_by_output, operator.gt, 0.98, "random", 0.6),
+    Rule("clipped", _clipped, operator.ge, 10, "sensor", 0.6),
+    Rule("creep", _hold, operator.lt, 8.0, "holds", 0.55, timed=True),
+    Rule("sampling", _samples_of_branch, operator.lt, 8, "sampling", 0.5),
+    Rule("resolution", _resolution, operator.gt, 0.02, "sensor", 0.45),
+    Rule("repeats", _repeated_cycles, operator.lt, 1, "repeats", 0.2),
+)
+"""Numbers on which gaps rest, from which value on nothing is missing, and the run that identifies it."""

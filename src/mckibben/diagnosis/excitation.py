@@ -1,0 +1,198 @@
+"""Excitation of recordings: ranges, noise, branches and holds of everything that drives a muscle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.arrays import NARROWEST, Array
+from mckibben.recording import Recording
+from mckibben.signals.holds import holds
+from mckibben.signals.reversals import reversals, swing_threshold
+
+MOVES, LOAD_MOVES = 0.01, 0.1
+"""Range, over the largest magnitude, from which a channel moves; a load, which inertia shakes."""
+
+BRANCH = 0.1
+"""Share of its range that a channel covers in a branch, at least."""
+
+MOST_BRANCHES = 2000
+"""Branches of a channel that are kept, evenly taken from more."""
+
+NOISY_RECORDINGS = 8
+"""Recordings in which noise is estimated."""
+
+CROSSINGS = np.linspace(0.1, 0.9, 9)
+"""Shares of a branch between which its speed is taken."""
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A channel on its way from one turning point to the next.
+
+    Parameters
+    ----------
+    recording, first, last : int
+        Number of the recording, and samples of the turning points.
+    start, end : float
+        Values there.
+    """
+
+    recording: int
+    first: int
+    last: int
+    start: float
+    end: float
+
+    @property
+    def travel(self) -> float:
+        """How far it goes."""
+        return abs(self.end - self.start)
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What recordings contain of everything that drives a muscle.
+
+    Parameters
+    ----------
+    recordings, tests : tuple of Recording
+    inputs, loads, outputs : tuple of str
+        Channels that are commanded, that schedule or load, and that are modelled.
+    """
+
+    recordings: tuple[Recording, ...]
+    tests: tuple[Recording, ...]
+    inputs: tuple[str, ...]
+    loads: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Inputs and loads."""
+        return (*self.inputs, *self.loads)
+
+    @property
+    def timed(self) -> bool:
+        """Whether every recording has time."""
+        return all(recording.sample_time is not None for recording in self.recordings)
+
+    @cached_property
+    def ranges(self) -> Mapping[str, tuple[float, float]]:
+        """Lowest and highest value of every channel."""
+        return {name: extremes(self.recordings, name) for name in (*self.driven, *self.outputs)}
+
+    @cached_property
+    def noise(self) -> Mapping[str, float]:
+        """Standard deviation of the white noise of every channel, 0 where motion hides it."""
+        every = self.recordings[:: -(-len(self.recordings) // NOISY_RECORDINGS)]
+        found = {name: [_white(one[name]) for one in every] for name in self.ranges}
+        return {name: float(np.median(values)) for name, values in found.items()}
+
+    @cached_property
+    def moving(self) -> tuple[str, ...]:
+        """Inputs and loads that move, within a recording or between them."""
+        return tuple(name for name in self.driven if self.moves(name))
+
+    @property
+    def swinging(self) -> tuple[str, ...]:
+        """Inputs that move within a recording; all that move where none does."""
+        found = [name for name in self.moving if name in self.inputs]
+        return tuple(name for name in found if self.branches[name]) or tuple(found)
+
+    def span(self, channel: str) -> float:
+        """Return the range of a channel."""
+        low, high = self.ranges[channel]
+        return high - low
+
+    def moves(self, channel: str) -> bool:
+        """Return whether a channel moves by more than its noise and a small share of its size."""
+        share = LOAD_MOVES if channel in self.loads else MOVES
+        size = share * max(map(abs, self.ranges[channel]))
+        return self.span(channel) > max(size, 10 * self.noise[channel], NARROWEST)
+
+    def pooled(self, channels: Sequence[str]) -> Array:
+        """Return the samples of all recordings, shape (n, channels)."""
+        return np.concatenate([recording.matrix(channels) for recording in self.recordings])
+
+    @cached_property
+    def turns(self) -> Mapping[str, tuple[NDArray[np.int64], ...]]:
+        """Turning points of everything that moves, with both ends, of every recording."""
+        return {
+            name: tuple(self._turns(one, name) for one in self.recordings) for name in self.moving
+        }
+
+    def _turns(self, recording: Recording, name: str) -> NDArray[np.int64]:
+        noise = swing_threshold(self.noise[name], 0.0, len(recording))
+        return reversals(recording[name], max(noise, BRANCH * self.span(name)))
+
+    @cached_property
+    def branches(self) -> Mapping[str, tuple[Branch, ...]]:
+        """Branches of everything that moves."""
+        found = {}
+        for name in self.moving:
+            every = [
+                Branch(number, int(first), int(last), float(u[first]), float(u[last]))
+                for number, turns in enumerate(self.turns[name])
+                for u in [self.recordings[number][name]]
+                for first, last in pairwise(turns)
+                if abs(u[last] - u[first]) >= BRANCH * self.span(name)
+            ]
+            found[name] = tuple(every[:: max(1, len(every) // MOST_BRANCHES)])
+        return found
+
+    def speed(self, name: str, branch: Branch) -> float:
+        """Return the speed of a branch, whatever is held on the way [unit/s]."""
+        recording = self.recordings[branch.recording]
+        u = recording[name][branch.first : branch.last + 1]
+        reached = np.maximum.accumulate((u - branch.start) * np.sign(branch.end - branch.start))
+        # where a level is first reached, between samples
+        levels = CROSSINGS * branch.travel
+        after = np.searchsorted(reached, levels)
+        before = np.maximum(after - 1, 0)
+        rise = np.maximum(reached[after] - reached[before], 1e-12)
+        times = before + np.clip((levels - reached[before]) / rise, 0.0, 1.0)
+        step = float(np.diff(levels)[0])
+        return step / (max(float(np.median(np.diff(times))), 0.1) * (recording.sample_time or 1.0))
+
+    @cached_property
+    def longest_hold(self) -> float:
+        """Longest time in which all inputs and loads stand still, after having moved [s]."""
+        spans = [self.span(name) for name in self.moving]
+        return max(
+            (
+                (hold.stop - hold.start) * (recording.sample_time or 0.0)
+                for recording in self.recordings
+                for hold in holds(recording.matrix(self.moving), spans)
+                if hold.start > 0
+            ),
+            default=0.0,
+        )
+
+
+def extremes(recordings: Sequence[Recording], name: str) -> tuple[float, float]:
+    """Return the lowest and the highest value of a channel in the recordings that have it."""
+    values = [one[name] for one in recordings if name in one]
+    return min(float(x.min()) for x in values), max(float(x.max()) for x in values)
+
+
+def third_differences(x: Array) -> tuple[float, bool]:
+    """Return the median size of third differences, and whether white noise makes them.
+
+    Those of white noise are as large over every second sample; of motion, larger.
+    """
+    if x.size < 32:
+        return 0.0, False
+    one, two = (float(np.median(np.abs(np.diff(x[::k], 3)))) for k in (1, 2))
+    return one, two < 1.5 * one
+
+
+def _white(x: Array) -> float:
+    size, white = third_differences(x)
+    # 0.6745 is the median of |N(0, 1)|, and 20 the variance of its third differences
+    return size / (0.6745 * np.sqrt(20.0)) if white else 0.0

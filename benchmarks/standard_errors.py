@@ -20,7 +20,7 @@ from tests.diagnosis.runs import noise
 from tests.diagnosis.test_parameters import MODELS, STEP, fitted
 
 from mckibben import Recording, statistics
-from mckibben.validation import parameters as told
+from mckibben.diagnosis.description import describe
 
 
 def measure(name: str, memory: float, seeds: int) -> tuple[float, float]:
@@ -33,12 +33,11 @@ def measure(name: str, memory: float, seeds: int) -> tuple[float, float]:
         y = clean + 0.1 * noise(clean.size, memory, 1000 + seed)
         model = fitted(block, u, y)
         recording = Recording({"pressure": u, "displacement": y}, STEP)
-        left = told.residuals(model, [recording])
         most = statistics.MOST_TERMS
         for place, terms in enumerate((most, 0)):
             statistics.MOST_TERMS = terms
-            sure = told.sureness(model, [recording], left)
-            for one, true in zip(told.parameters(model, sure), truth.tolist(), strict=True):
+            found = describe(model, [recording]).parameters
+            for one, true in zip(found, truth.tolist(), strict=True):
                 if one.interval is not None:
                     hits[place].append(one.interval[0] <= true <= one.interval[1])
         statistics.MOST_TERMS = most

@@ -97,6 +97,15 @@ def test_what_is_missed_is_named_first(what: str) -> None:
     assert check(TRUE, recording(u, TRUE.simulate(u) + 0.1 * noise(u.size, 0.8, 9))).right
 
 
+def test_a_load_that_the_model_does_not_read_is_named() -> None:
+    u = cycles(4000)
+    load = staircase(STEP * np.arange(u.size), [0.0, 20.0, 5.0, 30.0, 10.0, 25.0], 4.0)
+    y = TRUE.simulate(u) - 0.02 * load + 0.1 * noise(u.size, 0.8, 1)
+    measured = recording(u, y).with_channels({"force": "N"}, force=load)
+    first = check(TRUE, measured).outputs[0].missing[0]
+    assert (first.kind, first.channel) == ("load", "force")
+
+
 def test_rounding_and_a_coarse_sensor_say_nothing() -> None:
     u = cycles(3000)
     coarse = np.round(TRUE.simulate(u) / 0.2) * 0.2

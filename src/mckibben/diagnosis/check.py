@@ -42,6 +42,9 @@ OFF_GRID = 0.01
 LAST = ("runs", "offset")
 """Groups that have no shape: whatever else is missed shifts the mean, so they are tested beside it."""
 
+ALONE = ("drift", "offset")
+"""Groups that are no finding beside others: what a wrong model leaves has a mean and a trend as well."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -309,8 +312,7 @@ class _Search:
             [group for group in self.groups if group.kind not in LAST],
             *([group for group in self.groups if group.kind == kind] for kind in LAST),
         ):
-            # an offset beside a curve that has a mean of its own is not determined
-            left = [group for group in wave if group.kind != "offset" or not found]
+            left = [group for group in wave if group.kind not in ALONE or not found]
             while certain := [g for g in left if self._test(g, known).p_value <= self.level]:
                 best = max(certain, key=lambda group: self._gain(group, known))
                 others = [
@@ -322,7 +324,7 @@ class _Search:
                 ]
                 found.append(self.finding(best, known, tuple(dict.fromkeys(others))))
                 known = (*known, *best.columns)
-                left = [group for group in left if group is not best and group.kind not in others]
+                left = [g for g in left if g is not best and g.kind not in (*others, *ALONE)]
         return tuple(found)
 
     def finding(

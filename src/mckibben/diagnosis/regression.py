@@ -1,11 +1,11 @@
 """Regression of residuals on what they may depend on, where neighbours are alike and variances differ.
 
 Noise is an autoregression of the greatest restricted likelihood beside *all* columns (Harville, JASA 72,
-1977), so that the freedom that columns take makes it look no rougher than it is; its order is that of
-Burg's method by BIC. A test has the larger p-value of two in the whitened series, as either alone
-rejects too often: the F-test, with the freedom by which that noise is known (Satterthwaite), where
+1977), so that the freedom that columns take makes it look no rougher than it is; its order is at most
+that of Burg's method by BIC. A test has the larger p-value of two in the whitened series, as either
+alone rejects too often: the F-test, with the freedom by which that noise is known (Satterthwaite), where
 variances differ; and Hotelling's T² by the covariance HC3 (MacKinnon and White, J. Econometrics 29,
-1985) where samples are few. ``benchmarks/validation.py`` measures both.
+1985) where samples are few. ``benchmarks/validation.py`` measures what comes of them.
 
 Pieces (one per recording) are whitened each by itself; nothing crosses from one into the next. Whatever
 asks whether a curve, a loop or a trend is in a recording is such a test, beside the columns that it may
@@ -158,10 +158,14 @@ class Regression:
 
         fitted, _ = _basis(self._plain[:, :-1])
         left = self._plain[:, -1] - fitted @ (fitted.T @ self._plain[:, -1])
-        burg = autoregression(np.split(left, self._ends))
         spare = max(len(left) - fitted.shape[1], 0) // SAMPLES_PER_TERM
-        start = _partial(burg.coefficients)[: min(MOST_ORDER, spare)]
-        order = start.size
+        # columns may have taken what is slow in the noise: so the whole is a start as well
+        found = [
+            _partial(autoregression(np.split(part, self._ends)).coefficients)
+            for part in (left, self._plain[:, -1] - self._plain[:, -1].mean())
+        ]
+        order = min(max(start.size for start in found), MOST_ORDER, spare)
+        starts = [np.pad(start[:order], (0, max(order - start.size, 0))) for start in found]
         self._lagged = _lagged(tables, order)
         # of the rows that noise is known by: what is only in the first ones would be nothing there
         _, inner = _basis(np.concatenate([table[order:, :-1] for table in tables]))
@@ -178,7 +182,8 @@ class Regression:
             return freedom * left + columns
 
         ends = [(-SMOOTHEST, SMOOTHEST)] * order
-        at = minimize(cost, start, method="L-BFGS-B", bounds=ends).x
+        tried = [minimize(cost, start, method="L-BFGS-B", bounds=ends) for start in starts]
+        at = min(tried, key=lambda one: float(one.fun)).x
         slope = approx_fprime(at, cost, STEP)
         moved = [approx_fprime(at + step, cost, STEP) for step in STEP * np.eye(order)]
         curvature = (np.array(moved) - slope) / STEP

@@ -115,8 +115,6 @@ def _say(study: Study, folder: Path) -> None:
     if study.characterization is not None:
         for sentence in words.characterization_sentences(study.characterization):
             say(sentence)
-    for gap in study.untold:
-        say(f"- {words.gap_sentence(gap)} {words.gap_run(gap)}")
     if study.review is not None:
         say()
         for sentence in words.reviewed(study.review):
@@ -126,48 +124,23 @@ def _say(study: Study, folder: Path) -> None:
             if study.review.refit.recommended:
                 say(f"Next: mckibben invert {folder / 'refit.json'} -o inverse2.json")
         say()
-    say(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
+    say(f"Report: {folder / 'report.html'}, updated with every model.\n", flush=True)
 
 
 def _conclude(study: Study, folder: Path) -> None:
-    from mckibben.report.answers import answers
-    from mckibben.report.wording import another_inverted
+    from mckibben.report import words
 
     print_leaderboard(study.leaderboard)
     say()
-    for question, answer in answers(study):
-        say(f"{question} {answer[0]}")
-    if another := another_inverted(study):
-        say(f"{another}.")
-    check = study.inverse
-    if check is not None and check.reachable is not None:
-        low, high = check.reachable
-        say(
-            f"Inverse of {check.model}: follows any reference from {numeral(low, 4)} to "
-            f"{numeral(high, 4)} {study.leaderboard.unit} on the model itself, largest error "
-            f"{check.error:.1e} of that range."
-        )
-    elif check is not None:
-        tested = study.test[0].name
-        followed = f"what it makes of {study.input} in {tested}" if check.own else tested
-        say(
-            f"Inverse of {check.model}: follows {followed} on the model itself, largest "
-            f"error {numeral(100 * check.error, 2)} % of its range."
-        )
-    elif study.leaderboard.not_recommended:
-        say("No inverse is written, since no model is recommended.")
-    elif not study.leaderboard.stopped:
-        say("No model here has an inverse.")
-    if check is not None and check.uncompensated_error is not None:
-        say(
-            f"Without compensation, {check.given} read off one slow rise, that is "
-            f"{numeral(100 * check.uncompensated_error, 2)} %. On the muscle, the model's comes on top."
-        )
+    for question, answer in words.answers(study):
+        say(f"{question} {answer}")
+    if said := words.inverse(study):
+        say(said)
     if study.not_looped:
         say(f"No loop was closed: {study.not_looped}")
     for name, tracked in study.loops.items():
         errors = ", ".join(numeral(error, 2) for error in tracked.rmse.values())
-        say(f"Following a recorded motion on {study.plant}: {name}, RMSE {errors} mm.")
+        say(f"{name} on {study.plant}: RMSE {errors} {study.leaderboard.unit}.")
     best = study.leaderboard.best
     written = [
         str(folder / "report.html"),

@@ -11,7 +11,6 @@ from mckibben.report import (
     interactive,
     subjects,
     templating,
-    wording,
     words,
 )
 
@@ -65,5 +64,5 @@ def check_page(found: Validation, description: ModelDescription, model_file: str
         drawn=runs,
         words=words,
         level=LEVEL,
-        versions=wording.versions(),
+        versions=templating.versions(),
     )

@@ -17,10 +17,8 @@ from mckibben.report import (
     review_subjects,
     subjects,
     templating,
-    wording,
     words,
 )
-from mckibben.report.answers import answers
 from mckibben.report.commands import Typed, commands
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown, unique
@@ -98,10 +96,10 @@ def page(study: Study, typed: Typed | None = None) -> str:
         words=words,
         reading=notes_by_file(measured),
         notes=[note for note in study.notes if note not in reading_notes(measured)],
-        wording=wording,
+        versions=templating.versions(),
         typed=typed or Typed(),
         commands=commands(study, typed),
-        answers=answers(study),
+        answers=words.answers(study),
         checked=checked(study),
         description=study.description,
         review=study.review,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.report import interactive, templating, wording
+from mckibben.report import interactive, templating
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Mark, Panel
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def reproduction_page(found: Reproduction) -> str:
         found=found,
         pictured=pictured,
         shown=shown,
-        versions=wording.versions(),
+        versions=templating.versions(),
     )
 
 

@@ -89,3 +89,12 @@ def _environment() -> Environment:
     }
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     return environment
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python, this package, and those that its numbers come from."""
+    import platform
+    from importlib.metadata import version
+
+    packages = ("mckibben", "numpy", "scipy", "numba")
+    return {"Python": platform.python_version()} | {name: version(name) for name in packages}

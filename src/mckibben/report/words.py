@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.data_gaps import Gap
     from mckibben.diagnosis.review import Review
     from mckibben.planning.planner import Plan
+    from mckibben.recording import Recording
+    from mckibben.studying.study import Study
 
 # --- Comparison -------------------------------------------------------------------------------------
 
@@ -68,8 +70,8 @@ def chosen(board: Leaderboard) -> str:
         f"{numeral(value, 3)} {board.unit}".strip()
         for value in (best.test_error, lowest.test_error, best.chosen_by)
     )
-    end = "the lowest." if lowest is best else f"lowest test RMSE: {lowest.model}, {least}."
-    return f"Chosen by {by}: {best.model}, {heading} {error}; its test RMSE {own}, {end}"
+    end = ", the lowest" if lowest is best else f"; the lowest is {lowest.model}'s, {least}"
+    return f"Chosen by {by}: {best.model}, {heading} {error}. Its test RMSE is {own}{end}."
 
 
 def not_recommended(
@@ -112,8 +114,6 @@ def comparison(board: Leaderboard) -> list[str]:
         f"{name} is outside its training range in {numeral(100 * share, 2)} % of the test samples."
         for name, share in board.outside.items()
     ]
-    if best is not None and (band := best.band) is not None:
-        said += band_on_test(band.level, band.coverage, band.width, band.unit_of_width)
     if best is not None:
         said += [f"{best.model}: {note}." for note in best.diagnostics.get("notes", ())]
     return said
@@ -440,10 +440,7 @@ def _residual(one: OutputCheck) -> str:
     if not one.missing:
         return f"{residual} follows none of {one.n_tests} causes tested."
     first = one.missing[0]
-    return (
-        f"{residual} follows {missed(one, first)}: {percent(first.share)} of its variance, "
-        f"{_p(first.p_value)}."
-    )
+    return f"{residual} follows {missed(one, first)}: {percent(first.share)} of its variance."
 
 
 def _missed(one: OutputCheck, finding: Finding) -> str:
@@ -514,6 +511,11 @@ def gap_sentence(gap: Gap) -> str:
         percent=f"{numeral(100 * gap.value, 2)} %",
         levels=_levels(gap),
     )
+
+
+def gap_name(gap: Gap) -> str:
+    """Return what cannot be identified, without its number."""
+    return GAPS[gap.what].split(" cannot be ")[0].format(channels=listing(gap.channels)).lower()
 
 
 def gap_run(gap: Gap) -> str:
@@ -641,4 +643,86 @@ def _size(unit: str, value: float) -> str:
     return f"{numeral(value, 2)} {unit}".rstrip()
 
 
-# --- The three answers ------------------------------------------------------------------------------
+# --- A study ----------------------------------------------------------------------------------------
+
+
+def answers(study: Study) -> tuple[tuple[str, str], ...]:
+    """Return the three questions about a model, each with one sentence: at most 60 words together."""
+    return (
+        ("Is it right?", _right(study)),
+        ("How far off may it be?", _how_far(study)),
+        ("What to record next?", _record_next(study)),
+    )
+
+
+def _right(study: Study) -> str:
+    if study.leaderboard.best is None:
+        return "No model is chosen."
+    if study.check is None:
+        return "The chosen model is checked when all are fitted."
+    if isinstance(study.check, str):
+        return study.check
+    return _residual(max(study.check.outputs, key=lambda one: one.rmse / max(one.span, 1e-300)))
+
+
+def _how_far(study: Study) -> str:
+    best, unit = study.leaderboard.best, study.leaderboard.unit
+    if best is None or best.test is None:
+        return "No model is chosen."
+    if best.band is None:
+        rmse, largest = numeral(best.test.rmse, 2), numeral(best.test.max_error, 2)
+        return f"{rmse} {unit} RMSE on the test, {largest} {unit} at most."
+    worst = min(best.band.coverage, key=best.band.coverage.__getitem__)
+    of = f" for {worst}" if len(best.band.coverage) > 1 else ""
+    half = numeral(best.band.width[worst] / 2, 2)
+    level, held = percent(best.band.level), percent(best.band.coverage[worst])
+    return f"The {level} band{of}, ±{half} {best.band.unit_of_width} wide, held {held} of the test."
+
+
+def _record_next(study: Study) -> str:
+    if not study.untold:
+        return "No data gaps were found."
+    first, *others = study.untold
+    more = f" ({len(others)} more gaps)" if others else ""
+    return f"{gap_run(first)[:-1]}: {gap_name(first)} cannot be identified{more}."
+
+
+def inverse(study: Study) -> str:
+    """Return which model is inverted and how well it is followed, or that none is."""
+    check, unit = study.inverse, study.leaderboard.unit
+    if check is None:
+        return "" if study.leaderboard.pending else "No inverse: no model recommended has one."
+    error = percent(check.error)
+    if check.reachable is None:
+        motion = "its own output for the test" if check.own else "the motion of the test"
+        text = f"The inverse of {check.model} follows {motion} on the model itself, error {error}"
+    else:
+        low, high = (numeral(end, 3) for end in check.reachable)
+        text = f"The inverse of {check.model} reaches {low} to {high} {unit}, error {error}"
+    if check.uncompensated_error is not None:
+        text += f"; a static map: {percent(check.uncompensated_error)}"
+    return f"{text}. The model's own error adds on the muscle."
+
+
+def verdict(study: Study) -> list[str]:
+    """Return which model is chosen, how far it is from others, and what limits it."""
+    board, best = study.leaderboard, study.leaderboard.best
+    if not (said := chosen(board)):
+        return ["No model is fitted yet." if board.pending else "No model could be identified."]
+    sentences = [said]
+    if best is not None and best.rmse_interval is not None:
+        low, high = (numeral(end, 3) for end in best.rmse_interval)
+        sentences.append(f"95 % interval of its test RMSE: {low} to {high} {board.unit}.")
+    if board.level:
+        sentences.append(f"{listing(board.level)}: {LEVEL}.")
+    if best is not None and best.caution is not None:
+        sentences.append(f"{best.model} is good only near the motions it was fitted to.")
+    return sentences
+
+
+def duration(recording: Recording) -> str:
+    """Return how long a recording is."""
+    samples = f"{recording.n_samples} samples"
+    if recording.duration is None or recording.sample_time is None:
+        return f"{samples}, no time"
+    return f"{samples}, {numeral(recording.duration, 3)} s at {numeral(1 / recording.sample_time, 3)} Hz"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -198,23 +198,18 @@ def study(
             "loops are closed on a rig with recordings of several muscles, or under a load",
             remedy="leave --rig out, or use mckibben track",
         )
-    one = len(channels.inputs) == len(channels.outputs) == 1
-    looped, told = channels.inputs, (*channels.inputs, *(channels.scheduling or ()))
-    if one:
+    looped, loop = channels.inputs, None
+    if len(channels.inputs) == len(channels.outputs) == 1:
         looped = (moved_by([*recordings, *tests], looped[0], list(recordings[0].channels)),)
+        beside = {*channels.inputs, *(channels.scheduling or ())} - set(looped)
+        with suppress(DataError):  # of a load that follows the input, which is a data gap
+            loop = characterize(
+                [*recordings, *tests], looped[0], channels.outputs[0], beside=sorted(beside)
+            )
     so_far = Study(
         train=plan.data.split.train,
         test=plan.data.split.test,
-        characterization=(
-            characterize(
-                [*recordings, *tests],
-                looped[0],
-                channels.outputs[0],
-                beside=[name for name in told if name != looped[0]],
-            )
-            if one
-            else None
-        ),
+        characterization=loop,
         leaderboard=plan.board(),
         predictions={},
         inverse=None,
@@ -247,7 +242,7 @@ def study(
             check=check_on_test(block, split, on_test, names),
             description=describe(block, split.train, fitted=True),
         )
-    if so_far.characterization is None or not so_far.characterization.follows_direction:
+    if loop is None or not loop.follows_direction:
         so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
     undone = so_far.inverse
     if not channels.single and undone is not None:

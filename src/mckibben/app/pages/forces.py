@@ -16,7 +16,6 @@ from mckibben.comparison.channels import FORCE
 from mckibben.comparison.splits import tested_from
 from mckibben.errors import DataError, MckibbenError
 from mckibben.numerals import number, percent
-from mckibben.report import wording
 
 
 def _tells(desk: Desk) -> dict[str, list[str]]:
@@ -91,7 +90,7 @@ def build(desk: Desk) -> None:
         run.set_options(names, value=run.value if run.value in names else next(iter(names), None))
         known_error = desk.workspace.test_errors().get(str(model.value))
         error.set_text(f"{model.value}: {known_error}." if known_error else "")
-        doubt.set_text(_forgets(desk, str(model.value)))
+        doubt.set_text(_width_reproduced(desk, str(model.value)))
         doubt.set_visibility(bool(doubt.text))
 
     async def look() -> None:
@@ -133,16 +132,11 @@ def _trained(desk: Desk) -> dict[str, str]:
     return {}
 
 
-def _forgets(desk: Desk, model: str) -> str:
-    """Return that a model lost the gap between branches; empty where it keeps it, or is not known."""
+def _width_reproduced(desk: Desk, model: str) -> str:
+    """Return how much of the measured hysteresis width a model has; empty where it is not known."""
     memory = next((row["memory"] for row in desk.results() if row["name"] == model), None) or {}
     ratio = memory.get("gap_ratio")
-    if ratio is None or ratio >= wording.FORGETFUL:
-        return ""
-    return (
-        f"{model} keeps only {percent(ratio)} of the gap between rising and falling branches: "
-        "where its inputs turn back or are held, do not rely on what it estimates."
-    )
+    return "" if ratio is None else f"Hysteresis width reproduced by {model}: {percent(ratio)}."
 
 
 def _shown(desk: Desk, name: str, one: Estimated) -> None:

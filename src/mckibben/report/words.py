@@ -493,7 +493,7 @@ EXTRAPOLATED = "{channel} goes beyond the recordings: errors there are extrapola
 RUN = "Record {what}."
 RUNS = {
     "random": "all inputs and loads moving at random over {levels}",
-    "speeds": "the same motion at a third of the speed, and three times as fast",
+    "speeds": "the same motion three times slower and three times faster",
     "holds": "holds of 30 s at several levels",
     "repeats": "one run twice",
     "time": "time, or give the rate",

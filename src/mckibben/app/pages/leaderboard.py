@@ -282,7 +282,7 @@ async def _closer(
                         label = f"band of {name}"
                         plots.shaded(figure, recording.time, (low, high), colour, label)
                     figure["layout"]["showlegend"] = True
-                    plot = picture(desk, figure, f"closer-{number}")
+                    plot = picture(desk, figure, f"closer-{index}")
                     plot.classes("flex-1 min-w-72", remove="w-full")
         with ui.row().classes("w-full items-start"):
             for name, block in blocks.items():

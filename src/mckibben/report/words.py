@@ -701,7 +701,10 @@ def inverse(study: Study) -> str:
         text = f"The inverse of {check.model} reaches {low} to {high} {unit}, error {error}"
     if check.uncompensated_error is not None:
         text += f"; a static map: {percent(check.uncompensated_error)}"
-    return f"{text}. The model's own error adds on the muscle."
+    own = next(row.test_error for row in study.leaderboard.rows if row.model == check.model)
+    return (
+        f"{text}. On the muscle the error of the model adds, {numeral(own, 2)} {unit} on the test."
+    )
 
 
 def verdict(study: Study) -> list[str]:

@@ -1,4 +1,4 @@
-"""A model described on recordings: its equations, its numbers and how sure they are, how it answers."""
+"""A model described on recordings: equations, numbers and how sure they are, frequency response."""
 
 from __future__ import annotations
 
@@ -15,12 +15,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.equations import quantities, written
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.notation import Written
-from mckibben.diagnosis.responses import (
-    DescribingFunction,
-    FrequencyResponse,
-    describing_functions,
-    frequency_responses,
-)
+from mckibben.diagnosis.responses import FrequencyResponse, frequency_responses
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.uncertainty import (
@@ -84,14 +79,8 @@ class ModelDescription:
         Its equations with its numbers, in LaTeX.
     parameters : tuple of Parameter
         In the order of ``block.pack()``.
-    n_effective : float
-        Independent samples that determine the mean of a residual as well as the recordings do.
-    condition : float
-        Of the sensitivities to the parameters, each scaled by its size.
     frequency_responses : tuple of FrequencyResponse
         Of linear models.
-    describing_functions : tuple of DescribingFunction
-        Of all others.
     recordings : tuple of str
         Names of those that all this rests on.
     fitted : bool
@@ -100,10 +89,7 @@ class ModelDescription:
 
     written: Written
     parameters: tuple[Parameter, ...]
-    n_effective: float
-    condition: float
     frequency_responses: tuple[FrequencyResponse, ...]
-    describing_functions: tuple[DescribingFunction, ...]
     recordings: tuple[str, ...]
     fitted: bool
 
@@ -114,7 +100,7 @@ class ModelDescription:
 
 
 def describe(
-    block: Block, recordings: Sequence[Recording], output: str | None = None, *, fitted: bool = True
+    block: Block, recordings: Sequence[Recording], *, fitted: bool = True
 ) -> ModelDescription:
     """Describe a model on recordings, usually those it was fitted to.
 
@@ -127,8 +113,6 @@ def describe(
         The model.
     recordings : sequence of Recording
         With its inputs and outputs.
-    output : str, optional
-        The only output to show responses of; default all.
     fitted : bool
         Whether the model was fitted to these recordings.
 
@@ -139,57 +123,46 @@ def describe(
     """
     if not recordings:
         raise DataError("there are no recordings to describe a model on", remedy="give one or more")
-    names = [channel.name for channel in block.outputs]
-    if output is not None and output not in names:
-        raise DataError(
-            f"the model gives {', '.join(names)}", channel=output, remedy="name one of those"
-        )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        condition, covariance, n_effective = uncertainty(block, recordings)
+        covariance, n_effective = uncertainty(block, recordings)
         known = np.isfinite(np.diag(covariance))
         half = _half_width(n_effective - int(known.sum()))
-        responses = frequency_responses(block, recordings, covariance, half, output)
-        loops = () if responses else describing_functions(block, recordings, output)
+        responses = frequency_responses(block, recordings, covariance, half)
     return ModelDescription(
         written(block),
         parameters(block, covariance, half),
-        n_effective,
-        condition,
         responses,
-        loops,
         tuple(recording.name for recording in recordings),
         fitted,
     )
 
 
-def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[float, Array, float]:
-    """Return condition and covariance of a model's parameters, and independent samples."""
-    names = [channel.name for channel in block.outputs]
-    inputs = [channel.name for channel in block.inputs]
-    share = 1.0
-    if not _means_nothing(block):
-        share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
+def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, float]:
+    """Return the covariance of a model's parameters, and independent samples; NaN where not known."""
+    if _means_nothing(block):
+        return unknown(block), np.nan
+    outputs, inputs = ([c.name for c in some] for some in (block.outputs, block.inputs))
+    share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
     kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
     share = sum(map(len, kept)) / sum(map(len, recordings))
     runs = tuple(
         Run(
-            *(r.name, r.matrix(inputs), r.matrix(names), np.empty((len(r), 0))),
+            *(r.name, r.matrix(inputs), r.matrix(outputs), np.empty((len(r), 0))),
             *(np.ones(len(r), dtype=bool), r.sample_time),
         )
         for r in kept
     )
     data = TrainingData(runs, block.inputs, block.outputs)
     residual = data.target - simulate_started([block], data)[0]
-    ends = np.cumsum([run.outputs.size for run in data.runs])[:-1]
-    left = [part.reshape(-1, len(names)) for part in np.split(residual, ends)]
-    if _means_nothing(block) or not np.isfinite(residual).all():
-        return np.nan, unknown(block), np.nan
+    if not np.isfinite(residual).all():
+        return unknown(block), np.nan
+    ends = np.cumsum([run.outputs.size for run in runs])[:-1]
+    left = [part.reshape(-1, len(outputs)) for part in np.split(residual, ends)]
     n = sum(map(len, left))
     n_effective = min(m.effective_sample_size(n) for m in autoregressions(left)) / share
     places = np.flatnonzero(fixed(block)).tolist()
-    condition, covariance = covariance_of(block, data, residual, places, simulate_started)
-    return condition, share * covariance, n_effective
+    return share * covariance_of(block, data, residual, places, simulate_started)[1], n_effective
 
 
 def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Parameter, ...]:

@@ -88,8 +88,8 @@ class OutputCheck:
         Of the free run.
     mean_error : float
         The same of the mean, which a model has to beat to be of use.
-    resolution : float
-        Smallest step of the measured output; 0 where it shows none.
+    exact : bool
+        Whether nothing is left but rounding, or the sensor's steps.
     missing : tuple of Finding
         What the model misses, most important first.
     suspects : tuple of Finding
@@ -107,17 +107,12 @@ class OutputCheck:
     span: float
     rmse: float
     mean_error: float
-    resolution: float
+    exact: bool
     missing: tuple[Finding, ...]
     suspects: tuple[Finding, ...]
     n_tests: int
     whiteness: Whiteness
     patterns: tuple[Pattern, ...]
-
-    @property
-    def exact(self) -> bool:
-        """Whether nothing is left but rounding, or the sensor's steps."""
-        return self.rmse <= max(ROUNDING * self.span, STEP * self.resolution)
 
     @property
     def useless(self) -> bool:
@@ -247,9 +242,9 @@ def _output(
     channel = model.outputs[place]
     residuals = [run.residual[:, place] for run in runs]
     measured = [run.measured[:, place] for run in runs]
-    span, resolution = float(np.ptp(np.concatenate(measured))), _resolution(measured)
-    rmse = _rms(residuals)
-    if rmse <= max(ROUNDING * span, STEP * resolution):
+    span, rmse = float(np.ptp(np.concatenate(measured))), _rms(residuals)
+    exact = rmse <= max(ROUNDING * span, STEP * _resolution(measured))
+    if exact:
         # what rounding follows is the arithmetic, or the sensor's steps
         residuals = [0.0 * e for e in residuals]
     groups, tables = suspects(model, tested, place, every)
@@ -283,9 +278,9 @@ def _output(
         span=span,
         rmse=rmse,
         mean_error=_rms([y - mean for y in measured]),
-        resolution=resolution,
+        exact=exact,
         missing=search.missing(),
-        suspects=tuple(search.finding(group, ()) for group in groups),
+        suspects=tuple(search.finding(group) for group in groups),
         n_tests=n_tests,
         whiteness=whiteness(residuals),
         patterns=tuple(patterns),
@@ -299,9 +294,7 @@ class _Search:
         self, regression: Regression, left: Sequence[Array], groups: Sequence[Group], level: float
     ) -> None:
         self.regression, self.groups, self.level = regression, groups, level
-        whole = np.concatenate(left)
-        self.n, self.squares = whole.size, float(whole @ whole)
-        self.about_mean = self.squares - whole.size * float(whole.mean()) ** 2
+        self.residual = np.concatenate(left)
 
     def missing(self) -> tuple[Finding, ...]:
         """Return what is certain, each beside those before."""
@@ -323,19 +316,20 @@ class _Search:
         return tuple(found)
 
     def finding(
-        self, group: Group, known: tuple[int, ...], others: tuple[str, ...] = ()
+        self, group: Group, known: tuple[int, ...] = (), others: tuple[str, ...] = ()
     ) -> Finding:
         """Return what a group explains beside others."""
         test = self._test(group, known)
-        coefficient, total = None, self.about_mean
+        coefficient, about = None, float(self.residual.mean())
         if group.kind == "lag":
             coefficient = float(group.delay)
         elif group.kind == "offset":
-            coefficient, total = self.regression.coefficient(group.columns[0]), self.squares
+            coefficient, about = self.regression.coefficient(group.columns[0]), 0.0
+        total = float(np.sum((self.residual - about) ** 2))
         return Finding(
             *(group.kind, group.channel, test.p_value),
             share=min(test.explained / total, 1.0) if total > 0 else 0.0,
-            size=float(np.sqrt(test.explained / self.n)),
+            size=float(np.sqrt(test.explained / self.residual.size)),
             coefficient=coefficient,
             or_kinds=others,
         )

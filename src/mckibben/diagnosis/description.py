@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.equations import quantities, written
+from mckibben.blocks.equations import Quantity, quantities, written
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.notation import Written
 from mckibben.diagnosis.responses import FrequencyResponse, frequency_responses
@@ -26,6 +26,7 @@ from mckibben.estimators.core.uncertainty import (
     vanishing,
 )
 from mckibben.recording import Recording
+from mckibben.system.atomic import plain
 
 LEVEL = 0.95
 """Of intervals."""
@@ -38,18 +39,14 @@ MOST_OPERATIONS = 200_000_000
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Parameter(Quantity):
     """One number of a model.
 
     Parameters
     ----------
-    name, symbol : str
-        In words, and in LaTeX.
+    name, symbol, unit, meaning : str
+        As `mckibben.blocks.equations.Quantity` has them.
     value : float
-    unit : str
-        Empty for none.
-    meaning : str
-        In words.
     status : str
         ``estimated``; ``fixed``: chosen, or at a bound; ``undetermined`` by the recordings;
         ``unknown``: no parameter of such a model means anything alone.
@@ -59,11 +56,7 @@ class Parameter:
         In which it lies by 95 %.
     """
 
-    name: str
-    symbol: str
     value: float
-    unit: str
-    meaning: str
     status: str
     standard_error: float | None
     interval: tuple[float, float] | None
@@ -95,7 +88,7 @@ class ModelDescription:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as a JSON-ready dict; what is not known is None."""
-        found: dict[str, Any] = _plain(self)
+        found: dict[str, Any] = plain(self)
         return found
 
 
@@ -170,25 +163,20 @@ def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Para
 
     What is rounding beside the others, as a weight of 1e-17, is shown as 0.
     """
-    values = block.pack()
-    shown = np.where(vanishing(values), 0.0, values).tolist()
-    errors = np.sqrt(np.diag(covariance)).tolist()
+    values, errors, chosen = block.pack(), np.sqrt(np.diag(covariance)), fixed(block)
+    known = np.isfinite(errors)
     other = "unknown" if _means_nothing(block) else "undetermined"
-    found = []
-    for what, value, error, chosen in zip(
-        quantities(block), shown, errors, fixed(block).tolist(), strict=True
-    ):
-        known = np.isfinite(error)
-        half = half_width * error
-        status = "estimated" if known else "fixed" if chosen else other
-        found.append(
-            Parameter(
-                *(what.name, what.symbol, value, what.unit, what.meaning, status),
-                error if known else None,
-                (value - half, value + half) if known else None,
-            )
+    status = np.where(known, "estimated", np.where(chosen, "fixed", other)).tolist()
+    shown = np.where(vanishing(values), 0.0, values)
+    ends = np.transpose(shown + half_width * np.outer([-1, 1], errors))
+    return tuple(
+        Parameter(
+            *(what.name, what.symbol, what.unit, what.meaning, float(shown[place]), status[place]),
+            float(errors[place]) if known[place] else None,
+            (float(ends[place, 0]), float(ends[place, 1])) if known[place] else None,
         )
-    return tuple(found)
+        for place, what in enumerate(quantities(block))
+    )
 
 
 def fixed(block: Block) -> NDArray[np.bool_]:
@@ -217,16 +205,3 @@ def _half_width(freedom: float) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(max(freedom, 1.0), 0.5 + LEVEL / 2)) if np.isfinite(freedom) else np.nan
-
-
-def _plain(value: Any) -> Any:
-    """Return dataclasses and arrays as JSON holds them."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, tuple | list):
-        return [_plain(item) for item in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value

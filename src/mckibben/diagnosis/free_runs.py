@@ -128,23 +128,16 @@ def _modelled(
 
 
 def _refuse(recording: Recording, block: Block, step: float | None) -> None:
-    for what, channels in (("reads", block.inputs), ("gives", block.outputs)):
-        for channel in channels:
-            if channel.name not in recording:
-                raise DataError(
-                    f"the model {what} this channel, and the recording lacks it",
-                    file=recording.source,
-                    channel=channel.name,
-                    remedy=f"name its column: --column {channel.name}=COLUMN",
-                )
-            if recording.units[channel.name] != channel.unit:
-                raise DataError(
-                    f"the model wants {channel.unit or 'no unit'}, the recording has "
-                    f"{recording.units[channel.name] or 'no unit'}",
-                    file=recording.source,
-                    channel=channel.name,
-                    remedy="convert the recording, or name its unit when reading it",
-                )
+    channels = (*block.inputs, *block.outputs)
+    units = recording.select([channel.name for channel in channels]).units
+    for channel in channels:
+        if (unit := units[channel.name]) != channel.unit:
+            raise DataError(
+                f"the model wants {channel.unit or 'no unit'}, the recording has {unit or 'no unit'}",
+                file=recording.source,
+                channel=channel.name,
+                remedy="convert the recording, or name its unit when reading it",
+            )
     if len(recording) < SHORTEST:
         raise DataError(
             f"{len(recording)} samples are too few: what a residual remembers is longer",

@@ -114,20 +114,19 @@ def describe(
     DataError
         If there are no recordings, or a channel is absent.
     """
+    from scipy.special import stdtrit
+
     if not recordings:
         raise DataError("there are no recordings to describe a model on", remedy="give one or more")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         covariance, n_effective = uncertainty(block, recordings)
-        known = np.isfinite(np.diag(covariance))
-        half = _half_width(n_effective - int(known.sum()))
+        freedom = n_effective - np.isfinite(np.diag(covariance)).sum()
+        half = float(stdtrit(np.maximum(freedom, 1.0), 0.5 + LEVEL / 2))
         responses = frequency_responses(block, recordings, covariance, half)
+    names = tuple(recording.name for recording in recordings)
     return ModelDescription(
-        written(block),
-        parameters(block, covariance, half),
-        responses,
-        tuple(recording.name for recording in recordings),
-        fitted,
+        written(block), parameters(block, covariance, half), responses, names, fitted
     )
 
 
@@ -198,10 +197,3 @@ def _operations(block: Block, recordings: Sequence[Recording]) -> float:
     except ModelError:
         usual = float(block.n_parameters)
     return usual * block.n_parameters * sum(map(len, recordings))
-
-
-def _half_width(freedom: float) -> float:
-    """Return half an interval, in standard errors."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(max(freedom, 1.0), 0.5 + LEVEL / 2)) if np.isfinite(freedom) else np.nan

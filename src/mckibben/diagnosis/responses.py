@@ -16,11 +16,8 @@ from mckibben.errors import ModelError
 from mckibben.estimators.core.uncertainty import DIFFERENCE, relative_sizes
 from mckibben.recording import Recording
 
-FREQUENCIES = 80
-"""Of a frequency response."""
-
-COHERENT = 0.6
-"""Coherence above which a measured frequency response is shown."""
+FREQUENCIES, COHERENT = 80, 0.6
+"""How many there are, and the coherence above which what was measured is shown."""
 
 LEAST, MOST = 16, 4096
 """Samples of a segment of Welch's method."""
@@ -66,29 +63,26 @@ def frequency_responses(
         Half an interval, in standard errors.
     """
     step = recordings[0].sample_time
+    if step is None:
+        return ()
     try:
-        system = None if step is None else block.linear_system(step)
+        system = block.linear_system(step)
     except ModelError:
         return ()
-    if step is None or system is None or not len(system.a):
+    if not len(system.a):
         return ()
     frequency = np.geomspace(2 / (max(map(len, recordings)) * step), 0.5 / step, FREQUENCIES)
     base = system.response(frequency)
     values, known = block.pack(), np.flatnonzero(np.isfinite(np.diag(covariance)))
-    sizes = DIFFERENCE * relative_sizes(values)
+    steps = DIFFERENCE * relative_sizes(values)
     slopes = np.zeros((known.size, *base.shape), dtype=complex)
     for slope, place in zip(slopes, known, strict=True):
-        moved = values.copy()
-        moved[place] += sizes[place]
-        slope[:] = np.log(block.unpack(moved).linear_system(step).response(frequency) / base)
-        slope /= sizes[place]
-    small = covariance[np.ix_(known, known)]
-    found = []
-    n_driven = len(block.inputs) - len(block.scheduling)
+        moved = block.unpack(values + steps * (np.arange(values.size) == place))
+        slope[:] = np.log(moved.linear_system(step).response(frequency) / base) / steps[place]
+    small, found = covariance[np.ix_(known, known)], []
     for j, output in enumerate(block.outputs):
-        i = j if n_driven == len(block.outputs) else 0
-        gain = np.abs(base[:, j, i])
-        angle = np.degrees(np.unwrap(np.angle(base[:, j, i])))
+        i = j if len(block.inputs) - len(block.scheduling) == len(block.outputs) else 0
+        gain, angle = np.abs(base[:, j, i]), np.degrees(np.unwrap(np.angle(base[:, j, i])))
         wide, turned = (
             half_width * np.sqrt(np.einsum("pf,pq,qf->f", part, small, part).clip(0))
             for part in (slopes[:, :, j, i].real, np.degrees(slopes[:, :, j, i].imag))
@@ -120,12 +114,11 @@ def _welch(
         spectra = [len(r) * csd(r[one], r[other], **settings)[1] for r in kept]
         return np.asarray(np.sum(spectra, axis=0))
 
-    cross, alone = power(given, wanted), power(given, given).real
     with np.errstate(divide="ignore", invalid="ignore"):
-        coherence = np.nan_to_num(np.abs(cross) ** 2 / (alone * power(wanted, wanted).real))
-        response = cross / alone
-    coherence[0] = 0.0  # of the mean
-    good = coherence > COHERENT
+        response = power(given, wanted) / power(given, given)
+        coherence = np.abs(response) ** 2 * (power(given, given) / power(wanted, wanted)).real
+    good = np.nan_to_num(coherence) > COHERENT
+    good[0] = False  # the mean
     angle = np.asarray(np.degrees(np.unwrap(np.angle(response[good]))), dtype=np.float64)
     frequency = np.asarray(np.fft.rfftfreq(length, step), dtype=np.float64)
     return frequency[good], np.abs(response[good]), angle

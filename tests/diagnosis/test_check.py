@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,9 +12,21 @@ from scipy.signal import lfilter
 
 from mckibben import PI, DataError, Recording
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.diagnosis.check import check
+from mckibben.comparison.choosing import recommended
+from mckibben.diagnosis.check import check, check_runs
+from mckibben.diagnosis.free_runs import Run
 from mckibben.signals import staircase
 from tests.diagnosis.runs import LINE, STEP, TRUE, Array, cycles, noise, recording, run
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A row of a leaderboard that was not validated."""
+
+    test_error: float
+    reason: str | None = None
+    skill_least: float | None = None
+
 
 SEEDS = 12
 LEVEL = 0.2
@@ -113,6 +126,21 @@ def test_rounding_and_a_coarse_sensor_say_nothing() -> None:
     assert check(TRUE, recording(u, coarse)).right
     # a loop that the sensor does show is found all the same
     assert "hysteresis" in missed(LINE, recording(u, coarse))
+
+
+@pytest.mark.parametrize("share", [0.5, 0.88, 0.92, 1.1])
+def test_of_no_use_is_what_a_comparison_does_not_recommend(share: float) -> None:
+    y = run(TRUE, 1500)["displacement"]
+    u, mean = cycles(1500), 1.0
+    modelled = y - share * (y - mean)
+    taken = Run(recording(u, y), u[:, np.newaxis], y[:, np.newaxis], modelled[:, np.newaxis])
+    (one,) = check_runs(TRUE, [taken], means=np.array([mean])).outputs
+    assert one.rmse == pytest.approx(share * one.mean_error)
+    row, constant = Scored(one.rmse), Scored(one.mean_error)
+    assert one.useless == (recommended([row], constant)[0] is None)
+    assert one.useless == (share > 0.9)
+    # where nothing is known of the training, it is the mean of what is checked
+    assert check_runs(TRUE, [taken]).outputs[0].mean_error == pytest.approx(np.std(y))
 
 
 GOOD = run(TRUE, 600)

@@ -336,7 +336,7 @@ class Block(DrawsItself, Parametrised):
         """
         raise ModelError(
             f"{self.kind!r} is not linear, so it has no transfer function. Remedy: hand over a linear "
-            "model (oe, arx, armax, bj, p1 to p3), or look at its describing function."
+            "model (oe, arx, armax, bj, p1 to p3)."
         )
 
     def continuous(self) -> Polynomials | None:

@@ -99,7 +99,12 @@ def acceptable(row: Ranked, constant: Ranked | None) -> bool:
 
 
 def _beats(row: Ranked, constant: Ranked) -> bool:
-    return row.test_error < USEFUL * constant.test_error
+    return useful(row.test_error, constant.test_error)
+
+
+def useful(error: float, constant: float) -> bool:
+    """Return whether an error is clearly less than that of the constant on the same samples."""
+    return error < USEFUL * constant
 
 
 def skill_of(squares: Array, constant: Array, seed: int) -> tuple[float, float]:

@@ -11,12 +11,12 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
+from mckibben.comparison.choosing import useful
 from mckibben.diagnosis.free_runs import Run, runs_of
-from mckibben.diagnosis.patterns import Pattern, Whiteness, patterns, whiteness
+from mckibben.diagnosis.patterns import Pattern, Whiteness, bins, whiteness
 from mckibben.diagnosis.regression import FTest, Regression
 from mckibben.diagnosis.suspects import Group, averaged, block_length, suspects
 from mckibben.recording import Recording, listed
-from mckibben.signals.reversals import noise_level
 from mckibben.system.progress import Tell, one_by_one, telling
 from mckibben.system.showing import DrawsItself
 from mckibben.system.threads import one_blas_thread
@@ -27,17 +27,14 @@ LEVEL = 0.01
 FEWEST_BLOCKS = 6
 """Of a recording that is tested."""
 
-ROUNDING = 1e-9
-"""Share of the span up to which a residual is rounding."""
+ROUNDING, STEP = 1e-9, 0.5
+"""Shares of the span and of the sensor's step up to which a residual's root mean square says nothing."""
 
-STEP = 0.5
-"""Steps of the sensor up to which a residual's root mean square says nothing."""
+UNMOVED, OFF_GRID = 0.05, 0.01
+"""A sensor shows its steps where so many samples equal the one before and none is further off a step."""
 
-UNMOVED = 0.05
-"""Share of the samples that are equal to the one before, from which a sensor shows its steps."""
-
-OFF_GRID = 0.01
-"""Steps by which a sample may miss the sensor's steps."""
+AGAINST = {"curve": "input", "load": "load", "hysteresis": "branch"}
+"""What residuals are averaged over, by kind of group."""
 
 LAST = ("runs", "offset")
 """Groups that have no shape: whatever else is missed shifts the mean, so they are tested beside it."""
@@ -83,29 +80,22 @@ class OutputCheck:
     ----------
     output, unit : str
         Channel.
-    n_samples : int
-        Of all recordings.
     sample_time : float or None
         [s].
-    span, deviation : float
-        Range of the measured output, and its standard deviation.
+    span : float
+        Range of the measured output.
     rmse : float
         Of the free run.
-    sensor_noise : float or None
-        Standard deviation of the measured output's white noise, from its third differences; None
-        where it cannot be told from movement.
-    resolution : float
-        Smallest step of the measured output; 0 where it shows none.
+    mean_error : float
+        The same of the mean, which a model has to beat to be of use.
+    exact : bool
+        Whether nothing is left but rounding, or the sensor's steps.
     missing : tuple of Finding
         What the model misses, most important first.
     suspects : tuple of Finding
         All that was tested, each by itself.
     n_tests : int
         Tests that share `LEVEL`.
-    independent : float
-        Samples without memory that determine a mean as well as all do.
-    every : int
-        Samples to a block; all tests but that of whiteness see means of these.
     whiteness : Whiteness
     patterns : tuple of Pattern
         Means of the residual over inputs, loads, modelled output and branches.
@@ -113,30 +103,21 @@ class OutputCheck:
 
     output: str
     unit: str
-    n_samples: int
     sample_time: float | None
     span: float
-    deviation: float
     rmse: float
-    sensor_noise: float | None
-    resolution: float
+    mean_error: float
+    exact: bool
     missing: tuple[Finding, ...]
     suspects: tuple[Finding, ...]
     n_tests: int
-    independent: float
-    every: int
     whiteness: Whiteness
     patterns: tuple[Pattern, ...]
 
     @property
-    def exact(self) -> bool:
-        """Whether nothing is left but rounding, or the sensor's steps."""
-        return self.rmse <= max(ROUNDING * self.span, STEP * self.resolution)
-
-    @property
     def useless(self) -> bool:
-        """Whether the mean of the measured output would be off by less."""
-        return self.rmse >= self.deviation
+        """Whether the mean is about as good; see `mckibben.comparison.choosing.useful`."""
+        return not useful(self.rmse, self.mean_error)
 
     @property
     def right(self) -> bool:
@@ -147,13 +128,7 @@ class OutputCheck:
         """Return it for JSON."""
         found = asdict(self)
         found["range"] = found.pop("span")
-        found["independent_samples"] = found.pop("independent")
-        found["samples_to_a_block"] = found.pop("every")
-        return found | {
-            "right": self.right,
-            "level": LEVEL,
-            "p_whiteness": self.whiteness.p_value,
-        }
+        return found | {"right": self.right, "level": LEVEL}
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,59 +212,78 @@ def check(
         return check_runs(model, runs_of(model, listed(recordings)), tell)
 
 
-def check_runs(model: Block, runs: Sequence[Run], tell: Tell | None = None) -> Validation:
-    """Check a model by what it made of recordings, running free; see `check`."""
-    with one_blas_thread():
-        return _checked(model, runs, tell)
+def check_runs(
+    model: Block, runs: Sequence[Run], tell: Tell | None = None, means: Array | None = None
+) -> Validation:
+    """Check a model by what it made of recordings, running free; see `check`.
 
-
-def _checked(model: Block, runs: Sequence[Run], tell: Tell | None) -> Validation:
+    Parameters
+    ----------
+    means : array, shape (m,), optional
+        Of the training outputs, which the model has to beat; default those of the recordings.
+    """
     every = block_length(model, runs)
     tested = [run for run in runs if len(run.inputs) // every >= FEWEST_BLOCKS] or list(runs)
-    outputs = tuple(
-        _output(model, runs, tested, every, place)
-        for place in one_by_one(range(len(model.outputs)), tell)
-    )
+    if means is None:
+        means = np.concatenate([run.measured for run in runs]).mean(axis=0)
+    with one_blas_thread():
+        outputs = tuple(
+            _output(model, runs, tested, every, place, float(means[place]))
+            for place in one_by_one(range(len(model.outputs)), tell)
+        )
     names = tuple(run.recording.name for run in runs)
     untested = tuple(run.recording.name for run in runs if run not in tested)
     return Validation(model.kind, names, outputs, untested, tuple(runs))
 
 
 def _output(
-    model: Block, runs: Sequence[Run], tested: Sequence[Run], every: int, place: int
+    model: Block, runs: Sequence[Run], tested: Sequence[Run], every: int, place: int, mean: float
 ) -> OutputCheck:
+    channel = model.outputs[place]
     residuals = [run.residual[:, place] for run in runs]
     measured = [run.measured[:, place] for run in runs]
-    whole = np.concatenate(measured)
-    span, resolution = float(np.ptp(whole)), _resolution(measured)
-    rmse = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
-    if rmse <= max(ROUNDING * span, STEP * resolution):
+    span, rmse = float(np.ptp(np.concatenate(measured))), _rms(residuals)
+    exact = rmse <= max(ROUNDING * span, STEP * _resolution(measured))
+    if exact:
         # what rounding follows is the arithmetic, or the sensor's steps
         residuals = [0.0 * e for e in residuals]
-    table = suspects(model, tested, place, every)
+    groups, tables = suspects(model, tested, place, every)
     left = [averaged(e, every) for e, run in zip(residuals, runs, strict=True) if run in tested]
-    regression = Regression(left, table.tables)
-    n_tests = len(model.outputs) * len(table.groups)
-    search = _Search(regression, left, table.groups, LEVEL / n_tests)
-    levels = [noise_level(y, span) for y in measured if len(y) > 1]
-    known = [level for level in levels if np.isfinite(level)]
+    regression = Regression(left, tables)
+
+    def pattern(
+        against: str, name: str, unit: str, values: list[Array], way: int | None = None
+    ) -> Pattern:
+        means = [averaged(x, every) for x in values]
+        branches = None if way is None else [table[:, way] for table in tables]
+        return Pattern(against, name, unit, bins(left, means, every, regression, branches))
+
+    patterns = [
+        pattern(
+            *(AGAINST[group.kind], group.channel, runs[0].recording.units[group.channel]),
+            [run.recording[group.channel] for run in tested],
+            group.columns[0] if group.kind == "hysteresis" else None,
+        )
+        for group in groups
+        if group.kind in AGAINST
+    ]
+    modelled = [run.modelled[:, place] for run in tested]
+    patterns.append(pattern("output", channel.name, channel.unit, modelled))
+    n_tests = len(model.outputs) * len(groups)
+    search = _Search(regression, left, groups, LEVEL / n_tests)
     return OutputCheck(
-        output=model.outputs[place].name,
-        unit=model.outputs[place].unit,
-        n_samples=whole.size,
+        output=channel.name,
+        unit=channel.unit,
         sample_time=runs[0].recording.sample_time,
         span=span,
-        deviation=float(np.std(whole)),
         rmse=rmse,
-        sensor_noise=float(np.median(known)) if known else None,
-        resolution=resolution,
+        mean_error=_rms([y - mean for y in measured]),
+        exact=exact,
         missing=search.missing(),
-        suspects=tuple(search.finding(group, ()) for group in table.groups),
+        suspects=tuple(search.finding(group) for group in groups),
         n_tests=n_tests,
-        independent=regression.noise.effective_sample_size(sum(map(len, left))),
-        every=every,
         whiteness=whiteness(residuals),
-        patterns=patterns(model, tested, place, left, table, regression),
+        patterns=tuple(patterns),
     )
 
 
@@ -300,48 +294,42 @@ class _Search:
         self, regression: Regression, left: Sequence[Array], groups: Sequence[Group], level: float
     ) -> None:
         self.regression, self.groups, self.level = regression, groups, level
-        whole = np.concatenate(left)
-        self.n, self.squares = whole.size, float(whole @ whole)
-        self.about_mean = self.squares - whole.size * float(whole.mean()) ** 2
+        self.residual = np.concatenate(left)
 
     def missing(self) -> tuple[Finding, ...]:
         """Return what is certain, each beside those before."""
         found: list[Finding] = []
         known: tuple[int, ...] = ()
-        for wave in (
-            [group for group in self.groups if group.kind not in LAST],
-            *([group for group in self.groups if group.kind == kind] for kind in LAST),
-        ):
-            left = [group for group in wave if group.kind not in ALONE or not found]
-            while certain := [g for g in left if self._test(g, known).p_value <= self.level]:
+        for kinds in ({g.kind for g in self.groups} - set(LAST), *({kind} for kind in LAST)):
+            left = [g for g in self.groups if g.kind in kinds and not (found and g.kind in ALONE)]
+            while certain := [g for g in left if self._certain(g, known)]:
                 best = max(certain, key=lambda group: self._gain(group, known))
-                others = [
-                    group.kind
+                others = {
+                    group.kind: None
                     for group in certain
                     if group is not best
-                    and self._test(best, (*known, *group.beside, *group.columns)).p_value
-                    > self.level
-                ]
-                found.append(self.finding(best, known, tuple(dict.fromkeys(others))))
+                    and not self._certain(best, (*known, *group.beside, *group.columns))
+                }
+                found.append(self.finding(best, known, tuple(others)))
                 known = (*known, *best.columns)
                 left = [g for g in left if g is not best and g.kind not in (*others, *ALONE)]
         return tuple(found)
 
     def finding(
-        self, group: Group, known: tuple[int, ...], others: tuple[str, ...] = ()
+        self, group: Group, known: tuple[int, ...] = (), others: tuple[str, ...] = ()
     ) -> Finding:
         """Return what a group explains beside others."""
         test = self._test(group, known)
-        coefficient, total = None, self.about_mean
+        coefficient, about = None, float(self.residual.mean())
         if group.kind == "lag":
             coefficient = float(group.delay)
         elif group.kind == "offset":
-            coefficient = float(self.regression.coefficients(group.columns)[0])
-            total = self.squares
+            coefficient, about = self.regression.coefficient(group.columns[0]), 0.0
+        total = float(np.sum((self.residual - about) ** 2))
         return Finding(
             *(group.kind, group.channel, test.p_value),
             share=min(test.explained / total, 1.0) if total > 0 else 0.0,
-            size=float(np.sqrt(test.explained / self.n)),
+            size=float(np.sqrt(test.explained / self.residual.size)),
             coefficient=coefficient,
             or_kinds=others,
         )
@@ -349,6 +337,9 @@ class _Search:
     def _test(self, group: Group, known: Sequence[int]) -> FTest:
         beside = set(known) | set(group.beside)
         return self.regression.test(group.columns, tuple(sorted(beside - set(group.columns))))
+
+    def _certain(self, group: Group, known: tuple[int, ...]) -> bool:
+        return self._test(group, known).p_value <= self.level
 
     def _gain(self, group: Group, known: tuple[int, ...]) -> float:
         """Return how much more a group explains than noise would, by Mallows' C_p, beside the mean.
@@ -359,6 +350,10 @@ class _Search:
         new = {*group.beside, *group.columns} - before
         found = self.regression.test(tuple(sorted(new)), tuple(sorted(before)))
         return found.explained - 2 * found.by_noise
+
+
+def _rms(pieces: Sequence[Array]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(pieces) ** 2)))
 
 
 def _resolution(measured: Sequence[Array]) -> float:

@@ -1,10 +1,10 @@
-"""A model described on recordings: its equations, its numbers and how sure they are, how it answers."""
+"""A model described on recordings: equations, numbers and how sure they are, frequency response."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,15 +12,10 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.equations import quantities, written
+from mckibben.blocks.equations import Quantity, quantities, written
 from mckibben.blocks.inverse import commands
 from mckibben.blocks.notation import Written
-from mckibben.diagnosis.responses import (
-    DescribingFunction,
-    FrequencyResponse,
-    describing_functions,
-    frequency_responses,
-)
+from mckibben.diagnosis.responses import FrequencyResponse, frequency_responses
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.uncertainty import (
@@ -31,6 +26,7 @@ from mckibben.estimators.core.uncertainty import (
     vanishing,
 )
 from mckibben.recording import Recording
+from mckibben.system.atomic import plain
 
 LEVEL = 0.95
 """Of intervals."""
@@ -43,18 +39,14 @@ MOST_OPERATIONS = 200_000_000
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Parameter(Quantity):
     """One number of a model.
 
     Parameters
     ----------
-    name, symbol : str
-        In words, and in LaTeX.
+    name, symbol, unit, meaning : str
+        As `mckibben.blocks.equations.Quantity` has them.
     value : float
-    unit : str
-        Empty for none.
-    meaning : str
-        In words.
     status : str
         ``estimated``; ``fixed``: chosen, or at a bound; ``undetermined`` by the recordings;
         ``unknown``: no parameter of such a model means anything alone.
@@ -64,11 +56,7 @@ class Parameter:
         In which it lies by 95 %.
     """
 
-    name: str
-    symbol: str
     value: float
-    unit: str
-    meaning: str
     status: str
     standard_error: float | None
     interval: tuple[float, float] | None
@@ -84,14 +72,8 @@ class ModelDescription:
         Its equations with its numbers, in LaTeX.
     parameters : tuple of Parameter
         In the order of ``block.pack()``.
-    n_effective : float
-        Independent samples that determine the mean of a residual as well as the recordings do.
-    condition : float
-        Of the sensitivities to the parameters, each scaled by its size.
     frequency_responses : tuple of FrequencyResponse
         Of linear models.
-    describing_functions : tuple of DescribingFunction
-        Of all others.
     recordings : tuple of str
         Names of those that all this rests on.
     fitted : bool
@@ -100,21 +82,18 @@ class ModelDescription:
 
     written: Written
     parameters: tuple[Parameter, ...]
-    n_effective: float
-    condition: float
     frequency_responses: tuple[FrequencyResponse, ...]
-    describing_functions: tuple[DescribingFunction, ...]
     recordings: tuple[str, ...]
     fitted: bool
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as a JSON-ready dict; what is not known is None."""
-        found: dict[str, Any] = _plain(self)
+        found: dict[str, Any] = plain(self)
         return found
 
 
 def describe(
-    block: Block, recordings: Sequence[Recording], output: str | None = None, *, fitted: bool = True
+    block: Block, recordings: Sequence[Recording], *, fitted: bool = True
 ) -> ModelDescription:
     """Describe a model on recordings, usually those it was fitted to.
 
@@ -127,8 +106,6 @@ def describe(
         The model.
     recordings : sequence of Recording
         With its inputs and outputs.
-    output : str, optional
-        The only output to show responses of; default all.
     fitted : bool
         Whether the model was fitted to these recordings.
 
@@ -137,59 +114,47 @@ def describe(
     DataError
         If there are no recordings, or a channel is absent.
     """
+    from scipy.special import stdtrit
+
     if not recordings:
         raise DataError("there are no recordings to describe a model on", remedy="give one or more")
-    names = [channel.name for channel in block.outputs]
-    if output is not None and output not in names:
-        raise DataError(
-            f"the model gives {', '.join(names)}", channel=output, remedy="name one of those"
-        )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        condition, covariance, n_effective = uncertainty(block, recordings)
-        known = np.isfinite(np.diag(covariance))
-        half = _half_width(n_effective - int(known.sum()))
-        responses = frequency_responses(block, recordings, covariance, half, output)
-        loops = () if responses else describing_functions(block, recordings, output)
+        covariance, n_effective = uncertainty(block, recordings)
+        freedom = n_effective - np.isfinite(np.diag(covariance)).sum()
+        half = float(stdtrit(np.maximum(freedom, 1.0), 0.5 + LEVEL / 2))
+        responses = frequency_responses(block, recordings, covariance, half)
+    names = tuple(recording.name for recording in recordings)
     return ModelDescription(
-        written(block),
-        parameters(block, covariance, half),
-        n_effective,
-        condition,
-        responses,
-        loops,
-        tuple(recording.name for recording in recordings),
-        fitted,
+        written(block), parameters(block, covariance, half), responses, names, fitted
     )
 
 
-def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[float, Array, float]:
-    """Return condition and covariance of a model's parameters, and independent samples."""
-    names = [channel.name for channel in block.outputs]
-    inputs = [channel.name for channel in block.inputs]
-    share = 1.0
-    if not _means_nothing(block):
-        share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
+def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, float]:
+    """Return the covariance of a model's parameters, and independent samples; NaN where not known."""
+    if _means_nothing(block):
+        return unknown(block), np.nan
+    outputs, inputs = ([c.name for c in some] for some in (block.outputs, block.inputs))
+    share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
     kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
     share = sum(map(len, kept)) / sum(map(len, recordings))
     runs = tuple(
         Run(
-            *(r.name, r.matrix(inputs), r.matrix(names), np.empty((len(r), 0))),
+            *(r.name, r.matrix(inputs), r.matrix(outputs), np.empty((len(r), 0))),
             *(np.ones(len(r), dtype=bool), r.sample_time),
         )
         for r in kept
     )
     data = TrainingData(runs, block.inputs, block.outputs)
     residual = data.target - simulate_started([block], data)[0]
-    ends = np.cumsum([run.outputs.size for run in data.runs])[:-1]
-    left = [part.reshape(-1, len(names)) for part in np.split(residual, ends)]
-    if _means_nothing(block) or not np.isfinite(residual).all():
-        return np.nan, unknown(block), np.nan
+    if not np.isfinite(residual).all():
+        return unknown(block), np.nan
+    ends = np.cumsum([run.outputs.size for run in runs])[:-1]
+    left = [part.reshape(-1, len(outputs)) for part in np.split(residual, ends)]
     n = sum(map(len, left))
     n_effective = min(m.effective_sample_size(n) for m in autoregressions(left)) / share
     places = np.flatnonzero(fixed(block)).tolist()
-    condition, covariance = covariance_of(block, data, residual, places, simulate_started)
-    return condition, share * covariance, n_effective
+    return share * covariance_of(block, data, residual, places, simulate_started)[1], n_effective
 
 
 def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Parameter, ...]:
@@ -197,25 +162,20 @@ def parameters(block: Block, covariance: Array, half_width: float) -> tuple[Para
 
     What is rounding beside the others, as a weight of 1e-17, is shown as 0.
     """
-    values = block.pack()
-    shown = np.where(vanishing(values), 0.0, values).tolist()
-    errors = np.sqrt(np.diag(covariance)).tolist()
+    values, errors, chosen = block.pack(), np.sqrt(np.diag(covariance)), fixed(block)
+    known = np.isfinite(errors)
     other = "unknown" if _means_nothing(block) else "undetermined"
-    found = []
-    for what, value, error, chosen in zip(
-        quantities(block), shown, errors, fixed(block).tolist(), strict=True
-    ):
-        known = np.isfinite(error)
-        half = half_width * error
-        status = "estimated" if known else "fixed" if chosen else other
-        found.append(
-            Parameter(
-                *(what.name, what.symbol, value, what.unit, what.meaning, status),
-                error if known else None,
-                (value - half, value + half) if known else None,
-            )
+    status = np.where(known, "estimated", np.where(chosen, "fixed", other)).tolist()
+    shown = np.where(vanishing(values), 0.0, values)
+    ends = np.transpose(shown + half_width * np.outer([-1, 1], errors))
+    return tuple(
+        Parameter(
+            *(what.name, what.symbol, what.unit, what.meaning, float(shown[place]), status[place]),
+            float(errors[place]) if known[place] else None,
+            (float(ends[place, 0]), float(ends[place, 1])) if known[place] else None,
         )
-    return tuple(found)
+        for place, what in enumerate(quantities(block))
+    )
 
 
 def fixed(block: Block) -> NDArray[np.bool_]:
@@ -237,23 +197,3 @@ def _operations(block: Block, recordings: Sequence[Recording]) -> float:
     except ModelError:
         usual = float(block.n_parameters)
     return usual * block.n_parameters * sum(map(len, recordings))
-
-
-def _half_width(freedom: float) -> float:
-    """Return half an interval, in standard errors."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(max(freedom, 1.0), 0.5 + LEVEL / 2)) if np.isfinite(freedom) else np.nan
-
-
-def _plain(value: Any) -> Any:
-    """Return dataclasses and arrays as JSON holds them."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, tuple | list):
-        return [_plain(item) for item in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value

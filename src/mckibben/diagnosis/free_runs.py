@@ -15,11 +15,8 @@ from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 
-FEWEST = 60
-"""Samples of all recordings together below which nothing can be tested."""
-
-SHORTEST = 10
-"""Samples of one recording."""
+FEWEST, SHORTEST = 60, 10
+"""Samples that can be tested at least, of all recordings together and of each."""
 
 SHIFTS = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
 """Root mean squares of the residual by which the first measured output may be off."""
@@ -40,16 +37,12 @@ class Run:
         What the model is given.
     measured, modelled : array, shape (n, m)
         Outputs; the model runs free.
-    start_chosen : bool
-        Whether its memory starts from that of a few starts which leaves least of the whole recording;
-        else as a leaderboard has it.
     """
 
     recording: Recording
     inputs: Array
     measured: Array
     modelled: Array
-    start_chosen: bool = False
 
     @property
     def residual(self) -> Array:
@@ -79,8 +72,7 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
             modelled = _modelled(block, recording, outputs, recordings)
         measured = recording.matrix(outputs)
         refuse_runaway(block, recording, modelled, measured)
-        chosen = block.n_states > 0 and not recording.meta.get(PERIODIC)
-        found.append(Run(recording, recording.matrix(inputs), measured, modelled, chosen))
+        found.append(Run(recording, recording.matrix(inputs), measured, modelled))
     return tuple(found)
 
 
@@ -90,29 +82,23 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
         raise DataError("there is no recording to check the model on", remedy="give at least one")
     for recording in recordings:
         _refuse(recording, block, recordings[0].sample_time)
-    total = sum(map(len, recordings))
+    total, source = sum(map(len, recordings)), recordings[0].source
     if total < FEWEST:
         raise DataError(
             f"{total} samples are too few to tell a wrong model from noise",
-            file=recordings[0].source,
+            file=source,
             remedy=f"record at least {FEWEST}, better ten cycles with 50 or more each",
         )
     driven = [c.name for c in block.inputs if c.name not in block.scheduling]
-    if all(_constant(recordings, name) for name in driven):
+    still = [driven[0]] if all(_constant(recordings, name) for name in driven) else []
+    still += [c.name for c in block.outputs if _constant(recordings, c.name)]
+    if still:
         raise DataError(
-            "the input is constant, so that nothing tells what the model does when it moves",
-            file=recordings[0].source,
-            channel=driven[0],
-            remedy="record while it moves",
+            "the channel is constant, so that nothing tells what the model does when it moves",
+            file=source,
+            channel=still[0],
+            remedy="record while it moves, or name another column with --column",
         )
-    for channel in block.outputs:
-        if _constant(recordings, channel.name):
-            raise DataError(
-                "the output is constant, as of a sensor that is stuck",
-                file=recordings[0].source,
-                channel=channel.name,
-                remedy="record while it moves, or name another column with --column",
-            )
 
 
 def _modelled(
@@ -130,37 +116,28 @@ def _modelled(
     tried = [block.simulate(recording).matrix(outputs), free]
     if not np.mean((tried[0] - free) ** 2) > 0:
         return free
-    measured = recording.matrix(outputs)
+    measured, name = recording.matrix(outputs), outputs[0]
     noise = float(np.sqrt(np.mean((measured[:, 0] - free[:, 0]) ** 2)))
     for shift in SHIFTS:
         first = np.append(measured[0, 0] + shift * noise, measured[1:, 0])
-        units = {outputs[0]: recording.units[outputs[0]]}
-        start = measured_start(
-            block, recording.with_channels(units, **{outputs[0]: first}), outputs
-        )
+        moved = recording.with_channels({name: recording.units[name]}, **{name: first})
+        start = measured_start(block, moved, outputs)
         tried.append(block.simulate(recording, initial=start.tolist()).matrix(outputs))
     errors = [float(np.sum((measured - one) ** 2)) for one in tried]
     return tried[int(np.nanargmin(errors))] if np.isfinite(errors).any() else free
 
 
 def _refuse(recording: Recording, block: Block, step: float | None) -> None:
-    for what, channels in (("reads", block.inputs), ("gives", block.outputs)):
-        for channel in channels:
-            if channel.name not in recording:
-                raise DataError(
-                    f"the model {what} this channel, and the recording lacks it",
-                    file=recording.source,
-                    channel=channel.name,
-                    remedy=f"name its column: --column {channel.name}=COLUMN",
-                )
-            if recording.units[channel.name] != channel.unit:
-                raise DataError(
-                    f"the model wants {channel.unit or 'no unit'}, the recording has "
-                    f"{recording.units[channel.name] or 'no unit'}",
-                    file=recording.source,
-                    channel=channel.name,
-                    remedy="convert the recording, or name its unit when reading it",
-                )
+    channels = (*block.inputs, *block.outputs)
+    units = recording.select([channel.name for channel in channels]).units
+    for channel in channels:
+        if (unit := units[channel.name]) != channel.unit:
+            raise DataError(
+                f"the model wants {channel.unit or 'no unit'}, the recording has {unit or 'no unit'}",
+                file=recording.source,
+                channel=channel.name,
+                remedy="convert the recording, or name its unit when reading it",
+            )
     if len(recording) < SHORTEST:
         raise DataError(
             f"{len(recording)} samples are too few: what a residual remembers is longer",
@@ -168,9 +145,7 @@ def _refuse(recording: Recording, block: Block, step: float | None) -> None:
             remedy=f"leave this recording out, or record at least {SHORTEST} samples",
         )
     own = recording.sample_time
-    if (own is None) != (step is None) or (
-        own is not None and step is not None and abs(own - step) > SAME_TIME * step
-    ):
+    if abs((own or 0.0) - (step or 0.0)) > SAME_TIME * (step or 0.0):
         said = ["without time" if t is None else f"{t:g} s" for t in (step, own)]
         raise DataError(
             f"recordings differ in sample time: {said[0]} and {said[1]}",

@@ -8,28 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
-from mckibben.diagnosis.free_runs import Run
 from mckibben.diagnosis.regression import Regression
-from mckibben.diagnosis.suspects import Suspects, averaged
 from mckibben.statistics import NORMAL_95
 
-TESTED = 12
-"""Lags that are tested together at most."""
+TESTED, PER_LAG = 12, 20
+"""Lags that are tested together at most, and samples of all recordings to one of them at least."""
 
-PER_LAG = 20
-"""Samples to a lag that is tested, of all recordings, at least."""
-
-SHOWN = 50
-"""Lags that are drawn one by one at most, and as many thinned ones beyond."""
-
-PAIRS = 5
-"""Pairs of samples of one recording to a lag at least, as a multiple of the lag."""
+SHOWN, PAIRS = 50, 5
+"""Lags that are drawn one by one at most; pairs of samples of a recording to a lag, as its multiple."""
 
 NORMAL_99 = 2.5758
 """Standard deviations in which 99 % of a normal distribution lie."""
-
-Ways = Sequence[Array] | None
 
 BINS = 10
 """Bins of as many samples each."""
@@ -100,86 +89,57 @@ def whiteness(residuals: Sequence[Array]) -> Whiteness:
     """
     from scipy.special import chdtrc
 
-    room = max(map(len, residuals)) // (PAIRS + 1)
+    room, n = max(map(len, residuals)) // (PAIRS + 1), sum(map(len, residuals))
     lags = np.arange(1, min(SHOWN, room) + 1)
     if room > SHOWN:
         lags = np.union1d(lags, np.geomspace(SHOWN, room, SHOWN).astype(int))
-    n = sum(map(len, residuals))
     mean = float(np.concatenate(residuals).mean())
     left = [e - mean for e in residuals]
     power = float(sum(e @ e for e in left))
     found, scatter = np.zeros(lags.size), np.zeros(lags.size)
     for place, lag in enumerate(lags.tolist()):
-        for e in (e for e in left if len(e) > lag):
-            products = e[lag:] * e[:-lag]
-            # the mean was taken off: what noise itself would give is below zero
-            found[place] += products.sum() + len(products) / n * power / n
-            scatter[place] += products @ products
-    tested = min(TESTED, SHOWN, room, n // PER_LAG)
-    deviation = np.sqrt(scatter)
+        products = np.concatenate([e[lag:] * e[: len(e) - lag] for e in left if len(e) > lag])
+        # the mean was taken off: what noise itself would give is below zero
+        found[place] = products.sum() + len(products) / n * power / n
+        scatter[place] = products @ products
+    tested, deviation = min(TESTED, room, n // PER_LAG), np.sqrt(scatter)
     ratio = np.divide(found, deviation, out=np.zeros(lags.size), where=deviation > 0)
     p_value = float(chdtrc(tested, float(np.sum(ratio[:tested] ** 2)))) if tested else None
-    size = power if power > 0 else 1.0
-    band = NORMAL_99 * deviation / size
-    return Whiteness(
-        tuple(lags.tolist()), tuple((found / size).tolist()), tuple(band.tolist()), tested, p_value
-    )
+    by_lag = [(x / (power or 1.0)).tolist() for x in (found, NORMAL_99 * deviation)]
+    return Whiteness(tuple(lags.tolist()), tuple(by_lag[0]), tuple(by_lag[1]), tested, p_value)
 
 
-def patterns(
-    block: Block,
-    runs: Sequence[Run],
-    output: int,
-    left: Sequence[Array],
-    table: Suspects,
-    regression: Regression,
-) -> tuple[Pattern, ...]:
-    """Return means of a residual, averaged over blocks (n,), over all that moves and over branches."""
-    found = []
-
-    def add(against: str, name: str, unit: str, values: Sequence[Array], ways: Ways = None) -> None:
-        parts = [averaged(x, table.every) for x in values]
-        bins = _bins(left, parts, table.every, regression, ways)
-        found.append(Pattern(against, name, unit, bins))
-
-    for group in table.groups:
-        if group.kind in ("curve", "load", "hysteresis"):
-            samples = [run.recording[group.channel] for run in runs]
-            unit = runs[0].recording.units[group.channel]
-            against = {"curve": "input", "load": "load", "hysteresis": "branch"}[group.kind]
-            ways = None
-            if group.kind == "hysteresis":
-                ways = [np.sign(part[:, group.columns[0]]) for part in table.tables]
-            add(against, group.channel, unit, samples, ways)
-    channel = block.outputs[output]
-    add("output", channel.name, channel.unit, [run.modelled[:, output] for run in runs])
-    return tuple(found)
-
-
-def _bins(
+def bins(
     left: Sequence[Array],
     values: Sequence[Array],
     every: int,
     regression: Regression,
-    ways: Ways,
+    branches: Sequence[Array] | None = None,
 ) -> tuple[Bin, ...]:
-    """Return means where values are in bins of as many samples each, and on either branch."""
+    """Return means of a residual where values are in bins of as many samples each.
+
+    Parameters
+    ----------
+    left, values : sequence of array, shape (n,)
+        Means over blocks of ``every`` samples.
+    branches : sequence of array, shape (n,), optional
+        Positive on the rising branch and negative on the falling one, to take them apart.
+    """
     ends = np.unique(np.quantile(np.concatenate(values), np.linspace(0, 1, BINS + 1)))
-    branches: Sequence[tuple[str, int]] = (("", 0),)
-    if ways is not None:
-        branches = (("rising", 1), ("falling", -1))
-    ways = [np.zeros(len(x)) for x in values] if ways is None else ways
+    ways = (
+        [np.zeros(len(x)) for x in values] if branches is None else [np.sign(x) for x in branches]
+    )
+    places = [np.clip(np.searchsorted(ends, x, "right") - 1, 0, ends.size - 2) for x in values]
+    labels = {"": 0} if branches is None else {"rising": 1, "falling": -1}
     found = []
     for k in range(ends.size - 1):
-        place = [np.clip(np.searchsorted(ends, x, "right") - 1, 0, ends.size - 2) for x in values]
-        for label, way in branches:
-            chosen = [(p == k) & (w == way) for p, w in zip(place, ways, strict=True)]
+        for label, way in labels.items():
+            chosen = [(p == k) & (w == way) for p, w in zip(places, ways, strict=True)]
             n = int(sum(own.sum() for own in chosen))
-            if n == 0:
-                continue
-            weights = [own / n for own in chosen]
-            mean = float(sum(w @ e for w, e in zip(weights, left, strict=True)))
-            half = NORMAL_95 * regression.deviation(weights)
-            interval = (mean - half, mean + half)
-            found.append(Bin(label, float(ends[k]), float(ends[k + 1]), n * every, mean, interval))
+            if n:
+                weights = [own / n for own in chosen]
+                mean = float(sum(w @ e for w, e in zip(weights, left, strict=True)))
+                half = NORMAL_95 * regression.deviation(weights)
+                ends_of = float(ends[k]), float(ends[k + 1])
+                found.append(Bin(label, *ends_of, n * every, mean, (mean - half, mean + half)))
     return tuple(found)

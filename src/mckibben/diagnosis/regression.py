@@ -1,72 +1,53 @@
 """Regression of residuals on what they may depend on, where neighbours are alike and variances differ.
 
 Noise is an autoregression of the greatest restricted likelihood beside *all* columns (Harville, JASA 72,
-1977), so that the freedom that columns take makes it look no rougher than it is; its order is at most
-that of Burg's method by BIC. A test has the larger p-value of two in the whitened series, as either
-alone rejects too often: the F-test, with the freedom by which that noise is known (Satterthwaite), where
-variances differ; and Hotelling's T² by the covariance HC3 (MacKinnon and White, J. Econometrics 29,
-1985) where samples are few. ``benchmarks/validation.py`` measures what comes of them.
-
-Pieces (one per recording) are whitened each by itself; nothing crosses from one into the next. Whatever
-asks whether a curve, a loop or a trend is in a recording is such a test, beside the columns that it may
-be without being one.
+1977), so that the freedom that columns take makes it look no rougher than it is. A test has the larger
+p-value of two in the whitened series, as either alone rejects too often: the F-test, with the freedom by
+which that noise is known (Satterthwaite); and Hotelling's T² by the covariance HC3 (MacKinnon and White,
+J. Econometrics 29, 1985). ``benchmarks/validation.py`` measures what comes of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.statistics import Autoregression, autoregression
 
-MOST_ORDER = 6
-"""Largest order of the noise model."""
-
-SAMPLES_PER_TERM = 16
-"""Beside those that columns take, at least."""
+MOST_ORDER, SAMPLES_PER_TERM = 6, 16
+"""Of the noise model: the largest order, and samples to a term beside those that columns take."""
 
 SMOOTHEST = 3.8
 """Partial correlations of noise are at most the tanh of this: 0.999."""
 
-STEP = 0.02
-"""Of finite differences by these."""
+STEP, LEAST_CURVATURE = 0.02, 0.1
+"""Of the likelihood: step of finite differences, and the least curvature along a partial correlation."""
 
-LEAST_CURVATURE = 0.1
-"""Of the likelihood, so that what the data do not determine has a large error and no infinite one."""
-
-DEPENDENT = 1e-9
-"""Share of the energy of columns below which what one adds to the others is rounding."""
-
-ROUNDING = 1e-12
-"""Energy that is added to every column, so that none vanishes when it is whitened."""
+DEPENDENT, ROUNDING = 1e-9, 1e-12
+"""Shares of the energy of columns: what adds less to others adds nothing; what is added to every one."""
 
 MOST_LEVERAGE = 0.9
 """Share of a sample in its own fit that is corrected for."""
 
-Places = Sequence[int]
+Places = tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class FTest:
+class FTest(NamedTuple):
     """A test of columns beside others.
 
     Parameters
     ----------
     p_value : float
         Probability that noise alone is followed as well.
-    freedom : int
-        Columns that add something to the others.
-    explained : float
-        Sum of squares of the series that they explain beside the others.
-    by_noise : float
-        What they would explain of noise alone, on average.
+    explained, by_noise : float
+        Sum of squares that the columns explain beside the others; what they would of noise, on average.
     """
 
     p_value: float
-    freedom: int
     explained: float
     by_noise: float
 
@@ -77,7 +58,7 @@ class Regression:
     Parameters
     ----------
     series : sequence of array, shape (n,)
-        One per recording, all at one sample time.
+        One per recording; nothing crosses from one into the next.
     columns : sequence of array, shape (n, k)
         A constant is one of them, or there is none.
 
@@ -88,19 +69,17 @@ class Regression:
     """
 
     def __init__(self, series: Sequence[Array], columns: Sequence[Array]) -> None:
-        tables = [np.column_stack([x, e]) for x, e in zip(columns, series, strict=True)]
-        whole = np.concatenate(tables)
+        whole = np.column_stack([np.concatenate(columns), np.concatenate(series)])
         size = np.sqrt(np.mean(whole**2, axis=0))
         self._size = np.where(size > 0, size, 1.0)
         self._plain = whole / self._size
-        self._ends = np.cumsum([len(table) for table in tables])[:-1]
-        tables = np.split(self._plain, self._ends)
-        self._partial, self._doubt = self._fitted_noise(tables)
-        order = self._partial.size
-        whitener = _whitener(self._partial)
+        self._ends = np.cumsum([len(piece) for piece in series])[:-1]
+        self._partial, self._doubt = self._fitted_noise()
+        order, whitener = self._partial.size, _whitener(self._partial)
         unit = Autoregression(-whitener[1:], 1.0, 0.0)
+        tables = np.split(self._plain, self._ends)
         self._white = np.concatenate([unit.whitened(table)[order:] for table in tables])
-        basis, _ = _basis(self._white[:, :-1])
+        basis = _basis(self._white[:, :-1])
         left = self._white[:, -1] - basis @ (basis.T @ self._white[:, -1])
         self._freedom = max(len(left) - basis.shape[1] - order, 1)
         self._variance = float(left @ left) / self._freedom
@@ -108,27 +87,19 @@ class Regression:
         deviation = float(np.sqrt(self._variance) * self._size[-1])
         variance = deviation**2 / float(np.prod(1 - np.tanh(self._partial) ** 2))
         self.noise = Autoregression(-whitener[1:], deviation, variance)
-        self._tested: dict[tuple[tuple[int, ...], tuple[int, ...]], FTest] = {}
+        self.test = cache(self._test)
 
-    def test(self, chosen: Places, beside: Places = ()) -> FTest:
+    def _test(self, chosen: Places, beside: Places = ()) -> FTest:
         """Test some of the columns beside others, all given by their places."""
-        key = (tuple(chosen), tuple(beside))
-        if key not in self._tested:
-            self._tested[key] = self._test(*key)
-        return self._tested[key]
-
-    def _test(self, chosen: Places, beside: Places) -> FTest:
         from scipy.special import fdtrc
 
         plain = _added(self._plain, chosen, beside)
         explained = float(np.sum((plain.T @ self._plain[:, -1]) ** 2)) * float(self._size[-1]) ** 2
-        by_noise = float(
-            sum(np.sum(self.noise.coloured(u) ** 2) for u in np.split(plain, self._ends))
-        )
+        by_noise = self._variance_along(np.split(plain, self._ends))
         new = _added(self._white, chosen, beside)
         q = new.shape[1]
         if q == 0 or self._variance <= 0:
-            return FTest(1.0, 0, explained, by_noise)
+            return FTest(1.0, explained, by_noise)
         along = new.T @ self._white[:, -1]
         unsure = self._unsure(chosen, beside, q)
         freedom = 2 / (2 / self._freedom + unsure)
@@ -140,23 +111,26 @@ class Regression:
         below = max(freedom - q + 1, 1.0)
         squared = along @ np.linalg.pinv(scores.T @ scores, hermitian=True) @ along
         differing = fdtrc(q, below, squared / q * below / max(freedom, below))
-        return FTest(float(max(alike, differing)), q, explained, by_noise)
+        return FTest(float(max(alike, differing)), explained, by_noise)
 
-    def coefficients(self, chosen: Places) -> Array:
-        """Return the coefficients of columns that follow the whitened series best, shape (k,)."""
-        places = list(chosen)
-        found = np.linalg.lstsq(self._white[:, places], self._white[:, -1], rcond=DEPENDENT)[0]
-        return np.asarray(found * self._size[-1] / self._size[places])
+    def coefficient(self, place: int) -> float:
+        """Return the coefficient of a column that follows the whitened series best, alone."""
+        column = self._white[:, place]
+        along = column @ self._white[:, -1] / (column @ column)
+        return float(along * self._size[-1] / self._size[place])
 
     def deviation(self, weights: Sequence[Array]) -> float:
         """Return the standard deviation that noise gives to a weighted sum of pieces, (n,) each."""
-        return float(np.sqrt(sum(float(np.sum(self.noise.coloured(w) ** 2)) for w in weights)))
+        return float(np.sqrt(self._variance_along(weights)))
 
-    def _fitted_noise(self, tables: Sequence[Array]) -> tuple[Array, Array]:
+    def _variance_along(self, ways: Sequence[Array]) -> float:
+        return float(sum(np.sum(self.noise.coloured(way) ** 2) for way in ways))
+
+    def _fitted_noise(self) -> tuple[Array, Array]:
         """Return what the noise's partial correlations are the tanh of, and its covariance."""
         from scipy.optimize import approx_fprime, minimize
 
-        fitted, _ = _basis(self._plain[:, :-1])
+        fitted = _basis(self._plain[:, :-1])
         left = self._plain[:, -1] - fitted @ (fitted.T @ self._plain[:, -1])
         spare = max(len(left) - fitted.shape[1], 0) // SAMPLES_PER_TERM
         # columns may have taken what is slow in the noise: so the whole is a start as well
@@ -166,9 +140,10 @@ class Regression:
         ]
         order = min(max(start.size for start in found), MOST_ORDER, spare)
         starts = [np.pad(start[:order], (0, max(order - start.size, 0))) for start in found]
+        tables = np.split(self._plain, self._ends)
         self._lagged = _lagged(tables, order)
         # of the rows that noise is known by: what is only in the first ones would be nothing there
-        _, inner = _basis(np.concatenate([table[order:, :-1] for table in tables]))
+        inner = _independent(np.concatenate([table[order:, :-1] for table in tables]))
         k = inner.shape[1]
         change = np.zeros((len(inner) + 1, k + 1))
         change[:-1, :k], change[-1, k] = inner, 1.0
@@ -199,51 +174,30 @@ class Regression:
 
         def power(partial: Array) -> float:
             products = _filtered(self._lagged, partial)
-            new = _log_size(products, [*beside, *chosen]) - _log_size(products, beside)
+            new = _log_size(products, (*beside, *chosen)) - _log_size(products, beside)
             return new / q - _sizes(self._small, partial)[1]
 
         slopes = approx_fprime(self._partial, power, STEP)
         return float(slopes @ self._doubt @ slopes)
 
 
-def f_test(
-    series: Sequence[Array], columns: Sequence[Array], beside: Sequence[Array] | None = None
-) -> FTest:
-    """Test whether pieces (n,) of a series follow columns (n, k) beside others (n, m).
-
-    `Regression` tests several groups of columns under one noise.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> wave, noise = np.sin(np.arange(500.0) / 9), np.cumsum(rng.normal(0, 0.02, 500))
-    >>> f_test([noise], [wave[:, np.newaxis]]).p_value > 0.05
-    True
-    >>> f_test([noise + 0.1 * wave], [wave[:, np.newaxis]]).p_value < 1e-6
-    True
-    """
-    k = columns[0].shape[1]
-    if beside is not None:
-        columns = [np.column_stack(both) for both in zip(columns, beside, strict=True)]
-    return Regression(series, columns).test(range(k), range(k, columns[0].shape[1]))
-
-
-def _basis(columns: Array) -> tuple[Array, Array]:
-    """Return an orthonormal basis of columns, (n, rank), and what it is of them, (k, rank)."""
+def _independent(columns: Array, energy: float = 0.0) -> Array:
+    """Return the weights, (k, rank), by which columns make an orthonormal basis."""
     energies, ways = np.linalg.eigh(columns.T @ columns)
-    kept = energies > DEPENDENT * float(energies.max(initial=1e-300))
-    change = ways[:, kept] / np.sqrt(energies[kept])
-    return columns @ change, change
+    kept = energies > DEPENDENT * (energy or float(energies.max(initial=1e-300)))
+    return np.asarray(ways[:, kept] / np.sqrt(energies[kept]))
+
+
+def _basis(columns: Array) -> Array:
+    """Return an orthonormal basis of columns, shape (n, rank)."""
+    return columns @ _independent(columns)
 
 
 def _added(table: Array, chosen: Places, beside: Places) -> Array:
     """Return an orthonormal basis of what chosen columns add to others, shape (n, rank)."""
-    known, _ = _basis(table[:, list(beside)])
-    new = table[:, list(chosen)]
+    known, new = _basis(table[:, list(beside)]), table[:, list(chosen)]
     rest = new - known @ (known.T @ new)
-    energies, ways = np.linalg.eigh(rest.T @ rest)
-    kept = energies > DEPENDENT * float((new**2).sum())
-    return np.asarray(rest @ ways[:, kept] / np.sqrt(energies[kept]))
+    return rest @ _independent(rest, float((new**2).sum()))
 
 
 def _lagged(tables: Sequence[Array], order: int) -> Array:

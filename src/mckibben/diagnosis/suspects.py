@@ -19,8 +19,8 @@ from mckibben.diagnosis.free_runs import Run
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import reversals
 
-PER_BRANCH = 24
-"""Blocks to a usual branch of the input."""
+PER_BRANCH, PER_COLUMN = 24, 6
+"""Blocks to a usual branch of the input, and to a column at least."""
 
 FEWEST, MOST = 400, 6000
 """Blocks looked at, at least where there are as many samples, and at most."""
@@ -33,9 +33,6 @@ WAYS = (0.05, 0.2, 0.6)
 
 HELD = 0.15
 """Share of the samples in holds from which creep is told from the loop."""
-
-PER_COLUMN = 6
-"""Blocks to a column, at least."""
 
 MOST_DELAY, LONGER = 50, 8
 """Samples that outputs are shifted by at most, and the shortest recording as a multiple of that."""
@@ -70,88 +67,74 @@ class Group:
     delay: int = 0
 
 
-@dataclass(frozen=True)
-class Suspects:
-    """The columns of all recordings, (blocks, k) each, of blocks of ``every`` samples; their groups."""
-
-    every: int
-    tables: tuple[Array, ...]
-    groups: tuple[Group, ...]
-
-    def of(self, kind: str, channel: str = "") -> Group | None:
-        """Return a group, or None."""
-        found = (g for g in self.groups if g.kind == kind and channel in ("", g.channel))
-        return next(found, None)
-
-
 def averaged(samples: Array, every: int) -> Array:
     """Return the means over blocks of so many samples, shape (n // every, ...)."""
     n = len(samples) // every
     return np.asarray(samples[: n * every].reshape(n, every, *samples.shape[1:]).mean(axis=1))
 
 
-def suspects(block: Block, runs: Sequence[Run], output: int, every: int) -> Suspects:
-    """Return what the residual of an output may follow, as means over blocks of so many samples.
+def suspects(
+    block: Block, runs: Sequence[Run], output: int, every: int
+) -> tuple[tuple[Group, ...], list[Array]]:
+    """Return what the residual of an output may follow: groups, and columns (blocks, k) of every run.
 
-    Groups that come first have room first where recordings are short.
+    Columns are means over blocks of so many samples. Groups that come first have room first where
+    recordings are short.
     """
     room = max(sum(len(run.inputs) // every for run in runs) // PER_COLUMN, 1)
-    parts: list[list[Array]] = [[] for _ in runs]
+    tables = [np.zeros((len(run.inputs) // every, 0)) for run in runs]
     groups: list[Group] = []
 
     def add(
         kind: str,
-        channel: str,
         columns: Sequence[Array],
-        beside: Sequence[int] = (),
+        channel: str = "",
+        beside: tuple[int, ...] = (0,),
         delay: int = 0,
     ) -> tuple[int, ...]:
-        first = sum(part.shape[1] for part in parts[0])
-        places = tuple(range(first, first + columns[0].shape[1]))
-        if places and places[-1] < room:
-            groups.append(Group(kind, channel, places, tuple(beside), delay))
-            for own, part in zip(parts, columns, strict=True):
-                own.append(averaged(part, every))
-            return places
-        return ()
+        first, more = tables[0].shape[1], columns[0].shape[1]
+        places = tuple(range(first, first + more))
+        if not 0 < more <= room - first:
+            return ()
+        groups.append(Group(kind, channel, places, beside, delay))
+        for i, part in enumerate(columns):
+            tables[i] = np.column_stack([tables[i], averaged(part, every)])
+        return places
 
     modelled = _scaled([run.modelled[:, output] for run in runs])
     causes = {name: _scaled(_samples(runs, name)) for name in _moving(block, runs)}
     driven = [name for name in causes if name in _driven(block)]
-    level = add("offset", "", [np.ones((len(y), 1)) for y in modelled])
+    add("offset", [np.ones((len(y), 1)) for y in modelled], beside=())
     delay = _best_delay(runs, output)
-    add("lag", "", [_lagging(y, delay) for y in modelled], level, delay)
+    add("lag", [_lagging(y, delay) for y in modelled], delay=delay)
     for name, x in causes.items():
         if name in driven:
-            places = add("curve", name, _hats(x, max(KNOTS // len(driven), 4)), level)
-            add("hysteresis", name, [_branches(part) for part in x], (*level, *places))
+            places = add("curve", _hats(x, max(KNOTS // len(driven), 4)), name)
+            add("hysteresis", [_branches(part) for part in x], name, (0, *places))
         else:
             acting = zip(x, modelled, strict=True)
-            add("load", name, [np.column_stack([load, load * y]) for load, y in acting], level)
-    add("drift", "", _trends(modelled), level)
-    add("speed", "", [_speeds(y) for y in modelled], level)
-    shortest = max(int(np.median(branch_lengths(block, runs))) // 2, 10)
-    longest = _longest_hold(list(causes), runs, shortest)
+            add("load", [np.column_stack([load, load * y]) for load, y in acting], name)
+    add("drift", _trends(modelled))
+    add("speed", [_speeds(y) for y in modelled])
+    longest = _longest_hold(block, runs, list(causes))
     if longest:
-        add("creep", "", [_creeping(y, longest) for y in modelled], level)
-    add("output", "", _hats(modelled, KNOTS), level)
+        add("creep", [_creeping(y, longest) for y in modelled])
+    add("output", _hats(modelled, KNOTS))
     own = np.eye(len(runs))[:, 1:]
-    add(
-        "runs", "", [np.tile(row, (len(y), 1)) for row, y in zip(own, modelled, strict=True)], level
-    )
-    return Suspects(every, tuple(np.concatenate(own, axis=1) for own in parts), tuple(groups))
+    add("runs", [np.tile(row, (len(y), 1)) for row, y in zip(own, modelled, strict=True)])
+    return tuple(groups), tables
 
 
 def block_length(block: Block, runs: Sequence[Run]) -> int:
     """Return how many samples make a block: few beside a branch, and not too many blocks in all."""
     sizes = [len(run.inputs) for run in runs]
-    branches = branch_lengths(block, runs)
+    branches = _branch_lengths(block, runs)
     usual = int(np.median(branches)) // PER_BRANCH if branches else 1
     most = max(int(np.median(sizes)) // (2 * PER_COLUMN), 1)
     return min(max(1, min(usual, sum(sizes) // FEWEST), -(-sum(sizes) // MOST)), most)
 
 
-def branch_lengths(block: Block, runs: Sequence[Run]) -> list[int]:
+def _branch_lengths(block: Block, runs: Sequence[Run]) -> list[int]:
     """Return the samples between turning points of driven inputs."""
     driven = [x for name in _driven(block) for x in _samples(runs, name) if np.ptp(x) > 0]
     return [int(length) for x in driven for length in np.diff(reversals(x))]
@@ -163,14 +146,13 @@ def _driven(block: Block) -> list[str]:
 
 def _moving(block: Block, runs: Sequence[Run]) -> list[str]:
     """Return the names of inputs, and of recorded causes that the model does not read, if they move."""
-    taken = [channel.name for channel in (*block.inputs, *block.outputs)]
+    inputs, outputs = ([c.name for c in channels] for channels in (block.inputs, block.outputs))
     others = [
         name
         for name in runs[0].recording.channels
-        if name.split("_")[0] in CAUSES and name not in taken
+        if name.split("_")[0] in CAUSES and name not in (*inputs, *outputs)
     ]
-    names = [channel.name for channel in block.inputs] + others
-    recorded = [name for name in names if all(name in run.recording for run in runs)]
+    recorded = [n for n in (*inputs, *others) if all(n in run.recording for run in runs)]
     return [name for name in recorded if np.ptp(np.concatenate(_samples(runs, name))) > 0]
 
 
@@ -188,9 +170,9 @@ def _hats(parts: Sequence[Array], knots: int) -> list[Array]:
     """Return piecewise-linear functions between knots that have as many samples between them."""
     at = np.unique(np.quantile(np.concatenate(parts), np.linspace(0, 1, knots)))
     return [
-        np.column_stack(
-            [np.zeros(part.size), *(np.interp(part, at, r) for r in np.eye(at.size)[1:])]
-        )[:, 1:]
+        np.array([np.interp(part, at, knot) for knot in np.eye(at.size)[1:]])
+        .reshape(-1, part.size)
+        .T
         for part in parts
     ]
 
@@ -211,15 +193,14 @@ def _lagging(modelled: Array, delay: int) -> Array:
 def _best_delay(runs: Sequence[Run], output: int) -> int:
     """Return by how many samples the modelled output is best shifted."""
     most = min(MOST_DELAY, min(len(run.inputs) for run in runs) // LONGER)
+    both = [(run.measured[:, output], run.modelled[:, output]) for run in runs]
 
     def left(delay: int) -> float:
-        total = 0.0
-        for run in runs:
-            # the same samples at every delay
-            y, modelled = run.measured[:, output], run.modelled[:, output]
-            kept = slice(most, len(y) - most)
-            total += float(np.sum((y[kept] - modelled[most - delay : len(y) - most - delay]) ** 2))
-        return total
+        # the same samples at every delay
+        return sum(
+            float(np.sum((y[most : len(y) - most] - x[most - delay : len(y) - most - delay]) ** 2))
+            for y, x in both
+        )
 
     return min(range(-most, most + 1), key=lambda delay: (left(delay), abs(delay)))
 
@@ -239,8 +220,9 @@ def _speeds(modelled: Array) -> Array:
     return np.column_stack([np.abs(rate), root, rate * modelled])
 
 
-def _longest_hold(names: Sequence[str], runs: Sequence[Run], shortest: int) -> int:
+def _longest_hold(block: Block, runs: Sequence[Run], names: Sequence[str]) -> int:
     """Return the samples of the longest hold of all inputs and loads; 0 where little is held."""
+    shortest = max(int(np.median(_branch_lengths(block, runs))) // 2, 10)
     tables = [run.recording.matrix(names) for run in runs]
     spans = np.ptp(np.concatenate(tables), axis=0).tolist()
     found = [hold.stop - hold.start for table in tables for hold in holds(table, spans, shortest)]

@@ -1,25 +1,21 @@
-"""Figures of what a model answers to sines: frequency responses and describing functions."""
+"""Figures of frequency responses."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
-from mckibben.numerals import numeral
 from mckibben.report import interactive
-from mckibben.report.drawing import N_AGES, Curve, Drawing, Panel, axis_label
+from mckibben.report.drawing import Curve, Drawing, Panel, axis_label
 
 if TYPE_CHECKING:
     from mckibben.blocks.fields import Channel
     from mckibben.diagnosis.description import ModelDescription
-    from mckibben.diagnosis.responses import DescribingFunction, FrequencyResponse
+    from mckibben.diagnosis.responses import FrequencyResponse
 
 
 def figures(description: ModelDescription) -> dict[str, list[list[interactive.Json]]]:
     """Return the figures of a description as pages hold them, by name."""
     drawn = {one.output.name: frequency_response(one) for one in description.frequency_responses}
-    drawn |= {one.output.name: describing_function(one) for one in description.describing_functions}
     return {f"response {name}": [interactive.plots(drawing)] for name, drawing in drawn.items()}
 
 
@@ -46,33 +42,6 @@ def frequency_response(found: FrequencyResponse) -> Drawing:
         panels.append(Panel("frequency [Hz]", label, tuple(curves), logarithmic=axes))
     note = "" if found.measured_frequency.size else "No frequency was recorded with high coherence."
     return Drawing(tuple(panels), stacked=True, note=note)
-
-
-def describing_function(found: DescribingFunction) -> Drawing:
-    """Draw gain and angle of the first harmonic over amplitude, for some rates, and of every cycle."""
-    panels: list[Panel] = []
-    shades = np.linspace(1, N_AGES, found.rate.size).round().astype(int).tolist()
-    for label, values, measured, modelled in (
-        (
-            _gain_label(found.input, found.output),
-            *(found.gain, found.measured_gain, found.modelled_gain),
-        ),
-        ("angle [deg]", found.angle, found.measured_angle, found.modelled_angle),
-    ):
-        first = not panels
-        curves = []
-        for rate, row, shade in zip(found.rate, values, shades, strict=True):
-            unit = f"{found.input.unit}/s".removeprefix("/")
-            name = "model" if np.isnan(rate) else f"model, {numeral(float(rate))} {unit}"
-            colour = "series-1" if len(shades) == 1 else f"age-{shade}"
-            curves.append(Curve(found.amplitude, row, name * first, colour))
-        if measured.size:
-            x = found.measured_amplitude
-            curves.append(Curve(x, measured, "recorded cycles" * first, "measured", "specks"))
-            curves.append(Curve(x, modelled, "model, same cycles" * first, "series-2", "rings"))
-        x_label = axis_label(f"amplitude of {found.input.name}", found.input.unit)
-        panels.append(Panel(x_label, label, tuple(curves)))
-    return Drawing(tuple(panels), stacked=True)
 
 
 def _gain_label(given: Channel, wanted: Channel) -> str:

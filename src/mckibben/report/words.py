@@ -433,8 +433,8 @@ def _residual(one: OutputCheck) -> str:
         return f"The residual of {one.output}, {size} RMS, is within rounding or the sensor's step."
     if one.useless:
         return (
-            f"The model is no better than the mean of {one.output}: {size} RMSE, standard deviation "
-            f"{numeral(one.deviation, 2)}."
+            f"The model is of no use for {one.output}: {size} RMSE, where the mean is off by "
+            f"{numeral(one.mean_error, 2)}."
         )
     residual = f"The residual of {one.output}, {size} RMS ({of_range}),"
     if not one.missing:

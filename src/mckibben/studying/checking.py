@@ -26,7 +26,9 @@ def check_on_test(
     outputs : sequence of str
         Their names.
     """
-    places = [list(outputs).index(channel.name) for channel in model.outputs]
+    given = [channel.name for channel in model.outputs]
+    places = [list(outputs).index(name) for name in given]
+    trained = np.concatenate([recording.matrix(given) for recording in split.train])
     runs = []
     for recording, rows, found in zip(split.test, split.test_rows, modelled, strict=True):
         scored = np.flatnonzero(rows)
@@ -35,10 +37,10 @@ def check_on_test(
         start, stop = int(scored[0]), int(scored[-1]) + 1
         kept = recording.slice(start, stop)
         inputs = kept.matrix(channel.name for channel in model.inputs)
-        measured = kept.matrix(channel.name for channel in model.outputs)
+        measured = kept.matrix(given)
         runs.append(Run(kept, inputs, measured, found[start:stop, places]))
     try:
         check_usable(model, [run.recording for run in runs])
-        return check_runs(model, runs)
+        return check_runs(model, runs, means=trained.mean(axis=0))
     except DataError as error:
         return f"{error.problem}. Remedy: {error.remedy}."

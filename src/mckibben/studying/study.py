@@ -62,7 +62,7 @@ class Study(DrawsItself):
     check : Validation, str or None
         What the chosen model misses on the test, or why that cannot be told; None without a choice.
     description : ModelDescription or None
-        What the chosen model is: equations, parameters and how sure they are, how it answers.
+        What the chosen model is: equations, parameters and how sure they are.
     review : Review or None
         How the loop that was logged followed its reference, where model or compensator are given.
     """

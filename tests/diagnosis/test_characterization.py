@@ -195,7 +195,6 @@ def test_noise_moves_nothing_much(seed: int) -> None:
 def test_where_noise_would_hide_a_loop_none_is_denied(seed: int) -> None:
     u = triangle(TIME[:1201:10], 6.0, 4.0)
     found = characterize(noisy(run(u, u, 10 * STEP), 0.1, seed))
-    assert found.depends
     assert found.has_loop is None
     low, high = found.intervals["branch_gap"]
     assert low < 0 < high
@@ -313,13 +312,10 @@ def unrelated(kind: str, seed: int) -> Array:
 @pytest.mark.parametrize("kind", WANDERING)
 def test_noise_that_wanders_and_drift_are_no_loop(kind: str) -> None:
     """Of 60 recordings at a level of 1 %, four or more have a probability of 0.3 %."""
-    looped = dependent = 0
+    looped = 0
     for seed in range(60):
         u = triangle(TIME[:4000], 40 / (3 + seed % 4), 5.0)
         noise = unrelated(kind, seed)
         bent = characterize(run(u, u + 0.05 * u**2 + 0.2 * noise))
         looped += bent.has_loop is True
-        assert bent.depends
-        dependent += characterize(run(u, noise)).depends
     assert looped < 4
-    assert dependent < 5

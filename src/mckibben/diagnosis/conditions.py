@@ -66,13 +66,13 @@ def others_of(
 
 
 Group = tuple[tuple[float, ...], list[tuple[int, Recording]]]
-"""Levels at which other inputs stand still, and the stretches where they do with their recordings."""
+"""Levels at which other inputs stand still; numbers of the recordings, and stretches where they do."""
 
 
 def standing(recordings: Sequence[Recording], given: str, others: Sequence[str]) -> list[Group]:
     """Return stretches in which all other inputs stand still and the input moves, by level."""
     span = max(float(np.ptp(one[given])) for one in recordings)
-    ranges = _spans(recordings, others)
+    ranges = np.ptp(np.concatenate([one.matrix(others) for one in recordings]), axis=0)
     found: list[tuple[Array, int, Recording]] = []
     for place, one in enumerate(recordings):
         columns = one.matrix(others)
@@ -125,34 +125,34 @@ def effects(
     shares = (seen[:, 2:] - lows) / (highs - lows) - 0.5
     k, middle = len(others), 0.5 * (x.min() + x.max())
     columns = np.column_stack([shares, shares * (x - middle)[:, np.newaxis], _hats(x)])
-    for terms in (
-        columns,
-        np.delete(columns, slice(k, 2 * k), axis=1),
-    ):  # slopes are not always told
-        slopes, _, rank, _ = np.linalg.lstsq(terms, y, rcond=None)
+    # changes of slope are not always told
+    for terms in (columns, np.delete(columns, slice(k, 2 * k), axis=1)):
+        found, _, rank, _ = np.linalg.lstsq(terms, y, rcond=None)
         if rank == terms.shape[1]:
             break
     else:
         return ()
-    left = y - terms @ slopes
+    left = y - terms @ found
     pieces = np.split(left, np.cumsum([len(part) for part in parts])[:-1])
     variance = float(np.mean(left**2)) * correlation_length(pieces)
-    spread = NORMAL_95 * np.sqrt(variance * np.diag(np.linalg.inv(terms.T @ terms)))
-    found = []
-    for j, name in enumerate(others):
-        two = [(float(slopes[i]), float(spread[i])) for i in (j, j + k)]
-        (change, half), (gain, gain_half) = (
-            two if terms is columns else (two[0], (0.0, float("inf")))
+    half = NORMAL_95 * np.sqrt(variance * np.diag(np.linalg.inv(terms.T @ terms)))
+    if terms is not columns:
+        found = np.insert(found, [k] * k, 0.0)
+        half = np.insert(half, [k] * k, np.inf)
+    limits = list(zip((found - half).tolist(), (found + half).tolist(), strict=True))
+    return tuple(
+        Effect(
+            channel=name,
+            low=float(lows[j]),
+            high=float(highs[j]),
+            unit=recordings[0].units[name],
+            change=float(found[j]),
+            limits=limits[j],
+            gain_change=float(found[j + k]),
+            gain_limits=limits[j + k],
         )
-        found.append(
-            Effect(
-                *(name, float(lows[j]), float(highs[j]), recordings[0].units[name], change),
-                (change - half, change + half),
-                gain,
-                (gain - gain_half, gain + gain_half),
-            )
-        )
-    return tuple(found)
+        for j, name in enumerate(others)
+    )
 
 
 def without(
@@ -168,8 +168,3 @@ def without(
             output = output - share * (effect.change + effect.gain_change * (one[given] - middle))
         found.append(one.with_channels({wanted: one.units[wanted]}, **{wanted: output}))
     return found
-
-
-def _spans(recordings: Sequence[Recording], names: Sequence[str]) -> Array:
-    seen = np.concatenate([one.matrix(names) for one in recordings])
-    return np.asarray(np.ptp(seen, axis=0))

@@ -144,8 +144,12 @@ def branches(x: ArrayLike, threshold: float | None = None) -> list[tuple[int, in
     [(0, 3, 1), (2, 4, -1)]
     """
     values = _checked(x)
-    turns = reversals(values, threshold)
-    ways = np.sign(np.diff(values[turns])).astype(int)
+    return branches_between(values, reversals(values, threshold))
+
+
+def branches_between(x: Array, turns: Indices) -> list[tuple[int, int, int]]:
+    """Return the branches between turning points that are known already, as `branches` does."""
+    ways = np.sign(np.diff(x[turns])).astype(int)
     return [
         (int(start), int(stop) + 1, int(way))
         for start, stop, way in zip(turns[:-1], turns[1:], ways, strict=True)

@@ -18,6 +18,7 @@ from mckibben.diagnosis.conditions import (
     without,
 )
 from mckibben.diagnosis.loops import (
+    FIGURES,
     Cycle,
     branches_of,
     curves_of,
@@ -47,19 +48,15 @@ output follows direction; and that branches explain at least whose shape is meas
 REPEATS = 3
 """Values of which an interval is made, at least."""
 
-OF_LOOPS = (
-    *("loop_width", "mid_width", "loop_area", "loop_area_share"),
-    *("asymmetry", "width_centroid"),
-)
-"""What every loop has."""
-
-SHAPE = {*OF_LOOPS, "dead_zone_upper", "dead_zone_lower", "closure_error"} | {
-    *("rate_dependence", "speeds")
+SHAPE = {
+    *("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid"),
+    *("dead_zone_upper", "dead_zone_lower", "closure_error", "rate_dependence", "speeds"),
 }
 """What is measured only where there is a loop."""
 
-BY_POSITION = {"gain", "onset", "saturation", "asymmetry", "width_centroid", "drift"} | {
-    *("branch_gap", "dead_zone_upper", "dead_zone_lower", "creep", "creep_time", "closure_error")
+BY_POSITION = {
+    *("gain", "onset", "saturation", "asymmetry", "width_centroid", "branch_gap", "drift"),
+    *("dead_zone_upper", "dead_zone_lower", "creep", "creep_time", "closure_error"),
 }
 """What has no meaning where the output follows direction."""
 
@@ -217,12 +214,12 @@ def characterize(
     """Measure what a muscle does: width and shape of its loop, memory, creep, dependence on rate.
 
     Sensor noise is averaged away first, over samples within which the input moves by 1 % of its range.
-    Ranges are those of all recordings together. What the recordings do not show is None.
+    Ranges are those of all recordings together.
 
-    Other inputs, such as pressures of other muscles, loads or lengths, are looked at beside: where
-    they stand still, every level of theirs has a loop of its own, and the one at which the output moves
-    most is reported. Where they never do while the input moves, their effect by straight lines is taken
-    away, and gain and mean gap of the branches alone are measured.
+    Where other inputs, such as pressures of other muscles, loads or lengths, stand still, every level
+    of theirs has a loop of its own, and the one at which the output moves most is reported. Where they
+    never do while the input moves, their effect by straight lines is taken away, and gain and mean gap
+    of the branches alone are measured.
 
     Parameters
     ----------
@@ -335,7 +332,7 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     curves = curves_of(branches, largest, scale)
     gains, onsets, saturations = ([curve[k] for curve in curves] for k in range(3))
     repeated: dict[str, Sequence[float | None]] = {
-        **{name: [getattr(loop, name) for loop in largest] for name in OF_LOOPS},
+        **{name: [loop.figures[name] for loop in largest] for name in FIGURES},
         "gain": gains,
         "onset": () if None in onsets else onsets,
         "saturation": () if None in saturations else saturations,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,23 +17,17 @@ from mckibben.signals.reversals import whole_cycles
 SHARES = np.linspace(0.02, 0.98, 49)
 """Input levels of a curve, as shares of its range; the middle one is mid input."""
 
-WINDOW = 0.025
-"""Samples this close to a level, as a share of the range, make the curve there."""
+WINDOW, FEWEST = 0.025, 8
+"""Samples this close to a level, as a share of the range, make the curve there; a branch whose shape is
+measured has this many at least."""
 
-FEWEST = 8
-"""Samples that a branch must have for its shape to be measured."""
+LARGE, CLOSED = 0.9, 0.02
+"""Amplitudes from this share of the largest on are as large, or cover the input range; a closed loop
+ends within this share of its amplitude of where it began."""
 
-LARGE = 0.9
-"""Amplitudes from this share of the largest on are as large, or cover the input range."""
-
-CLOSED = 0.02
-"""Share of the amplitude within which a closed loop ends where it began."""
-
-PART = 0.5
-"""Share of the other branch that a branch at either end of a recording must have to make a loop."""
-
-SLIGHT = 0.005
-"""Mean width over the output range below which it is not measured where a loop is wide."""
+PART, SLIGHT = 0.5, 0.005
+"""Share of the other branch that a branch at either end of a recording must have to make a loop; mean
+width over the output range below which it is not measured where a loop is wide."""
 
 FLAT, REACH = 0.2, 2
 """Share of the mean slope below which the output hardly follows the input; levels on either side
@@ -69,14 +63,16 @@ class Cycle:
         return apart <= within * self.amplitude
 
 
+FIGURES = ("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid")
+"""Of a loop, as in `Characterization`; asymmetry of closed ones, the centroid not of slight ones."""
+
+
 @dataclass(frozen=True)
 class Loop:
     """The curves of one cycle: output ``up`` and ``down`` at input ``levels``, each of shape (49,).
 
     ``begins`` and ``ends`` are its first and last sample, ``first`` whether its recording begins with
-    it, ``closed`` whether the input returns to where it began. The figures are as in `Characterization`:
-    ``asymmetry`` is the standard deviation of up(mid + s) + down(mid - s) over the levels [% of the
-    output range], None of open loops; ``width_centroid`` is None of slight ones.
+    it, ``closed`` whether the input returns to where it began.
     """
 
     cycle: Cycle
@@ -87,12 +83,7 @@ class Loop:
     ends: int
     closed: bool
     first: bool
-    loop_width: float
-    mid_width: float
-    asymmetry: float | None
-    width_centroid: float | None
-    loop_area: float
-    loop_area_share: float
+    figures: Mapping[str, float | None]
 
 
 def loops_of(tracks: Sequence[Track], scale: Scale) -> list[Loop]:
@@ -128,22 +119,13 @@ def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
     seconds = None if track.sample_time is None else track.sample_time * (u.size - 1)
     rate = None if seconds is None else float((2 * u[top] - u[0] - u[-1]) / seconds)
     area, wide = loop_area(u[covered], y[covered]), widths.mean() >= SLIGHT * span
-    return Loop(
-        cycle=Cycle(number, low, high, rate, 100 * mid / span),
-        levels=levels,
-        up=up,
-        down=down,
-        begins=piece.start,
-        ends=piece.stop - 1,
-        closed=closed,
-        first=piece.start <= track.major_turns[1] and not track.periodic,
-        loop_width=100 * mid / span,
-        mid_width=mid,
-        asymmetry=100 * float(np.std(up + down[::-1])) / span if closed else None,
-        width_centroid=float((2 * SHARES - 1) @ widths / widths.sum()) if wide else None,
-        loop_area=area,
-        loop_area_share=100 * area / (amplitude * span),
-    )
+    asymmetry = 100 * float(np.std(up + down[::-1])) / span if closed else None
+    centroid = float((2 * SHARES - 1) @ widths / widths.sum()) if wide else None
+    first = piece.start <= track.major_turns[1] and not track.periodic
+    width, share = 100 * mid / span, 100 * area / (amplitude * span)
+    figures = dict(zip(FIGURES, (width, mid, area, share, asymmetry, centroid), strict=True))
+    cycle = Cycle(number, low, high, rate, width)
+    return Loop(cycle, levels, up, down, piece.start, piece.stop - 1, closed, first, figures)
 
 
 def largest_of(loops: Sequence[Loop]) -> list[Loop]:
@@ -193,12 +175,16 @@ class Branches:
     ways: Array
     owners: Array
 
-    def mean(self, way: float) -> Array:
-        """Return the mean curve of one direction, NaN at levels that no such branch covers."""
-        chosen = self.curves[self.ways == way]
-        known = np.isfinite(chosen)
-        total, count = np.where(known, chosen, 0.0).sum(axis=0), known.sum(axis=0)
-        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    @property
+    def middle(self) -> Array:
+        """Mean of both directions' mean curves (49,), NaN at levels that one of them does not cover."""
+        means = []
+        for way in (1, -1):
+            chosen = self.curves[self.ways == way]
+            known = np.isfinite(chosen)
+            count = np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+            means.append(np.where(known, chosen, 0.0).sum(axis=0) / count)
+        return np.mean(means, axis=0)
 
 
 def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
@@ -276,7 +262,7 @@ def curves_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[Curv
         (loop.levels, 0.5 * (loop.up + loop.down))
         for loop in loops
         if loop.cycle.amplitude >= LARGE * scale.u.span
-    ] or [(found.levels, 0.5 * (found.mean(1.0) + found.mean(-1.0)))]
+    ] or [(found.levels, found.middle)]
     return [
         _curve_of(u[known], y[known], scale) for u, y in curves if (known := np.isfinite(y)).any()
     ]

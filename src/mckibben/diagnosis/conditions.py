@@ -12,7 +12,7 @@ from mckibben.diagnosis.tracks import FEWEST, Range
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves
-from mckibben.statistics import NORMAL_95, correlation_length
+from mckibben.statistics import correlation_length
 
 ALIKE = 0.02
 """Share of all that another input does within which levels are one."""
@@ -118,6 +118,8 @@ def effects(
 
     By least squares beside a curve of the input, each with a straight line, and that times the input.
     """
+    from scipy.special import stdtrit
+
     parts = [one.matrix((given, wanted, *others))[:: -(-len(one) // MOST)] for one in recordings]
     seen = np.concatenate(parts)
     x, y = seen[:, 0], seen[:, 1]
@@ -134,8 +136,11 @@ def effects(
         return ()
     left = y - terms @ found
     pieces = np.split(left, np.cumsum([len(part) for part in parts])[:-1])
-    variance = float(np.mean(left**2)) * correlation_length(pieces)
-    half = NORMAL_95 * np.sqrt(variance * np.diag(np.linalg.inv(terms.T @ terms)))
+    memory = correlation_length(pieces)
+    # as many samples are independent, less those that the terms take
+    freedom = max(len(y) / memory - terms.shape[1], 1.0)
+    variance = float(left @ left) / freedom * np.diag(np.linalg.inv(terms.T @ terms))
+    half = float(stdtrit(freedom, 0.975)) * np.sqrt(variance)
     if terms is not columns:
         found = np.insert(found, [k] * k, 0.0)
         half = np.insert(half, [k] * k, np.inf)

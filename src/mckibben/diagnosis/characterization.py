@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar
@@ -35,11 +34,9 @@ from mckibben.recording import Recording, listed
 from mckibben.signals.reversals import whole_cycles
 from mckibben.system.showing import DrawsItself
 
-LEVEL = 0.01
-"""Of the test for a loop."""
-
-NO_GAP = 0.01
-"""Branches whose mean gap is surely below this share of the output range are no loop."""
+LEVEL, NO_GAP = 0.01, 0.01
+"""Of the test for a loop; branches whose mean gap is surely below the second share of the output range
+are no loop."""
 
 EXPLAINED, POSITION = 0.5, 0.1
 """Share of the output's variance that velocity explains at least, and the input at most, where the
@@ -199,9 +196,8 @@ class Characterization(DrawsItself):
         return self.direction_share >= EXPLAINED and self.position_share <= POSITION
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as JSON holds it, with None for what could not be measured."""
-        found: dict[str, Any] = _plain(asdict(self))
-        return found | {"follows_direction": self.follows_direction}
+        """Return everything for JSON, with None for what could not be measured."""
+        return asdict(self) | {"follows_direction": self.follows_direction}
 
 
 def characterize(
@@ -414,11 +410,3 @@ def _unit(runs: Sequence[Recording], channel: str) -> str:
             remedy="convert them, or read the files with --unit",
         )
     return units.pop()
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -14,17 +14,12 @@ from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves
 from mckibben.statistics import correlation_length
 
-ALIKE = 0.02
-"""Share of all that another input does within which levels are one."""
+ALIKE, COVERS = 0.02, 0.5
+"""Share of all that another input does within which levels are one, and of the input range over which
+the input moves in a stretch that is measured."""
 
-COVERS = 0.5
-"""Share of the input range over which the input moves in a stretch that is measured."""
-
-MOST = 2000
-"""Samples of a recording by which effects are found."""
-
-KNOTS = 12
-"""Of the curve of the input beside which other inputs have an effect."""
+MOST, KNOTS = 2000, 12
+"""Samples of a recording by which effects are found, and knots of the curve of the input beside it."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +27,7 @@ class Effect:
     """How far another input that goes from ``low`` to ``high`` moves the output at equal input.
 
     By straight lines: the ``change`` of the output and that of its slope, ``gain_change``, each with its
-    95 % interval.
+    95 % interval; None where recordings do not tell the latter.
     """
 
     channel: str
@@ -41,8 +36,8 @@ class Effect:
     unit: str
     change: float
     limits: Range
-    gain_change: float
-    gain_limits: Range
+    gain_change: float | None
+    gain_limits: Range | None
 
 
 def others_of(
@@ -141,9 +136,6 @@ def effects(
     freedom = max(len(y) / memory - terms.shape[1], 1.0)
     variance = float(left @ left) / freedom * np.diag(np.linalg.inv(terms.T @ terms))
     half = float(stdtrit(freedom, 0.975)) * np.sqrt(variance)
-    if terms is not columns:
-        found = np.insert(found, [k] * k, 0.0)
-        half = np.insert(half, [k] * k, np.inf)
     limits = list(zip((found - half).tolist(), (found + half).tolist(), strict=True))
     return tuple(
         Effect(
@@ -153,8 +145,8 @@ def effects(
             unit=recordings[0].units[name],
             change=float(found[j]),
             limits=limits[j],
-            gain_change=float(found[j + k]),
-            gain_limits=limits[j + k],
+            gain_change=float(found[j + k]) if terms is columns else None,
+            gain_limits=limits[j + k] if terms is columns else None,
         )
         for j, name in enumerate(others)
     )
@@ -170,6 +162,8 @@ def without(
         output = one[wanted]
         for effect in moved:
             share = (one[effect.channel] - effect.low) / (effect.high - effect.low) - 0.5
-            output = output - share * (effect.change + effect.gain_change * (one[given] - middle))
+            output = output - share * (
+                effect.change + (effect.gain_change or 0.0) * (one[given] - middle)
+            )
         found.append(one.with_channels({wanted: one.units[wanted]}, **{wanted: output}))
     return found

@@ -19,11 +19,9 @@ SAME, HUNTED = 0.01, 0.05
 """Shares of the input range: a level is passed beyond the first; a regulator hunts over the second, so
 that what turns back by less is no minor loop."""
 
-DENSE = 8
-"""Samples that a branch must have for the output on it to be read between samples."""
-
-SETTLED = 0.1
-"""Share of a hold that is left out at its start, so that the lag of a jump is not taken for creep."""
+DENSE, SETTLED = 8, 0.1
+"""Samples that a branch must have for the output on it to be read between samples; share of a hold that
+is left out at its start, so that the lag of a jump is not taken for creep."""
 
 ALIKE, SPEED_RATIO = 0.05, 1.5
 """Cycles are compared whose extremes differ by this share of the amplitude at most, where their speeds

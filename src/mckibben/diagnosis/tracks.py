@@ -19,11 +19,9 @@ Range = tuple[float, float]
 QUIET, ROUNDING = 1e-3, 1e-12
 """Shares of the range: noise below the first is not averaged away, below the second is rounding."""
 
-MAJOR = 0.1
-"""Swings of the input below this share of its range do not separate cycles."""
-
-FEWEST = 10
-"""Samples of all recordings, at least."""
+MAJOR, FEWEST = 0.1, 10
+"""Swings of the input below this share of its range do not separate cycles; samples of all recordings,
+at least."""
 
 
 @dataclass(frozen=True)

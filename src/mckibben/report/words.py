@@ -145,17 +145,15 @@ def characterization_sentences(found: Characterization) -> list[str]:
         f"{y} covers {_spanning(ends, found.output_unit)} while {u} covers "
         f"{_spanning(found.input_range, found.input_unit)}{_gain(found)}."
     ]
-    if not found.depends:
-        p = "" if found.p_dependence is None else f"p = {numeral(found.p_dependence, 2)}, "
-        said.append(
-            f"No dependence of {y} on {u} is visible: {p}{u} and its direction explain "
-            f"{_share(found.loop_share)} of its variance."
-        )
-    elif found.follows_direction:
+    if found.follows_direction:
         said.append(
             f"{y} follows the direction of {u}, as friction does, and has no inverse by {u}: velocity "
             f"explains {_share(found.direction_share)} of its variance, {u} "
             f"{_share(found.position_share)}."
+        )
+    elif found.loop_width is None and not found.adjusted:
+        said.append(
+            f"{u} and its direction explain {_share(found.loop_share)} of the variance of {y}."
         )
     said += [*_loop(found), *_motion(found), *_coupling(found)]
     return [f"{sentence[0].upper()}{sentence[1:]}" for sentence in said]
@@ -174,7 +172,7 @@ def _loop(found: Characterization) -> Iterator[str]:
     elif found.branch_gap is not None:
         shown = "" if found.has_loop else "; a loop is not shown by it"
         yield f"Mean gap between branches: {_figure(found, 'branch_gap', y)}{shown}."
-    if found.branch_gap is not None and not found.drift_excluded:
+    if found.branch_gap is not None and found.p_loop is None:
         yield "No recording has four branches: drift would part rising and falling output as well."
     if found.rate_dependence is not None and found.speeds is not None:
         unit = f"{found.input_unit}/s".lstrip("/")
@@ -271,7 +269,6 @@ def characterization_rows(found: Characterization) -> list[Row]:
             "",
             "share that input and direction explain together",
         ),
-        row("p of dependence", "p_dependence", "", "probability of such slopes without dependence"),
         row("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
         row("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
         row("loop width at mid input", "mid_width", y, "the same in the unit of the output"),

@@ -18,6 +18,9 @@ ALIKE, COVERS = 0.02, 0.5
 """Share of all that another input does within which levels are one, and of the input range over which
 the input moves in a stretch that is measured."""
 
+FOLLOWS = 0.9
+"""Share of an input's variance (R²) that others explain, from which their effects are not separate."""
+
 MOST, KNOTS = 2000, 12
 """Samples of a recording by which effects are found, and knots of the curve of the input beside it."""
 
@@ -109,7 +112,7 @@ def _hats(x: Array) -> Array:
 def effects(
     recordings: Sequence[Recording], given: str, wanted: str, others: Sequence[str]
 ) -> tuple[Effect, ...]:
-    """Return how far other inputs move an output at equal input; none where some move together.
+    """Return how far other inputs move an output at equal input; none where they move together.
 
     By least squares beside a curve of the input, each with a straight line, and that times the input.
     """
@@ -121,6 +124,8 @@ def effects(
     lows, highs = seen[:, 2:].min(axis=0), seen[:, 2:].max(axis=0)
     shares = (seen[:, 2:] - lows) / (highs - lows) - 0.5
     k, middle = len(others), 0.5 * (x.min() + x.max())
+    if _together(parts, _hats(x), k):
+        return ()
     columns = np.column_stack([shares, shares * (x - middle)[:, np.newaxis], _hats(x)])
     # changes of slope are not always told
     for terms in (columns, np.delete(columns, slice(k, 2 * k), axis=1)):
@@ -150,6 +155,23 @@ def effects(
         )
         for j, name in enumerate(others)
     )
+
+
+def _together(parts: Sequence[Array], hats: Array, k: int) -> bool:
+    """Return whether another input follows from the input and the others, within recordings.
+
+    What moves only between recordings is separate.
+    """
+    seen = np.concatenate([part - part.mean(axis=0) for part in parts])[:, 2:]
+    curves = np.split(hats, np.cumsum([len(part) for part in parts])[:-1])
+    curve = np.concatenate([one - one.mean(axis=0) for one in curves])
+    for j in range(k):
+        beside = np.column_stack([curve, np.delete(seen, j, axis=1)])
+        left = seen[:, j] - beside @ np.linalg.lstsq(beside, seen[:, j], rcond=None)[0]
+        total = float(seen[:, j] @ seen[:, j])
+        if total > 0 and float(left @ left) < (1 - FOLLOWS) * total:
+            return True
+    return False
 
 
 def without(

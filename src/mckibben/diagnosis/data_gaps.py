@@ -41,6 +41,9 @@ REPEATED, LASTING, CYCLE_POINTS = 0.02, 1.1, 9
 """Cycles are the same where channels are within this share of their ranges at so many points, and times
 within this factor."""
 
+NOISES = 4.0
+"""Standard deviations of noise by which channels of equal cycles may differ beyond that."""
+
 OWN_NOISE = 3.0
 """Scatter of an output over that of the inputs, in shares of their ranges, that is noise of its own."""
 
@@ -266,13 +269,16 @@ def _beyond_range(known: Excitation) -> Found:
 
 
 def _dependence(known: Excitation) -> Found:
-    """Give the share of the variance of inputs and loads that follows from the others (R²)."""
-    if len(known.moving) < 2:
+    """Give the share of the variance within recordings of an input that follows from others (R²)."""
+    names = [name for name in known.moving if known.branches[name]]
+    if len(names) < 2:
         return
-    samples = known.pooled(known.moving)
+    samples = np.concatenate(
+        [one.matrix(names) - one.matrix(names).mean(axis=0) for one in known.recordings]
+    )
     together = np.corrcoef(samples[:: max(1, len(samples) // MOST_SAMPLES)].T)
     inflation = np.diag(np.linalg.pinv(together + 1e-9 * np.eye(len(together))))
-    for name, factor in zip(known.moving, inflation.tolist(), strict=True):
+    for name, factor in zip(names, inflation.tolist(), strict=True):
         yield 1.0 - 1.0 / max(factor, 1.0), (name,)
 
 
@@ -326,8 +332,8 @@ def _resolution(known: Excitation) -> Found:
 
 
 def _clipped(known: Excitation) -> Found:
-    """Give the samples in a row at one end of the range of a channel that has noise elsewhere."""
-    for name in (*known.moving, *known.outputs):
+    """Give the samples in a row at one end of the range of an output that has noise elsewhere."""
+    for name in known.outputs:
         steps = np.abs(np.diff(known.pooled([name])[:MOST_SAMPLES, 0]))
         if known.moves(name) and known.noise[name] > steps[steps > 0].min(initial=np.inf):
             at_ends = [one[name] == end for one in known.recordings for end in known.ranges[name]]
@@ -359,7 +365,10 @@ def _repeated_cycles(known: Excitation) -> Found:
                 # from the middle of one branch to that of the next: turning points are flat
                 first, last = (branch.middle(recording[name]) for branch in (one, other))
                 at = np.linspace(first, last, CYCLE_POINTS).round().astype(int)
-                path = [recording[u][at] / known.span(u) for u in known.moving]
+                path = [
+                    recording[u][at] / (known.span(u) + NOISES * known.noise[u] / REPEATED)
+                    for u in known.moving
+                ]
                 ends = np.array([one.start, other.start, other.end]) / known.span(name)
                 lasts = np.log((last - first) * (recording.sample_time or 1.0)) / np.log(LASTING)
                 cycles.append([*np.concatenate([ends, *path]) / REPEATED, lasts])

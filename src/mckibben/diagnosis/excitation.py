@@ -160,7 +160,8 @@ class Excitation:
         rise = np.maximum(reached[after] - reached[before], 1e-12)
         times = before + np.clip((levels - reached[before]) / rise, 0.0, 1.0)
         step = float(np.diff(levels)[0])
-        return step / (max(float(np.median(np.diff(times))), 0.1) * (recording.sample_time or 1.0))
+        moving = max(float(np.quantile(np.diff(times), 0.25)), 0.1)
+        return step / (moving * (recording.sample_time or 1.0))
 
     @cached_property
     def longest_hold(self) -> float:

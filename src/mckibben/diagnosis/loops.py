@@ -176,15 +176,15 @@ class Branches:
     owners: Array
 
     @property
-    def middle(self) -> Array:
-        """Mean of both directions' mean curves (49,), NaN at levels that one of them does not cover."""
+    def means(self) -> tuple[Array, Array]:
+        """Mean curves (49,) of both directions, NaN at levels that they do not cover."""
         means = []
         for way in (1, -1):
             chosen = self.curves[self.ways == way]
             known = np.isfinite(chosen)
             count = np.where(known.any(axis=0), known.sum(axis=0), np.nan)
             means.append(np.where(known, chosen, 0.0).sum(axis=0) / count)
-        return np.mean(means, axis=0)
+        return means[0], means[1]
 
 
 def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
@@ -252,32 +252,34 @@ Curve = tuple[float | None, float | None, float | None]
 
 
 def curves_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[Curve]:
-    """Return gain, onset and saturation of the means of rising and falling output, where they show.
+    """Return gain, onset and saturation of rising and falling output, where they show.
 
-    Of the largest loops where they cover the input range, else of all branches. The gain is the slope
-    at mid input over a fifth of the range; below the onset and above the saturation the slope stays
-    under a fifth of its mean.
+    Of the largest loops where they cover the input range, else of all branches. The gain is the mean
+    slope of both at mid input over a fifth of the range; below the onset and above the saturation the
+    slopes of both stay under a fifth of their mean.
     """
     curves = [
-        (loop.levels, 0.5 * (loop.up + loop.down))
+        (loop.levels, loop.up, loop.down)
         for loop in loops
         if loop.cycle.amplitude >= LARGE * scale.u.span
-    ] or [(found.levels, found.middle)]
+    ] or [(found.levels, *found.means)]
     return [
-        _curve_of(u[known], y[known], scale) for u, y in curves if (known := np.isfinite(y)).any()
+        _curve_of(u[known], np.array([up[known], down[known]]), scale)
+        for u, up, down in curves
+        if (known := np.isfinite(up + down)).any()
     ]
 
 
-def _curve_of(u: Array, mean: Array, scale: Scale) -> Curve:
+def _curve_of(u: Array, both: Array, scale: Scale) -> Curve:
     centre, fifth = 0.5 * (scale.u.low + scale.u.high), 0.1 * scale.u.span
     gain = onset = saturation = None
     if u[0] <= centre - fifth and u[-1] >= centre + fifth:
-        low, high = np.interp([centre - fifth, centre + fifth], u, mean)
+        low, high = np.interp([centre - fifth, centre + fifth], u, both.mean(axis=0))
         gain = float(high - low) / (2 * fifth)
     if u.size >= 4 * REACH:
-        rises = scale.sign * (mean[2 * REACH :] - mean[: -2 * REACH])
+        rises = scale.sign * (both[:, 2 * REACH :] - both[:, : -2 * REACH])
         slopes, at = rises / (u[2 * REACH :] - u[: -2 * REACH]), u[REACH:-REACH]
-        steep = np.flatnonzero(slopes >= max(FLAT * slopes.mean(), 0.0))
+        steep = np.flatnonzero(slopes.max(axis=0) >= max(FLAT * slopes.mean(), 0.0))
         # A flat end counts when more than one slope is flat there, so that noise makes none.
         onset = float(at[steep[0]]) if steep.size and steep[0] > 1 else None
         saturation = float(at[steep[-1]]) if steep.size and steep[-1] < at.size - 2 else None

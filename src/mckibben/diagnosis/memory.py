@@ -15,9 +15,9 @@ from mckibben.signals.holds import STILL, holds, shortest_hold
 MOVED = 0.02
 """Output change, as a share of its range, from which the output is taken to have moved."""
 
-SAME, HUNTED = 0.01, 0.05
-"""Shares of the input range: a level is passed beyond the first; a regulator hunts over the second, so
-that what turns back by less is no minor loop."""
+SAME, HUNTED, MINOR = 0.01, 0.05, 0.9
+"""Shares of the input range: a level is passed beyond the first; a regulator hunts over the second; a
+loop larger than the third is a major one."""
 
 DENSE, SETTLED = 8, 0.1
 """Samples that a branch must have for the output on it to be read between samples; share of a hold that
@@ -83,7 +83,8 @@ def minor_loop_errors(tracks: Sequence[Track], scale: Scale) -> list[float]:
         for departure, back in minor_loops(heights, SAME * scale.u.span):
             part, way = _branch(track, back)
             u, y, level = track.u[part], track.y[part], heights[departure]
-            if abs(u[0] - level) < HUNTED * scale.u.span or u.size < DENSE:
+            size = abs(u[0] - level) / scale.u.span
+            if not HUNTED <= size <= MINOR or u.size < DENSE:
                 continue
             returned = _first_reach(y, way * u, way * level)
             if returned is not None:

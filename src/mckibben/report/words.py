@@ -178,8 +178,8 @@ def _loop(found: Characterization) -> Iterator[str]:
         unit = f"{found.input_unit}/s".lstrip("/")
         speeds = " to ".join(numeral(speed, 2) for speed in found.speeds)
         yield (
-            f"At twice the speed loop width grows by {_figure(found, 'rate_dependence', '%')} of the "
-            f"output range, from cycles at {speeds} {unit}."
+            f"From {speeds} {unit} loop width grows by {_figure(found, 'rate_dependence', '%')} of the "
+            "output range per doubling of speed, on average."
         )
     if found.closure_error is not None and found.loop_width is not None:
         yield f"Minor loops close within {_figure(found, 'closure_error', '%')} of the output range."
@@ -189,9 +189,9 @@ def _motion(found: Characterization) -> Iterator[str]:
     u, y = found.input_unit, found.output_unit
     if found.dead_zone_upper is not None and found.dead_zone_lower is not None:
         yield (
-            f"After a reversal {found.input} changes by {_figure(found, 'dead_zone_upper', u)} from "
-            f"above and {_figure(found, 'dead_zone_lower', u)} from below before {found.output} moves "
-            "back."
+            f"After a reversal, at these speeds, {found.input} changes by "
+            f"{_figure(found, 'dead_zone_upper', u)} from above and "
+            f"{_figure(found, 'dead_zone_lower', u)} from below before {found.output} moves back."
         )
     for name, side in (("onset", "Below"), ("saturation", "Above")):
         if getattr(found, name) is not None:
@@ -385,7 +385,10 @@ def check_sentences(found: Validation) -> list[str]:
 
 def missed(one: OutputCheck, finding: Finding) -> str:
     """Return in a few words what a residual follows, and what it may be as well."""
-    kinds = [_KINDS[kind] for kind in (finding.kind, *finding.or_kinds)]
+    causes = [
+        _KINDS[kind].format(channel=channel or "the input")
+        for kind, channel in ((finding.kind, finding.channel), *finding.or_causes)
+    ]
     step, unit = (one.sample_time, "s") if one.sample_time else (1.0, "samples")
     value = finding.coefficient or 0.0
     number = ""
@@ -393,7 +396,7 @@ def missed(one: OutputCheck, finding: Finding) -> str:
         number = f" of {numeral(value, 2)} {one.unit}".rstrip()
     elif finding.kind == "lag" and value:
         number = f", about {numeral(value * step, 2)} {unit}"
-    return " or ".join(kinds).format(channel=finding.channel or "the input") + number
+    return " or ".join(causes) + number
 
 
 WHITE = 0.01
@@ -449,7 +452,7 @@ def _missed(one: OutputCheck, finding: Finding) -> str:
 
 
 def _advice(first: Finding) -> str:
-    return "" if first.or_kinds else _ADVICE.get(first.kind, "").format(channel=first.channel)
+    return "" if first.or_causes else _ADVICE.get(first.kind, "").format(channel=first.channel)
 
 
 def _p(value: float) -> str:

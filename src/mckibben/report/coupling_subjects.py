@@ -9,6 +9,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.comparison.channels import Channels, any_moves, moved_by
+from mckibben.diagnosis.conditions import FOLLOWS
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
@@ -88,7 +89,7 @@ class Coupling:
         place = self.outputs.index(output)
         effects, unit = self.effects[place], f" {self.units[place]}".rstrip()
         if not np.isfinite(effects).all():
-            return f"What moves {output} cannot be told: inputs move together."
+            return f"Effects on {output} cannot be separated: inputs follow from each other."
         first, *others = np.argsort(-np.abs(effects))[:MOST]
         least = "".join(f", {self.inputs[k]} by {numeral(effects[k])}{unit}" for k in others)
         return (
@@ -119,11 +120,12 @@ def coupling(
     y = np.concatenate([r.matrix(outputs) - r.matrix(outputs).mean(axis=0) for r in recordings])
     size = np.linalg.norm(u, axis=0)
     scaled = u / np.where(size > 0, size, 1.0)
-    gains, _, rank, _ = np.linalg.lstsq(scaled, y, rcond=1e-6)
+    gains = np.linalg.lstsq(scaled, y, rcond=1e-6)[0]
     highest = np.max([r.matrix(inputs).max(axis=0) for r in recordings], axis=0)
     ranges = highest - np.min([r.matrix(inputs).min(axis=0) for r in recordings], axis=0)
     effects = (gains / np.where(size > 0, size, 1.0)[:, np.newaxis] * ranges[:, np.newaxis]).T
-    if rank < len(inputs):
+    inflation = np.diag(np.linalg.pinv(scaled.T @ scaled + 1e-9 * np.eye(len(inputs))))
+    if (1.0 - 1.0 / np.maximum(inflation, 1.0) > FOLLOWS).any():  # not separate, by R²
         effects = np.full_like(effects, np.nan)
     total = np.sum(y**2, axis=0)
     left = np.sum((y - scaled @ gains) ** 2, axis=0)

@@ -683,7 +683,7 @@ def _record_next(study: Study) -> str:
     if not study.data_gaps:
         return "No data gaps were found."
     first, *others = study.data_gaps
-    more = f" ({len(others)} more gaps)" if others else ""
+    more = f" ({len(others)} more in the report)" if others else ""
     return f"{gap_run(first)[:-1]}: {gap_name(first)} cannot be identified{more}."
 
 

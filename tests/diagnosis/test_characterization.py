@@ -148,13 +148,12 @@ def test_dependence_on_rate() -> None:
     assert same.speeds == pytest.approx((0.4, 1.6), rel=0.05)
 
 
-def test_without_time_what_needs_time_is_none() -> None:
+def test_without_time_what_needs_time_is_none_and_the_rest_is_the_same() -> None:
     u = triangle(TIME, 10.0, 5.0)
-    found = characterize(run(u, play(u, 0.3), None))
+    timed, found = (characterize(run(u, play(u, 0.3), step)) for step in (STEP, None))
     assert found.duration is found.sample_time is found.creep is found.rate_dependence is None
     assert [cycle.rate for cycle in found.cycles] == [None] * 10
-    assert found.loop_width is not None
-    assert found.drift == pytest.approx(0.0, abs=1e-9)
+    assert (found.loop_width, found.drift) == (timed.loop_width, timed.drift)
 
 
 def test_an_output_that_falls_with_the_input() -> None:
@@ -271,8 +270,7 @@ def damper(seed: int, switch: float) -> Recording:
 def test_friction_follows_direction_and_has_no_onset_trend_or_memory(switch: float) -> None:
     found = characterize(damper(0, switch), "displacement", "force")
     assert found.follows_direction
-    assert found.direction_share > 0.8
-    assert found.position_share < 0.05
+    assert found.position_share < 0.05 < 0.8 < found.direction_share
     assert found.onset is found.saturation is found.gain is found.creep is None
     assert found.dead_zone_upper is found.closure_error is None
 
@@ -281,7 +279,6 @@ def test_friction_follows_direction_and_has_no_onset_trend_or_memory(switch: flo
 def test_a_muscle_does_not_follow_direction_however_wide_its_loop(radius: float) -> None:
     u = irregular_triangle(TIME, 40, 5.0, seed=1)
     assert not characterize(run(u, play(u, radius))).follows_direction
-    assert not characterize(run(u, lag(u, 0.3))).follows_direction
 
 
 def wandering(kind: str, seed: int) -> Array:

@@ -16,6 +16,7 @@ from mckibben.diagnosis.conditions import (
     standing,
     without,
 )
+from mckibben.diagnosis.excitation import extremes
 from mckibben.diagnosis.loops import (
     FIGURES,
     Cycle,
@@ -300,14 +301,9 @@ def _levels(
 def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any]:
     """Return what is known of recordings without looking at loops."""
     durations, steps = [run.duration for run in runs], {run.sample_time for run in runs}
-    ends = {
-        end: (
-            min(float(run[name].min()) for run in runs),
-            max(float(run[name].max()) for run in runs),
-        )
-        for end, name in (("input_range", given), ("output_range", wanted))
-    }
-    return ends | {
+    return {
+        "input_range": extremes(runs, given),
+        "output_range": extremes(runs, wanted),
         "n_recordings": len(runs),
         "n_samples": sum(map(len, runs)),
         "duration": None if None in durations else float(sum(d or 0.0 for d in durations)),

@@ -178,13 +178,15 @@ class Branches:
     @property
     def means(self) -> tuple[Array, Array]:
         """Mean curves (49,) of both directions, NaN at levels that they do not cover."""
-        means = []
-        for way in (1, -1):
-            chosen = self.curves[self.ways == way]
-            known = np.isfinite(chosen)
-            count = np.where(known.any(axis=0), known.sum(axis=0), np.nan)
-            means.append(np.where(known, chosen, 0.0).sum(axis=0) / count)
-        return means[0], means[1]
+        rising, falling = (_mean(self.curves[self.ways == way], axis=0) for way in (1, -1))
+        return rising, falling
+
+
+def _mean(x: Array, axis: int) -> Array:
+    """Return the mean of what is known along an axis, NaN where nothing is."""
+    known = np.isfinite(x)
+    count = np.where(known.any(axis=axis), known.sum(axis=axis), np.nan)
+    return np.asarray(np.where(known, x, 0.0).sum(axis=axis) / count)
 
 
 def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
@@ -214,37 +216,30 @@ def gap_of(found: Branches, sign: float) -> tuple[float | None, Range | None, fl
     """
     from scipy.special import fdtrc, stdtrit
 
-    gaps: list[float] = []
-    pairs: list[float] = []
-    repeats: dict[float, list[float]] = {1.0: [], -1.0: []}
-    for k in range(found.ways.size - 1):
-        if found.owners[k] == found.owners[k + 1]:
-            pairs += _mean(found.ways[k + 1] * (found.curves[k] - found.curves[k + 1]))
-            if k and found.owners[k - 1] == found.owners[k]:
-                before, here, after = found.curves[k - 1 : k + 2]
-                gaps += _mean(found.ways[k] * (0.5 * (before + after) - here))
-                repeats[found.ways[k]] += _mean(np.where(np.isfinite(here), after - before, np.nan))
-    n = len(gaps)
-    if not pairs:
+    curves, same = found.curves, np.diff(found.owners) == 0
+    ways, inner = found.ways[:, np.newaxis], same[1:] & same[:-1]
+    here, before, after = curves[1:-1], curves[:-2], curves[2:]
+    again = np.where(np.isfinite(here), after - before, np.nan)
+    pairs, gaps, rising, falling = (
+        means[np.isfinite(means)]
+        for means in (
+            _mean((ways[1:] * (curves[:-1] - curves[1:]))[same], axis=1),
+            _mean((ways[1:-1] * (0.5 * (before + after) - here))[inner], axis=1),
+            *(_mean(again[inner & (found.ways[1:-1] == way)], axis=1) for way in (1, -1)),
+        )
+    )
+    if not pairs.size:
         return None, None, None
-    gap = sign * float(np.mean(gaps or pairs))
+    n, gap = gaps.size, sign * float(np.mean(gaps if gaps.size else pairs))
     if n < 2:
         return gap, None, None
     # of independent branches, gaps vary by 3/2, their mean by 4/n and repeats by 2 times their variance
     error, freedom = min(
-        (float(np.sqrt(2 * np.mean(np.square(x)) / n)), float(len(x)))
-        for x in repeats.values()
-        if x
+        (float(np.sqrt(2 * np.mean(x**2) / n)), float(x.size)) for x in (rising, falling) if x.size
     )
     half = error * float(stdtrit(freedom, 0.975))
     p = float(fdtrc(1.0, freedom, (gap / error) ** 2)) if error > 0 else float(gap == 0)
     return gap, (gap - half, gap + half), p
-
-
-def _mean(apart: Array) -> list[float]:
-    """Return the mean over the levels that are known, if there are any."""
-    known = apart[np.isfinite(apart)]
-    return [float(known.mean())] if known.size else []
 
 
 Curve = tuple[float | None, float | None, float | None]

@@ -31,11 +31,9 @@ from mckibben.system.showing import DrawsItself
 REFERENCE = "reference_"
 """What names of channels of a desired motion begin with."""
 
-LONGEST = 1.0
-"""Delay that is looked for [s]; an eighth of the log at most."""
-
-HELD = 3
-"""Samples in a row at an extreme, while the reference moves, from which a command is at a limit."""
+LONGEST, HELD = 1.0, 3
+"""Delay that is looked for [s], an eighth of the log at most; samples in a row at an extreme, while the
+reference moves, from which a command is at a limit."""
 
 ROUNDING = 1e-9
 """Share of a range up to which values are equal."""
@@ -391,7 +389,8 @@ def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
         return columns - columns.mean(axis=0)
 
     def explained(samples: float) -> float:
-        x = later(samples)[:, 0]
+        x = _shifted(first, samples)[inner]
+        x -= x.mean()
         return float((x @ got) ** 2 / (x @ x))
 
     late, gain = float(max(range(-most, most + 1), key=explained)), 1.0

@@ -25,7 +25,7 @@ def one_muscle() -> Study:
     assert best.block is not None
     return replace(
         found,
-        untold=data_gaps(found.train, ("pressure",), ("displacement",)),
+        data_gaps=data_gaps(found.train, ("pressure",), ("displacement",)),
         check=mckibben.check(best.block, found.test),
         description=describe(best.block, found.train),
     )

@@ -156,7 +156,7 @@ def _recordings(
     if as_json:
         told = gaps if isinstance(gaps, str) else [gap.to_dict() for gap in gaps]
         files = {file: [asdict(column) for column in found] for file, found in columns.items()}
-        print_json({"files": files, "recordings": described, "untold": told})
+        print_json({"files": files, "recordings": described, "data_gaps": told})
         return
     for file, found in columns.items():
         say(file)

@@ -94,7 +94,7 @@ class StudyFolder:
         best = board.best
         if best is not None and not board.pending:
             told = study.to_dict()
-            kept = {name: told[name] for name in ("check", "description", "untold")}
+            kept = {name: told[name] for name in ("check", "description", "data_gaps")}
             write("validation.json", to_json(kept) + "\n")
             if best.banded is not None:
                 write("banded.json", to_text(best.banded))

@@ -680,9 +680,9 @@ def _how_far(study: Study) -> str:
 
 
 def _record_next(study: Study) -> str:
-    if not study.untold:
+    if not study.data_gaps:
         return "No data gaps were found."
-    first, *others = study.untold
+    first, *others = study.data_gaps
     more = f" ({len(others)} more gaps)" if others else ""
     return f"{gap_run(first)[:-1]}: {gap_name(first)} cannot be identified{more}."
 

@@ -57,8 +57,8 @@ class Study(DrawsItself):
         The channel that models are told as the load, where one was named.
     notes : tuple of str
         What was assumed or mended on the way.
-    untold : tuple of Gap
-        Data gaps: what the recordings cannot identify, most important first.
+    data_gaps : tuple of Gap
+        What the recordings cannot identify, most important first.
     check : Validation, str or None
         What the chosen model misses on the test, or why that cannot be told; None without a choice.
     description : ModelDescription or None
@@ -80,7 +80,7 @@ class Study(DrawsItself):
     not_looped: str = ""
     load: str | None = None
     notes: tuple[str, ...] = ()
-    untold: tuple[Gap, ...] = ()
+    data_gaps: tuple[Gap, ...] = ()
     check: Validation | str | None = None
     description: ModelDescription | None = field(default=None, repr=False)
     review: Review | None = None
@@ -103,7 +103,7 @@ class Study(DrawsItself):
         known = self.characterization
         return {
             "characterization": None if known is None else known.to_dict(),
-            "untold": [gap.to_dict() for gap in self.untold],
+            "data_gaps": [gap.to_dict() for gap in self.data_gaps],
             "check": self.check.to_dict() if isinstance(self.check, Validation) else self.check,
             "description": None if self.description is None else self.description.to_dict(),
             "review": None if self.review is None else self.review.to_dict(),
@@ -215,7 +215,7 @@ def study(
         inverse=None,
         load=next(iter(channels.scheduling or ()), None),
         notes=(*notes, *plan.notes),
-        untold=data_gaps(recordings, looped, channels.outputs, tests=tests),
+        data_gaps=data_gaps(recordings, looped, channels.outputs, tests=tests),
         review=reviewed,
     )
     if found is not None:

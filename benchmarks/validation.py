@@ -130,7 +130,9 @@ def planted(plant: str, fault: str, motion: str, seed: int) -> tuple[str, ...]:
     missing = (
         check_runs(reader("pressure"), [run(pressure, y, modelled, **loads)]).outputs[0].missing
     )
-    return (missing[0].kind, *missing[0].or_kinds) if missing else ("nothing",)
+    return (
+        (missing[0].kind, *(kind for kind, _ in missing[0].or_causes)) if missing else ("nothing",)
+    )
 
 
 def responded(module: Any, pressure: Array, load: Array) -> Array:

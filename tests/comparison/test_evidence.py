@@ -62,26 +62,19 @@ def test_noise_is_not_recommended() -> None:
     assert {row["model"] for row in board["rows"]} == {"pi", "p1", "constant"}
 
 
-def test_the_level_of_the_tests_is_kept_and_they_find_a_narrow_loop() -> None:
+def test_the_level_of_the_test_is_kept_and_it_finds_a_narrow_loop() -> None:
     """Of 200 recordings, 1 % of 200 is 2; 7 or more have a probability of 0.5 %."""
     time = np.arange(600) * STEP
     u = irregular_triangle(time, 8, 5.0, seed=1)
     curve = u + 2 * np.tanh(u - 2.5)
-    dependent = looped = missed = 0
+    looped = 0
     for seed in range(200):
         white = np.random.default_rng(seed).standard_normal(u.size)
-        nothing = characterize(Recording({"pressure": u, "displacement": white}, STEP))
         static = curve + 0.02 * np.ptp(curve) * white
         bent = characterize(Recording({"pressure": u, "displacement": static}, STEP))
-        assert nothing.p_dependence is not None
         assert bent.p_loop is not None
-        assert bent.p_dependence is not None
-        dependent += nothing.p_dependence <= 0.01
         looped += bent.p_loop <= 0.01
-        missed += bent.p_dependence > 0.01
-    assert dependent < 7
     assert looped < 7
-    assert missed == 0
     wave = triangle(time, 2.0, 5.0)
     play = np.empty(wave.size)
     place = 0.0

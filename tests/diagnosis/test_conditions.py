@@ -7,7 +7,7 @@ import pytest
 
 from mckibben import PI, DataError, Recording
 from mckibben.diagnosis.characterization import characterize
-from mckibben.signals import staircase
+from mckibben.signals import random_wave, staircase
 
 STEP = 0.01
 TIME = np.arange(3000) * STEP
@@ -24,7 +24,6 @@ def run(zero: float, seed: int) -> Recording:
 def test_zeros_of_recordings_change_no_verdict(zeros: tuple[float, ...]) -> None:
     same = characterize([run(0.0, seed) for seed, _ in enumerate(zeros)])
     moved = characterize([run(zero, seed) for seed, zero in enumerate(zeros)])
-    assert moved.depends
     assert moved.has_loop
     for name in ("loop_width", "gain", "dead_zone_upper", "branch_gap"):
         assert getattr(moved, name) == pytest.approx(getattr(same, name), rel=0.05, abs=0.02), name
@@ -45,11 +44,9 @@ def test_what_another_input_does_is_not_taken_for_the_own() -> None:
     told = characterize(two(ramps), "pressure_1", "displacement")
     apart = characterize(two(ramps), "pressure_1", "displacement", beside=["pressure_2"])
     assert told == apart  # channels of one quantity are inputs all
-    assert apart.creep is None or abs(apart.creep) < 0.1
+    assert abs(apart.creep or 0.0) < 0.1
     assert apart.loop_width == pytest.approx(clean.loop_width, rel=0.02)
-    assert apart.n_recordings == 1
-    assert apart.n_stretches is not None
-    assert apart.n_stretches >= 1
+    assert apart.n_recordings == apart.n_stretches == 1
 
 
 def test_a_step_of_payload_is_no_creep() -> None:
@@ -71,11 +68,26 @@ def test_a_torque_that_moves_with_the_pressure_does_not_turn_its_sign(torque: fl
     found = characterize(run, output="angle")
     assert found.adjusted
     assert not found.falls
-    assert found.gain is not None
-    assert found.gain > 0
+    assert (found.gain or 0.0) > 0
     low, high = found.effects[0].limits
     assert low < 10 * torque * float(np.ptp(load)) < high
-    assert found.loop_width is None  # of what straight lines leave, no width is that of the muscle
+    # of what straight lines leave, no width is that of the muscle
+    assert found.loop_width is None
+    assert set(found.intervals) <= {"gain", "branch_gap"}
+
+
+def test_the_effect_of_another_input_is_in_its_interval_where_noise_is_slow() -> None:
+    """In 95 % of recordings; of 60, eight or more are missed with a probability of 1.6 %."""
+    missed = 0
+    for seed in range(60):
+        u, v = (random_wave(TIME, 0.5, 5.0, seed=seed + k) for k in (0, 1000))
+        white = np.random.default_rng(seed).standard_normal(TIME.size + 99)
+        y = u + 0.1 * u**2 - 2 * v + np.convolve(white, np.ones(100) / 10, "valid")
+        run = Recording({"pressure_1": u, "pressure_2": v, "displacement": y}, STEP)
+        (effect,) = characterize(run, "pressure_1").effects
+        low, high = effect.limits
+        missed += not low < -2 * (effect.high - effect.low) < high
+    assert missed < 8
 
 
 def test_inputs_that_move_as_one_are_refused() -> None:

@@ -148,7 +148,6 @@ def _recordings(
                 }
                 for name, samples in recording.channels.items()
             },
-            "lag_samples": _lag(recording),
             "meta": dict(recording.meta),
         }
         for recording in recordings
@@ -177,8 +176,6 @@ def _recordings(
             for name, one in about["channels"].items()
         ]
         print_table(["channel", "unit", "lowest", "highest", "at a limit", "stuck samples"], rows)
-        if about["lag_samples"] is not None:
-            say(f"Lag of the output on the input: {about['lag_samples']} samples")
         for note in recording.notes:
             say(f"Note: {note}")
     say()
@@ -188,16 +185,3 @@ def _recordings(
     say("Data gaps:" if gaps else "Data gaps: none")
     for gap in gaps:
         say(f"- {gap_sentence(gap)} {gap_run(gap)}")
-
-
-def _lag(recording: Recording) -> int | None:
-    """Return the lag of the one channel that pressure or voltage moves, None of several."""
-    from mckibben.files.condition import DRIVEN, DRIVING, lag
-
-    inputs, outputs = (
-        [name for name in recording.channels if recording.units[name] in units]
-        for units in (DRIVING, DRIVEN)
-    )
-    if len(inputs) != 1 or len(outputs) != 1:
-        return None
-    return lag(recording, inputs[0], outputs[0])

@@ -33,8 +33,9 @@ if TYPE_CHECKING:
 
 Unit = Literal["auto", "run", "block"]
 
-LEVEL = 0.9
-"""Level of a band where none is asked for, or the highest that its units allow."""
+LEVEL, LEVELS = 0.9, np.linspace(0.0, 1.0, 1001)
+"""Level of a band where none is asked for, or the highest that its units allow; those of the table of
+half widths."""
 
 RUNS = 9
 """Runs that allow a level of 0.9: from here on runs are the units, below blocks of them."""
@@ -42,14 +43,9 @@ RUNS = 9
 SHORTEST_BLOCK = 2.0
 """Correlation lengths of the errors that a block lasts at least."""
 
-WIDENINGS = (0.0, 0.3, 1.0, 3.0, 10.0)
-"""Shares by which a band may be wider at the mean speed than at rest."""
-
-FOLDS = 5
-"""Parts of the units that are left out in turn."""
-
-LEVELS = np.linspace(0.0, 1.0, 1001)
-"""Levels of the table of half widths."""
+WIDENINGS, FOLDS = (0.0, 0.3, 1.0, 3.0, 10.0), 5
+"""Shares by which a band may be wider at the mean speed than at rest, and parts of the units that are
+left out in turn to choose one."""
 
 MARGIN = 0.05
 """Share of a calibrated range up to which samples beyond it count as inside."""
@@ -64,10 +60,8 @@ class Held:
     inputs : array, shape (n, inputs)
     modelled, measured : array, shape (n, outputs)
         Outputs; the model runs free.
-    counts : array of bool, shape (n,)
-        Samples that are scored.
-    sample_time : float or None
-        [s].
+    counts, sample_time : array of bool, shape (n,), float or None
+        Samples that are scored; [s].
     """
 
     inputs: Array
@@ -220,13 +214,13 @@ def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Calibr
     runs = [run for run in runs if run.counts.any()]
     errors = [run.errors for run in runs]
     memory = max(correlation_length(one) for one in zip(*(e.T for e in errors), strict=True))
-    which: Literal["run", "block"]
-    which = "run" if unit == "run" or (unit == "auto" and len(runs) >= RUNS) else "block"
+    by_run = unit == "run" or (unit == "auto" and len(runs) >= RUNS)
+    which: Literal["run", "block"] = "run" if by_run else "block"
     units: list[NDArray[np.intp]] = []
     n = 0
     for length in map(len, errors):
         block = max(block_length(length, memory), SHORTEST_BLOCK * memory)
-        pieces = 1 if which == "run" else max(int(length / block), 1)
+        pieces = 1 if by_run else max(int(length / block), 1)
         units.append(n + np.arange(length) * pieces // length)
         n += pieces
     if n < 2:
@@ -236,20 +230,19 @@ def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Calibr
             remedy="calibrate on more, or longer, recordings",
         )
     level = min(LEVEL, n / (n + 1))
-    timed = all(run.sample_time for run in runs)
-    chosen = [
-        _narrowest(np.abs(e), v, np.concatenate(units), level, WIDENINGS if timed else (0.0,))
-        for e, v in zip(
-            np.concatenate(errors).T, np.concatenate([run.speeds for run in runs]).T, strict=True
-        )
+    widenings = WIDENINGS if all(run.sample_time for run in runs) else WIDENINGS[:1]
+    of, speeds = np.concatenate(units), np.concatenate([run.speeds for run in runs])
+    found = [
+        _narrowest(np.abs(e), v, of, level, widenings)
+        for e, v in zip(np.concatenate(errors).T, speeds.T, strict=True)
     ]
-    widenings, scores, widths, ratios = zip(*chosen, strict=True)
+    widening, scores, widths, ratios = zip(*found, strict=True)
     samples = np.concatenate([np.hstack([run.inputs, run.modelled]) for run in runs])
     band = Band(
         driving=model.inputs,
         given=model.outputs,
         ends=rows(np.array([samples.min(axis=0), samples.max(axis=0)])),
-        widening=vector(np.array(widenings)),
+        widening=vector(np.array(widening)),
         scores=rows(np.array(scores)),
         units=n,
         unit=which,
@@ -313,10 +306,8 @@ class TestedBand:
         What it is to hold: 0.9, or the most that so few units allow.
     unit, units : {"run", "block"}, int
         What counts as exchangeable, and how many the cross-validation had.
-    unit_of_width : str
-        Unit of the outputs.
-    coverage, width : mapping of str to float
-        By output: the share of samples inside, and the mean width.
+    unit_of_width, coverage, width : str, mappings of str to float
+        Unit of the outputs; by output, the share of samples inside and the mean width.
     """
 
     __test__ = False  # it is no test
@@ -350,17 +341,17 @@ def tested_band(
         band = find_band(block, held).band
     except DataError:
         return None
-    holds, width = [], []
-    modelled = outputs[len(split.train) :]
-    for recording, found, kept in zip(split.test, modelled, split.test_rows, strict=True):
-        ends = band.simulate(found, sample_time=recording.sample_time).reshape(len(found), -1, 3)
-        lower, upper = ends[kept, :, 1], ends[kept, :, 2]
+    covered, width = [], []
+    tested = zip(split.test, outputs[len(split.train) :], split.test_rows, strict=True)
+    for recording, modelled, kept in tested:
+        ends = band.simulate(modelled, sample_time=recording.sample_time)
+        _, lower, upper = np.moveaxis(ends.reshape(len(ends), -1, 3)[kept], -1, 0)
         measured = recording.matrix(names)[kept]
-        holds.append((lower <= measured) & (measured <= upper))
+        covered.append((lower <= measured) & (measured <= upper))
         width.append(upper - lower)
     shares, widths = (
         dict(zip(names, np.concatenate(each).mean(axis=0).tolist(), strict=True))
-        for each in (holds, width)
+        for each in (covered, width)
     )
     unit = block.outputs[0].unit
     return Banded(block, band), TestedBand(band.level, band.unit, band.units, unit, shares, widths)

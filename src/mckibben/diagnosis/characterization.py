@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -18,46 +17,45 @@ from mckibben.diagnosis.conditions import (
     without,
 )
 from mckibben.diagnosis.loops import (
+    FIGURES,
     Cycle,
     branches_of,
     curves_of,
     drift,
     explained,
-    gaps_of,
+    gap_of,
     largest_of,
     loops_of,
-    p_of_slopes,
 )
 from mckibben.diagnosis.memory import creep, dead_zones, minor_loop_errors, rate_dependence
-from mckibben.diagnosis.tracks import Range, Scale, interval, median, prepare
+from mckibben.diagnosis.tracks import Range, prepare
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
-from mckibben.signals.holds import holds, shortest_hold
 from mckibben.signals.reversals import whole_cycles
 from mckibben.system.showing import DrawsItself
 
-LEVEL = 0.01
-"""Of the tests for dependence and for a loop."""
-
-NO_GAP = 0.01
-"""Branches whose mean gap is surely below this share of the output range are no loop."""
+LEVEL, NO_GAP = 0.01, 0.01
+"""Of the test for a loop; branches whose mean gap is surely below the second share of the output range
+are no loop."""
 
 EXPLAINED, POSITION = 0.5, 0.1
 """Share of the output's variance that velocity explains at least, and the input at most, where the
 output follows direction; and that branches explain at least whose shape is measured."""
 
-BY_POSITION = (
-    *("gain", "onset", "saturation", "asymmetry", "width_centroid", "drift", "branch_gap"),
-    *("dead_zone_upper", "dead_zone_lower", "creep", "creep_time", "closure_error"),
-)
-"""What has no meaning where the output follows direction."""
+REPEATS = 3
+"""Values of which an interval is made, at least."""
 
-SHAPE = (
-    *("loop_width", "mid_width", "loop_area", "loop_area_share"),
-    *("asymmetry", "width_centroid", "dead_zone_upper", "dead_zone_lower", "closure_error"),
-    *("rate_dependence", "speeds"),
-)
-"""What is measured of a loop."""
+SHAPE = {
+    *("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid"),
+    *("dead_zone_upper", "dead_zone_lower", "closure_error", "rate_dependence", "speeds"),
+}
+"""What is measured only where there is a loop."""
+
+BY_POSITION = {
+    *("gain", "onset", "saturation", "asymmetry", "width_centroid", "branch_gap", "drift"),
+    *("dead_zone_upper", "dead_zone_lower", "creep", "creep_time", "closure_error"),
+}
+"""What has no meaning where the output follows direction."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +76,8 @@ class Characterization(DrawsItself):
     Parameters
     ----------
     n_cycles, n_reversals : int
-        Whole cycles run from minimum to minimum of the input and over at least a tenth of its
-        range; reversals are where it turns, minor loops included.
+        Whole cycles, from minimum to minimum of the input, over at least a tenth of its range; turning
+        points of the input, those of minor loops included.
     duration, sample_time : float or None
         All recordings together [s]; the sample time that they share [s].
     input_noise, output_noise : float or None
@@ -87,8 +85,8 @@ class Characterization(DrawsItself):
     loop_width, mid_width : float or None
         Distance of the largest cycles' branches at mid input: e_w [%] and [output unit].
     asymmetry, width_centroid : float or None
-        How far the loop is from its own image, turned by half a turn [%]; where it is wide, from -1
-        (low input) to 1 (high input).
+        How far the loop is from its own image, turned by half a turn [%], 0 for classical
+        Prandtl-Ishlinskii models; where it is wide, from -1 (low input) to 1 (high input).
     loop_area, loop_area_share : float or None
         Area that it encloses [input unit x output unit], and that over the rectangle round it [%].
     dead_zone_upper, dead_zone_lower : float or None
@@ -96,9 +94,10 @@ class Characterization(DrawsItself):
     gain, onset, saturation : float or None
         Slope of the mean of both branches at mid input [output unit/input unit], and the inputs below
         and above which it stays under a fifth of its mean.
-    branch_gap : float or None
-        Mean distance of falling and rising output at the same input, positive where the output
-        lags [output unit].
+    branch_gap, p_loop : float or None
+        Mean distance of falling and rising output at the same input, positive where the output lags
+        [output unit], and the probability of such gaps without a loop. From four branches on drift
+        cancels; of fewer there is no probability.
     creep, creep_time, drift : float or None
         Change of the output in a hold of all inputs [output unit], over what time [s]; and from one
         cycle to the next between the same extremes.
@@ -110,13 +109,10 @@ class Characterization(DrawsItself):
     position_share, direction_share, loop_share : float
         Share of the output's variance that functions of the input alone, of its velocity alone, and of
         the input and its direction together explain.
-    p_dependence, p_loop : float or None
-        Probability of as consistent slopes along branches, and gaps between them, of an output without
-        dependence, and without a loop; None of too few branches.
-    drift_excluded : bool
-        Whether branches are compared with those before and after, so that drift cancels.
     n_stretches : int or None
         Stretches in which other inputs stand still; None where nothing else moves.
+    falls : bool
+        Whether the output falls as the input grows.
     effects : tuple of Effect
         What other inputs do; ``adjusted`` where it is taken away, as they stand still nowhere:
         gain and branch gap alone are measured then.
@@ -163,9 +159,7 @@ class Characterization(DrawsItself):
     position_share: float = 0.0
     direction_share: float = 0.0
     loop_share: float = 0.0
-    p_dependence: float | None = None
     p_loop: float | None = None
-    drift_excluded: bool = True
     n_stretches: int | None = None
     falls: bool = False
     effects: tuple[Effect, ...] = ()
@@ -194,12 +188,6 @@ class Characterization(DrawsItself):
         return False if small else None
 
     @property
-    def depends(self) -> bool:
-        """Whether the output depends on the input, its direction included."""
-        shown = self.p_dependence is not None and self.p_dependence <= LEVEL
-        return shown or self.has_loop is True or self.loop_share >= EXPLAINED
-
-    @property
     def follows_direction(self) -> bool:
         """Whether the output follows the direction of motion, as friction does, and not position.
 
@@ -208,9 +196,8 @@ class Characterization(DrawsItself):
         return self.direction_share >= EXPLAINED and self.position_share <= POSITION
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as JSON holds it, with None for what could not be measured."""
-        found: dict[str, Any] = _plain(asdict(self))
-        return found | {"follows_direction": self.follows_direction}
+        """Return everything for JSON, with None for what could not be measured."""
+        return asdict(self) | {"follows_direction": self.follows_direction}
 
 
 def characterize(
@@ -223,12 +210,12 @@ def characterize(
     """Measure what a muscle does: width and shape of its loop, memory, creep, dependence on rate.
 
     Sensor noise is averaged away first, over samples within which the input moves by 1 % of its range.
-    Ranges are those of all recordings together. What the recordings do not show is None.
+    Ranges are those of all recordings together.
 
-    Other inputs, such as pressures of other muscles, loads or lengths, are looked at beside: where
-    they stand still, every level of theirs has a loop of its own, and the one at which the output moves
-    most is reported. Where they never do while the input moves, their effect by straight lines is taken
-    away, and gain and mean gap of the branches alone are measured.
+    Where other inputs, such as pressures of other muscles, loads or lengths, stand still, every level
+    of theirs has a loop of its own, and the one at which the output moves most is reported. Where they
+    never do while the input moves, their effect by straight lines is taken away, and gain and mean gap
+    of the branches alone are measured.
 
     Parameters
     ----------
@@ -267,26 +254,21 @@ def characterize(
     if not others:
         return _measured(runs, input, output)
     moved = effects(runs, input, output, others)
-    levels = []
-    for at, parts in standing(runs, input, others):
-        held = tuple((name, x, runs[0].units[name]) for name, x in zip(others, at, strict=True))
-        stretches = [part for _, part in parts]
-        if any(np.ptp(part[output]) > 0 for part in stretches):
-            found = _measured(stretches, input, output)
-            whole = any(len(part) == len(runs[place]) for place, part in parts)
-            if found.loop_width is not None or (whole and found.branch_gap is not None):
-                cycles = tuple(replace(c, recording=parts[c.recording][0]) for c in found.cycles)
-                levels.append(Level(held, replace(found, cycles=cycles)))
+    levels = _levels(runs, input, output, others)
     if levels:
-        most = max(levels, key=_moves_most).found
-        cycles = tuple(cycle for level in levels for cycle in level.found.cycles)
-        n_stretches = sum(level.found.n_recordings for level in levels)
-        levels = levels if len(levels) > 1 else []
-        found = replace(most, cycles=cycles, n_stretches=n_stretches, levels=tuple(levels))
+        found = replace(
+            max(
+                (level.found for level in levels),
+                key=lambda one: (one.loop_width is not None, one.output_span),
+            ),
+            cycles=tuple(cycle for level in levels for cycle in level.found.cycles),
+            n_stretches=sum(level.found.n_recordings for level in levels),
+            levels=tuple(levels) if len(levels) > 1 else (),
+        )
     elif moved:
         found = _measured(without(runs, input, output, moved), input, output)
-        blank = dict.fromkeys({*SHAPE, *BY_POSITION} - {"gain", "branch_gap"})
-        found = replace(found, cycles=(), adjusted=True, **blank)  # type: ignore[arg-type]
+        found = _blanked(found, (SHAPE | BY_POSITION) - {"gain", "branch_gap"})
+        found = replace(found, adjusted=True)
     else:
         raise DataError(
             f"it never moves while {', '.join(others)} stand still, so its effect cannot be identified",
@@ -297,24 +279,39 @@ def characterize(
     return replace(found, effects=moved, **_counts(runs, input, output))
 
 
-def _moves_most(level: Level) -> tuple[bool, float]:
-    return level.found.loop_width is not None, level.found.output_span
+def _levels(
+    runs: Sequence[Recording], given: str, wanted: str, others: Sequence[str]
+) -> list[Level]:
+    """Return what is found at every level of other inputs that shows a loop, or a recording's gap."""
+    levels = []
+    for at, parts in standing(runs, given, others):
+        stretches = [part for _, part in parts]
+        if all(np.ptp(part[wanted]) == 0 for part in stretches):
+            continue
+        found = _measured(stretches, given, wanted)
+        whole = any(len(part) == len(runs[place]) for place, part in parts)
+        if found.loop_width is not None or (whole and found.branch_gap is not None):
+            held = tuple((name, x, runs[0].units[name]) for name, x in zip(others, at, strict=True))
+            cycles = tuple(replace(c, recording=parts[c.recording][0]) for c in found.cycles)
+            levels.append(Level(held, replace(found, cycles=cycles)))
+    return levels
 
 
 def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any]:
     """Return what is known of recordings without looking at loops."""
     durations, steps = [run.duration for run in runs], {run.sample_time for run in runs}
-    ends = [
-        (float(min(one[name].min() for one in runs)), float(max(one[name].max() for one in runs)))
-        for name in (given, wanted)
-    ]
-    return {
+    ends = {
+        end: (
+            min(float(run[name].min()) for run in runs),
+            max(float(run[name].max()) for run in runs),
+        )
+        for end, name in (("input_range", given), ("output_range", wanted))
+    }
+    return ends | {
         "n_recordings": len(runs),
         "n_samples": sum(map(len, runs)),
         "duration": None if None in durations else float(sum(d or 0.0 for d in durations)),
         "sample_time": steps.pop() if len(steps) == 1 else None,
-        "input_range": ends[0],
-        "output_range": ends[1],
     }
 
 
@@ -322,21 +319,16 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
     """Return what is found in recordings in which nothing else moves, whatever their zeros."""
     several = len(runs) > 1 and all(given in run and wanted in run for run in runs)
     scale, tracks = prepare(levelled(runs, given, wanted) if several else runs, given, wanted)
-    units = tuple(_unit(runs, channel) for channel in (given, wanted))
     loops, branches = loops_of(tracks, scale), branches_of(tracks, scale)
-    largest, gaps = largest_of(loops), gaps_of(branches, scale.sign)
+    largest = largest_of(loops)
+    gap, gap_limits, p_loop = gap_of(branches, scale.sign)
     growth, growth_limits, speeds = rate_dependence(loops) or (None, None, None)
     upper, lower = dead_zones(tracks, scale)
-    crept = _crept(runs, given, wanted, scale)
+    crept = creep(runs, given, wanted, scale)
     curves = curves_of(branches, largest, scale)
     gains, onsets, saturations = ([curve[k] for curve in curves] for k in range(3))
     repeated: dict[str, Sequence[float | None]] = {
-        "loop_width": [loop.cycle.width for loop in largest],
-        "mid_width": [loop.mid_width for loop in largest],
-        "asymmetry": [loop.asymmetry for loop in largest],
-        "width_centroid": [loop.width_centroid for loop in largest],
-        "loop_area": [loop.area for loop in largest],
-        "loop_area_share": [loop.area_share for loop in largest],
+        **{name: [loop.figures[name] for loop in largest] for name in FIGURES},
         "gain": gains,
         "onset": () if None in onsets else onsets,
         "saturation": () if None in saturations else saturations,
@@ -347,60 +339,66 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
         "drift": drift(loops),
         "closure_error": minor_loop_errors(tracks, scale),
     }
-    values = {name: [x for x in each if x is not None] for name, each in repeated.items()}
-    limits = {name: interval(each) for name, each in values.items() if name != "creep_time"}
-    limits |= {"branch_gap": gaps.limits, "rate_dependence": growth_limits}
-    figures: dict[str, Any] = {name: median(each) for name, each in values.items()}
+    known = {name: [x for x in each if x is not None] for name, each in repeated.items()}
+    limits = {name: _interval(each) for name, each in known.items() if name != "creep_time"}
+    limits |= {"branch_gap": gap_limits, "rate_dependence": growth_limits}
+    figures: dict[str, Any] = {
+        name: float(np.median(each)) if each else None for name, each in known.items()
+    }
     position, direction, both = explained(tracks)
     found = Characterization(
         input=given,
         output=wanted,
-        input_unit=units[0],
-        output_unit=units[1],
+        input_unit=_unit(runs, given),
+        output_unit=_unit(runs, wanted),
         **_counts(runs, given, wanted),
         n_cycles=sum(len(whole_cycles(track.u, track.major_turns)) for track in tracks),
         n_reversals=sum(track.turns.size - 2 for track in tracks),
-        input_noise=None if np.isnan(scale.u_noise) else scale.u_noise,
-        output_noise=None if np.isnan(scale.y_noise) else scale.y_noise,
+        input_noise=None if np.isnan(scale.u.noise) else scale.u.noise,
+        output_noise=None if np.isnan(scale.y.noise) else scale.y.noise,
         cycles=tuple(loop.cycle for loop in loops),
         **figures,
-        branch_gap=gaps.gap,
+        branch_gap=gap,
+        p_loop=p_loop,
         rate_dependence=growth,
         speeds=speeds,
         position_share=position,
         direction_share=direction,
         loop_share=both,
-        p_dependence=p_of_slopes(tracks, scale),
-        p_loop=gaps.p,
-        drift_excluded=gaps.p is not None,
         falls=scale.sign < 0,
         intervals={name: found for name, found in limits.items() if found is not None},
     )
-    followed = found.depends and found.loop_share >= EXPLAINED
-    absent = set() if followed else {*SHAPE, *BY_POSITION} - {"branch_gap"}
+    absent = set() if both >= EXPLAINED else (SHAPE | BY_POSITION) - {"branch_gap"}
     if found.follows_direction:
-        absent |= set(BY_POSITION)
-    low, high = found.intervals.get("branch_gap", (1.0, 1.0))
+        absent |= BY_POSITION
+    low, high = gap_limits or (1.0, 1.0)
     if found.has_loop is False or low <= 0 <= high:
-        absent |= set(SHAPE)
-    kept = {name: limits for name, limits in found.intervals.items() if name not in absent}
+        absent |= SHAPE
+    return _blanked(found, absent)
+
+
+def _blanked(found: Characterization, absent: Collection[str]) -> Characterization:
+    """Return what is found without some of its figures."""
     cycles = () if "loop_width" in absent else found.cycles
+    kept = {name: limits for name, limits in found.intervals.items() if name not in absent}
     blank: dict[str, Any] = dict.fromkeys(absent)
     return replace(found, cycles=cycles, intervals=kept, **blank)
 
 
-def _crept(
-    runs: Sequence[Recording], given: str, wanted: str, scale: Scale
-) -> list[tuple[float, float]]:
-    """Return the times [s] and creep of the holds at least half as long as the longest."""
-    found = []
-    for run in runs:
-        if run.sample_time is not None:
-            u, y, span = run[given], run[wanted], scale.u_span
-            held = holds(u[:, np.newaxis], [span], shortest_hold(u, span))
-            found += [(run.sample_time * n, scale.sign * x) for n, x in creep(u, y, held, span)]
-    longest = max((time for time, _ in found), default=0.0)
-    return [(time, moved) for time, moved in found if time >= 0.5 * longest]
+def _interval(values: Sequence[float]) -> Range | None:
+    """Return the 95 % interval of the median of repeated values by Student's t; None of two or fewer.
+
+    It does not reach beyond zero where all values are of one sign.
+    """
+    from scipy.special import stdtrit
+
+    n = len(values)
+    if n < REPEATS:
+        return None
+    # the standard error of a median of normal values is 1.2533 times that of their mean
+    half = 1.2533 * float(np.std(values, ddof=1)) / np.sqrt(n) * float(stdtrit(n - 1, 0.975))
+    low, high = float(np.median(values)) - half, float(np.median(values)) + half
+    return max(low, 0.0) if min(values) >= 0 else low, min(high, 0.0) if max(values) <= 0 else high
 
 
 def _unit(runs: Sequence[Recording], channel: str) -> str:
@@ -412,11 +410,3 @@ def _unit(runs: Sequence[Recording], channel: str) -> str:
             remedy="convert them, or read the files with --unit",
         )
     return units.pop()
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -59,7 +59,7 @@ class Finding:
         The same as a root mean square, unit of the output.
     coefficient : float or None
         The offset [unit of the output], or how much later measured motion is than modelled [samples].
-    or_kinds : tuple of str
+    or_causes : tuple of (str, str)
         What it may be as well: beside them it is not certain.
     """
 
@@ -69,7 +69,7 @@ class Finding:
     share: float
     size: float
     coefficient: float | None = None
-    or_kinds: tuple[str, ...] = ()
+    or_causes: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,7 +247,8 @@ def _output(
     if exact:
         # what rounding follows is the arithmetic, or the sensor's steps
         residuals = [0.0 * e for e in residuals]
-    groups, tables = suspects(model, tested, place, every)
+    every_group, tables = suspects(model, tested, place, every)
+    groups = [group for group in every_group if group.kind != "start"]
     left = [averaged(e, every) for e, run in zip(residuals, runs, strict=True) if run in tested]
     regression = Regression(left, tables)
 
@@ -270,7 +271,10 @@ def _output(
     modelled = [run.modelled[:, place] for run in tested]
     patterns.append(pattern("output", channel.name, channel.unit, modelled))
     n_tests = len(model.outputs) * len(groups)
-    search = _Search(regression, left, groups, LEVEL / n_tests)
+    always = [
+        p for group in every_group if group.kind in ("offset", "start") for p in group.columns
+    ]
+    search = _Search(regression, left, groups, LEVEL / n_tests, always)
     return OutputCheck(
         output=channel.name,
         unit=channel.unit,
@@ -291,9 +295,15 @@ class _Search:
     """Groups that a residual follows, taken one by one, the most important first."""
 
     def __init__(
-        self, regression: Regression, left: Sequence[Array], groups: Sequence[Group], level: float
+        self,
+        regression: Regression,
+        left: Sequence[Array],
+        groups: Sequence[Group],
+        level: float,
+        always: Sequence[int],
     ) -> None:
         self.regression, self.groups, self.level = regression, groups, level
+        self.always = always
         self.residual = np.concatenate(left)
 
     def missing(self) -> tuple[Finding, ...]:
@@ -305,18 +315,22 @@ class _Search:
             while certain := [g for g in left if self._certain(g, known)]:
                 best = max(certain, key=lambda group: self._gain(group, known))
                 others = {
-                    group.kind: None
+                    (group.kind, group.channel): None
                     for group in certain
                     if group is not best
                     and not self._certain(best, (*known, *group.beside, *group.columns))
                 }
                 found.append(self.finding(best, known, tuple(others)))
                 known = (*known, *best.columns)
-                left = [g for g in left if g is not best and g.kind not in (*others, *ALONE)]
+                left = [
+                    g
+                    for g in left
+                    if g is not best and (g.kind, g.channel) not in others and g.kind not in ALONE
+                ]
         return tuple(found)
 
     def finding(
-        self, group: Group, known: tuple[int, ...] = (), others: tuple[str, ...] = ()
+        self, group: Group, known: tuple[int, ...] = (), others: tuple[tuple[str, str], ...] = ()
     ) -> Finding:
         """Return what a group explains beside others."""
         test = self._test(group, known)
@@ -331,7 +345,7 @@ class _Search:
             share=min(test.explained / total, 1.0) if total > 0 else 0.0,
             size=float(np.sqrt(test.explained / self.residual.size)),
             coefficient=coefficient,
-            or_kinds=others,
+            or_causes=others,
         )
 
     def _test(self, group: Group, known: Sequence[int]) -> FTest:
@@ -342,11 +356,11 @@ class _Search:
         return self._test(group, known).p_value <= self.level
 
     def _gain(self, group: Group, known: tuple[int, ...]) -> float:
-        """Return how much more a group explains than noise would, by Mallows' C_p, beside the mean.
+        """Return how much more a group explains than noise would, by Mallows' C_p.
 
-        With what it is beside: a branch by region may move the curve as well.
+        Beside mean and start, and with what it is beside: a branch by region may move the curve, too.
         """
-        before = set(known) | set(self.groups[0].columns)
+        before = {*known, *self.always}
         new = {*group.beside, *group.columns} - before
         found = self.regression.test(tuple(sorted(new)), tuple(sorted(before)))
         return found.explained - 2 * found.by_noise

@@ -12,19 +12,17 @@ from mckibben.diagnosis.tracks import FEWEST, Range
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves
-from mckibben.statistics import NORMAL_95, correlation_length
+from mckibben.statistics import correlation_length
 
-ALIKE = 0.02
-"""Share of all that another input does within which levels are one."""
+ALIKE, COVERS = 0.02, 0.5
+"""Share of all that another input does within which levels are one, and of the input range over which
+the input moves in a stretch that is measured."""
 
-COVERS = 0.5
-"""Share of the input range over which the input moves in a stretch that is measured."""
+FOLLOWS = 0.9
+"""Share of an input's variance (R²) that others explain, from which their effects are not separate."""
 
-MOST = 2000
-"""Samples of a recording by which effects are found."""
-
-KNOTS = 12
-"""Of the curve of the input beside which other inputs have an effect."""
+MOST, KNOTS = 2000, 12
+"""Samples of a recording by which effects are found, and knots of the curve of the input beside it."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,7 @@ class Effect:
     """How far another input that goes from ``low`` to ``high`` moves the output at equal input.
 
     By straight lines: the ``change`` of the output and that of its slope, ``gain_change``, each with its
-    95 % interval.
+    95 % interval; None where recordings do not tell the latter.
     """
 
     channel: str
@@ -41,8 +39,8 @@ class Effect:
     unit: str
     change: float
     limits: Range
-    gain_change: float
-    gain_limits: Range
+    gain_change: float | None
+    gain_limits: Range | None
 
 
 def others_of(
@@ -66,13 +64,13 @@ def others_of(
 
 
 Group = tuple[tuple[float, ...], list[tuple[int, Recording]]]
-"""Levels at which other inputs stand still, and the stretches where they do with their recordings."""
+"""Levels at which other inputs stand still; numbers of the recordings, and stretches where they do."""
 
 
 def standing(recordings: Sequence[Recording], given: str, others: Sequence[str]) -> list[Group]:
     """Return stretches in which all other inputs stand still and the input moves, by level."""
     span = max(float(np.ptp(one[given])) for one in recordings)
-    ranges = _spans(recordings, others)
+    ranges = np.ptp(np.concatenate([one.matrix(others) for one in recordings]), axis=0)
     found: list[tuple[Array, int, Recording]] = []
     for place, one in enumerate(recordings):
         columns = one.matrix(others)
@@ -114,45 +112,66 @@ def _hats(x: Array) -> Array:
 def effects(
     recordings: Sequence[Recording], given: str, wanted: str, others: Sequence[str]
 ) -> tuple[Effect, ...]:
-    """Return how far other inputs move an output at equal input; none where some move together.
+    """Return how far other inputs move an output at equal input; none where they move together.
 
     By least squares beside a curve of the input, each with a straight line, and that times the input.
     """
+    from scipy.special import stdtrit
+
     parts = [one.matrix((given, wanted, *others))[:: -(-len(one) // MOST)] for one in recordings]
     seen = np.concatenate(parts)
     x, y = seen[:, 0], seen[:, 1]
     lows, highs = seen[:, 2:].min(axis=0), seen[:, 2:].max(axis=0)
     shares = (seen[:, 2:] - lows) / (highs - lows) - 0.5
     k, middle = len(others), 0.5 * (x.min() + x.max())
+    if _together(parts, _hats(x), k):
+        return ()
     columns = np.column_stack([shares, shares * (x - middle)[:, np.newaxis], _hats(x)])
-    for terms in (
-        columns,
-        np.delete(columns, slice(k, 2 * k), axis=1),
-    ):  # slopes are not always told
-        slopes, _, rank, _ = np.linalg.lstsq(terms, y, rcond=None)
+    # changes of slope are not always told
+    for terms in (columns, np.delete(columns, slice(k, 2 * k), axis=1)):
+        found, _, rank, _ = np.linalg.lstsq(terms, y, rcond=None)
         if rank == terms.shape[1]:
             break
     else:
         return ()
-    left = y - terms @ slopes
+    left = y - terms @ found
     pieces = np.split(left, np.cumsum([len(part) for part in parts])[:-1])
-    variance = float(np.mean(left**2)) * correlation_length(pieces)
-    spread = NORMAL_95 * np.sqrt(variance * np.diag(np.linalg.inv(terms.T @ terms)))
-    found = []
-    for j, name in enumerate(others):
-        two = [(float(slopes[i]), float(spread[i])) for i in (j, j + k)]
-        (change, half), (gain, gain_half) = (
-            two if terms is columns else (two[0], (0.0, float("inf")))
+    memory = correlation_length(pieces)
+    # as many samples are independent, less those that the terms take
+    freedom = max(len(y) / memory - terms.shape[1], 1.0)
+    variance = float(left @ left) / freedom * np.diag(np.linalg.inv(terms.T @ terms))
+    half = float(stdtrit(freedom, 0.975)) * np.sqrt(variance)
+    limits = list(zip((found - half).tolist(), (found + half).tolist(), strict=True))
+    return tuple(
+        Effect(
+            channel=name,
+            low=float(lows[j]),
+            high=float(highs[j]),
+            unit=recordings[0].units[name],
+            change=float(found[j]),
+            limits=limits[j],
+            gain_change=float(found[j + k]) if terms is columns else None,
+            gain_limits=limits[j + k] if terms is columns else None,
         )
-        found.append(
-            Effect(
-                *(name, float(lows[j]), float(highs[j]), recordings[0].units[name], change),
-                (change - half, change + half),
-                gain,
-                (gain - gain_half, gain + gain_half),
-            )
-        )
-    return tuple(found)
+        for j, name in enumerate(others)
+    )
+
+
+def _together(parts: Sequence[Array], hats: Array, k: int) -> bool:
+    """Return whether another input follows from the input and the others, within recordings.
+
+    What moves only between recordings is separate.
+    """
+    seen = np.concatenate([part - part.mean(axis=0) for part in parts])[:, 2:]
+    curves = np.split(hats, np.cumsum([len(part) for part in parts])[:-1])
+    curve = np.concatenate([one - one.mean(axis=0) for one in curves])
+    for j in range(k):
+        beside = np.column_stack([curve, np.delete(seen, j, axis=1)])
+        left = seen[:, j] - beside @ np.linalg.lstsq(beside, seen[:, j], rcond=None)[0]
+        total = float(seen[:, j] @ seen[:, j])
+        if total > 0 and float(left @ left) < (1 - FOLLOWS) * total:
+            return True
+    return False
 
 
 def without(
@@ -165,11 +184,8 @@ def without(
         output = one[wanted]
         for effect in moved:
             share = (one[effect.channel] - effect.low) / (effect.high - effect.low) - 0.5
-            output = output - share * (effect.change + effect.gain_change * (one[given] - middle))
+            output = output - share * (
+                effect.change + (effect.gain_change or 0.0) * (one[given] - middle)
+            )
         found.append(one.with_channels({wanted: one.units[wanted]}, **{wanted: output}))
     return found
-
-
-def _spans(recordings: Sequence[Recording], names: Sequence[str]) -> Array:
-    seen = np.concatenate([one.matrix(names) for one in recordings])
-    return np.asarray(np.ptp(seen, axis=0))

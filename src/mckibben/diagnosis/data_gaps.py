@@ -13,43 +13,36 @@ from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.comparison.channels import channels_of
 from mckibben.comparison.shared_rows import without_copies
-from mckibben.diagnosis.excitation import Excitation, extremes, third_differences
+from mckibben.diagnosis.excitation import Excitation, extremes
 from mckibben.errors import DataError
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording, listed
+from mckibben.signals.reversals import third_differences
 
 if TYPE_CHECKING:
     from mckibben.comparison.channels import Names
 
-FEWEST_SAMPLES = 10
-"""Samples of a recording."""
+FEWEST_SAMPLES, MOST_SAMPLES = 10, 20_000
+"""Samples of a recording at least, and those in which correlations and sensor steps are looked for."""
 
-AT_END = 0.1
-"""Turning points this close to an end of the range, as a share of it, are at the end."""
+AT_END, OFF_REST = 0.1, 0.1
+"""Shares of a range: turning points this close to an end are at it; a channel this far off its most
+frequent value is off it."""
 
-SIMILAR = 1.5
-"""Speeds are compared between branches that differ in length by this factor at most."""
+LARGE, SIMILAR, FEWEST_BRANCHES = 0.25, 1.5, 4
+"""Speeds are compared of branches over this share of the range, that differ in length by this factor at
+most, and are so many at least; cycles of branches as long."""
 
-LARGE = 0.25
-"""Share of the range that branches cover whose speeds, or cycles, are compared."""
+REPEATED, LASTING, CYCLE_POINTS = 0.02, 1.1, 9
+"""Cycles are the same where channels are within this share of their ranges at so many points, and times
+within this factor."""
 
-FEWEST_BRANCHES = 4
-"""Branches of like length whose speeds are compared, at least."""
-
-OFF_REST = 0.1
-"""Share of its range by which a channel stands off its most frequent value."""
-
-MOST_SAMPLES = 20_000
-"""Samples in which correlations and sensor steps are looked for."""
-
-REPEATED, LASTING = 0.02, 1.1
-"""Share of its range within which a channel, and factor within which a time, are the same again."""
-
-CYCLE_POINTS = 9
-"""Points of a cycle that are compared."""
+NOISES = 4.0
+"""Standard deviations of noise by which channels of equal cycles may differ beyond that."""
 
 OWN_NOISE = 3.0
 """Scatter of an output over that of the inputs, in shares of their ranges, that is noise of its own."""
@@ -68,10 +61,8 @@ class Gap:
         Name of the rule: "rate", "creep", "minor loops" and so on.
     value, needed : float
         The number that shows it, and the value from which, or up to which, nothing is missing.
-    channels : tuple of str
-        Those concerned.
-    ranges : mapping of str to (float, float)
-        Lowest and highest value of each in the recordings.
+    channels, ranges : tuple of str, mapping of str to (float, float)
+        Those concerned, with their lowest and highest values in the recordings.
     run : str
         Kind of run that would identify it: a key of `planning.RUNS`, or what has to change.
     severity : float
@@ -93,19 +84,9 @@ class Gap:
 
 @dataclass(frozen=True)
 class Rule:
-    """A row of the table: a gap is named where a number is beyond what is needed.
+    """A row of the table: a gap is named where ``beyond(number, needed)`` is true.
 
-    Parameters
-    ----------
-    what, run, severity
-        As of `Gap`.
-    number : callable
-        Gives numbers by channels.
-    beyond : callable
-        ``beyond(number, needed)`` says whether there is a gap.
-    needed : float
-    timed : bool
-        Whether it needs time.
+    ``number`` gives numbers by channels; ``timed`` rules need time; the others are as of `Gap`.
     """
 
     what: str
@@ -178,9 +159,8 @@ def excitation(
     found = channels_of(every, inputs, outputs, None)
     driven = found.inputs
     if inputs is None and found.outputs == ("force",) and "pressure" in every[0]:
-        driven = tuple(
-            dict.fromkeys(("pressure", *driven))
-        )  # which models of force find themselves
+        # which models of force find themselves
+        driven = tuple(dict.fromkeys(("pressure", *driven)))
     names = (*driven, *found.outputs)
     for recording in every:
         if len(recording) < FEWEST_SAMPLES:
@@ -197,23 +177,21 @@ def excitation(
                 remedy="name them with --input and --output, or give recordings with the same channels",
             )
     told = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
-    loads = [name for name in told if all(name in recording for recording in every)]
-    kept = without_copies(every, driven, found.outputs)
-    return Excitation(tuple(kept), tuple(tests), driven, tuple(loads), found.outputs)
+    loads = tuple(name for name in told if all(name in recording for recording in every))
+    kept = tuple(without_copies(every, driven, found.outputs))
+    return Excitation(kept, tuple(tests), driven, loads, found.outputs)
 
 
 def _gaps(rule: Rule, known: Excitation) -> Iterator[Gap]:
     """Give the gap of a rule: its worst number, with the channels of all that are beyond."""
-    beyond = [
-        (value, names) for value, names in rule.number(known) if rule.beyond(value, rule.needed)
-    ]
-    if not beyond:
-        return
-    values = [value for value, _ in beyond]
-    worst = min(values) if rule.beyond(-np.inf, rule.needed) else max(values)
-    channels = tuple(dict.fromkeys(name for _, names in beyond for name in names))
-    ranges = {name: known.ranges[name] for name in channels}
-    yield Gap(rule.what, worst, rule.needed, channels, ranges, rule.run, rule.severity)
+    numbers = rule.number(known)
+    beyond = [(value, names) for value, names in numbers if rule.beyond(value, rule.needed)]
+    if beyond:
+        worst = min if rule.beyond(-np.inf, rule.needed) else max
+        value = worst(value for value, _ in beyond)
+        channels = tuple(dict.fromkeys(name for _, names in beyond for name in names))
+        ranges = {name: known.ranges[name] for name in channels}
+        yield Gap(rule.what, value, rule.needed, channels, ranges, rule.run, rule.severity)
 
 
 # -- rules -----------------------------------------------------------------------------------------
@@ -291,13 +269,16 @@ def _beyond_range(known: Excitation) -> Found:
 
 
 def _dependence(known: Excitation) -> Found:
-    """Give the share of the variance of inputs and loads that follows from the others (R²)."""
-    if len(known.moving) < 2:
+    """Give the share of the variance within recordings of an input that follows from others (R²)."""
+    names = [name for name in known.moving if known.branches[name]]
+    if len(names) < 2:
         return
-    samples = known.pooled(known.moving)
+    samples = np.concatenate(
+        [one.matrix(names) - one.matrix(names).mean(axis=0) for one in known.recordings]
+    )
     together = np.corrcoef(samples[:: max(1, len(samples) // MOST_SAMPLES)].T)
     inflation = np.diag(np.linalg.pinv(together + 1e-9 * np.eye(len(together))))
-    for name, factor in zip(known.moving, inflation.tolist(), strict=True):
+    for name, factor in zip(names, inflation.tolist(), strict=True):
         yield 1.0 - 1.0 / max(factor, 1.0), (name,)
 
 
@@ -335,36 +316,32 @@ def _samples_of_branch(known: Excitation) -> Found:
 
 def _resolution(known: Excitation) -> Found:
     """Give the noise of an output, or the step of its sensor if larger, as a share of its range."""
+    first = known.recordings[0]
+
+    def scatter(name: str) -> float:
+        return third_differences(first[name])[0] / known.span(name)
+
     for name in known.outputs if known.moving else ():
         if known.moves(name):
-            span = known.span(name)
-            follows = max(
-                third_differences(one[u])[0] / known.span(u)
-                for one in known.recordings[:1]
-                for u in known.moving
-            )
-            noisy = third_differences(known.recordings[0][name])[0] / span > OWN_NOISE * follows
+            noisy = scatter(name) > OWN_NOISE * max(map(scatter, known.moving))
             values = known.pooled([name])[:, 0]
             levels = np.unique(values[:: max(1, values.size // MOST_SAMPLES)])
             stepped = 2 < levels.size < min(values.size, MOST_SAMPLES) / 5
             step = float(np.quantile(np.diff(levels), 0.1)) if stepped else 0.0
-            yield max(known.noise[name] if noisy else 0.0, step) / span, (name,)
+            yield max(known.noise[name] if noisy else 0.0, step) / known.span(name), (name,)
 
 
 def _clipped(known: Excitation) -> Found:
-    """Give the samples in a row at one end of the range of a channel that has noise elsewhere."""
-    for name in (*known.moving, *known.outputs):
+    """Give the samples in a row at one end of the range of an output that has noise elsewhere."""
+    for name in known.outputs:
         steps = np.abs(np.diff(known.pooled([name])[:MOST_SAMPLES, 0]))
         if known.moves(name) and known.noise[name] > steps[steps > 0].min(initial=np.inf):
-            ends = known.ranges[name]
-            yield (
-                max(_longest(one[name] == end) for one in known.recordings for end in ends),
-                (name,),
-            )
+            at_ends = [one[name] == end for one in known.recordings for end in known.ranges[name]]
+            yield max(map(_longest, at_ends)), (name,)
 
 
-def _longest(true: Any) -> int:
-    edges = np.flatnonzero(np.diff(true.astype(np.int8), prepend=0, append=0))
+def _longest(true: NDArray[np.bool_]) -> int:
+    edges = np.flatnonzero(np.diff(true, prepend=False, append=False))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
@@ -388,7 +365,10 @@ def _repeated_cycles(known: Excitation) -> Found:
                 # from the middle of one branch to that of the next: turning points are flat
                 first, last = (branch.middle(recording[name]) for branch in (one, other))
                 at = np.linspace(first, last, CYCLE_POINTS).round().astype(int)
-                path = [recording[u][at] / known.span(u) for u in known.moving]
+                path = [
+                    recording[u][at] / (known.span(u) + NOISES * known.noise[u] / REPEATED)
+                    for u in known.moving
+                ]
                 ends = np.array([one.start, other.start, other.end]) / known.span(name)
                 lasts = np.log((last - first) * (recording.sample_time or 1.0)) / np.log(LASTING)
                 cycles.append([*np.concatenate([ends, *path]) / REPEATED, lasts])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,15 @@ from numpy.typing import NDArray
 from mckibben.arrays import NARROWEST, Array
 from mckibben.recording import Recording
 from mckibben.signals.holds import holds
-from mckibben.signals.reversals import reversals, swing_threshold
+from mckibben.signals.reversals import (
+    FEWEST,
+    GROWS,
+    OF_NORMAL,
+    branches_between,
+    reversals,
+    swing_threshold,
+    third_differences,
+)
 
 MOVES, LOAD_MOVES = 0.01, 0.1
 """Range, over the largest magnitude, from which a channel moves; a load, which inertia shakes."""
@@ -21,11 +28,8 @@ MOVES, LOAD_MOVES = 0.01, 0.1
 BRANCH = 0.1
 """Share of its range that a channel covers in a branch, at least."""
 
-MOST_BRANCHES = 2000
-"""Branches of a channel that are kept, evenly taken from more."""
-
-NOISY_RECORDINGS = 8
-"""Recordings in which noise is estimated."""
+MOST_BRANCHES, NOISY_RECORDINGS = 2000, 8
+"""Branches of a channel that are kept, and recordings in which noise is estimated, evenly taken."""
 
 CROSSINGS = np.linspace(0.1, 0.9, 9)
 """Shares of a branch between which its speed is taken."""
@@ -33,15 +37,7 @@ CROSSINGS = np.linspace(0.1, 0.9, 9)
 
 @dataclass(frozen=True)
 class Branch:
-    """A channel on its way from one turning point to the next.
-
-    Parameters
-    ----------
-    recording, first, last : int
-        Number of the recording, and samples of the turning points.
-    start, end : float
-        Values there.
-    """
+    """A channel on its way from one turning point to the next: recording, samples, values there."""
 
     recording: int
     first: int
@@ -128,13 +124,14 @@ class Excitation:
     @cached_property
     def turns(self) -> Mapping[str, tuple[NDArray[np.int64], ...]]:
         """Turning points of everything that moves, with both ends, of every recording."""
-        return {
-            name: tuple(self._turns(one, name) for one in self.recordings) for name in self.moving
-        }
 
-    def _turns(self, recording: Recording, name: str) -> NDArray[np.int64]:
-        noise = swing_threshold(self.noise[name], 0.0, len(recording))
-        return reversals(recording[name], max(noise, BRANCH * self.span(name)))
+        def found(name: str, u: Array) -> NDArray[np.int64]:
+            noise = swing_threshold(self.noise[name], 0.0, u.size)
+            return reversals(u, max(noise, BRANCH * self.span(name)))
+
+        return {
+            name: tuple(found(name, one[name]) for one in self.recordings) for name in self.moving
+        }
 
     @cached_property
     def branches(self) -> Mapping[str, tuple[Branch, ...]]:
@@ -142,13 +139,13 @@ class Excitation:
         found = {}
         for name in self.moving:
             every = [
-                Branch(number, int(first), int(last), float(u[first]), float(u[last]))
+                Branch(number, first, stop - 1, float(u[first]), float(u[stop - 1]))
                 for number, turns in enumerate(self.turns[name])
                 for u in [self.recordings[number][name]]
-                for first, last in pairwise(turns)
-                if abs(u[last] - u[first]) >= BRANCH * self.span(name)
+                for first, stop, _ in branches_between(u, turns)
             ]
-            found[name] = tuple(every[:: max(1, len(every) // MOST_BRANCHES)])
+            whole = [branch for branch in every if branch.travel >= BRANCH * self.span(name)]
+            found[name] = tuple(whole[:: max(1, len(whole) // MOST_BRANCHES)])
         return found
 
     def speed(self, name: str, branch: Branch) -> float:
@@ -163,21 +160,20 @@ class Excitation:
         rise = np.maximum(reached[after] - reached[before], 1e-12)
         times = before + np.clip((levels - reached[before]) / rise, 0.0, 1.0)
         step = float(np.diff(levels)[0])
-        return step / (max(float(np.median(np.diff(times))), 0.1) * (recording.sample_time or 1.0))
+        moving = max(float(np.quantile(np.diff(times), 0.25)), 0.1)
+        return step / (moving * (recording.sample_time or 1.0))
 
     @cached_property
     def longest_hold(self) -> float:
         """Longest time in which all inputs and loads stand still, after having moved [s]."""
         spans = [self.span(name) for name in self.moving]
-        return max(
-            (
-                (hold.stop - hold.start) * (recording.sample_time or 0.0)
-                for recording in self.recordings
-                for hold in holds(recording.matrix(self.moving), spans)
-                if hold.start > 0
-            ),
-            default=0.0,
-        )
+        lasting = [
+            (hold.stop - hold.start) * (recording.sample_time or 0.0)
+            for recording in self.recordings
+            for hold in holds(recording.matrix(self.moving), spans)
+            if hold.start > 0
+        ]
+        return max(lasting, default=0.0)
 
 
 def extremes(recordings: Sequence[Recording], name: str) -> tuple[float, float]:
@@ -186,18 +182,6 @@ def extremes(recordings: Sequence[Recording], name: str) -> tuple[float, float]:
     return min(float(x.min()) for x in values), max(float(x.max()) for x in values)
 
 
-def third_differences(x: Array) -> tuple[float, bool]:
-    """Return the median size of third differences, and whether white noise makes them.
-
-    Those of white noise are as large over every second sample; of motion, larger.
-    """
-    if x.size < 32:
-        return 0.0, False
-    one, two = (float(np.median(np.abs(np.diff(x[::k], 3)))) for k in (1, 2))
-    return one, two < 1.5 * one
-
-
 def _white(x: Array) -> float:
-    size, white = third_differences(x)
-    # 0.6745 is the median of |N(0, 1)|, and 20 the variance of its third differences
-    return size / (0.6745 * np.sqrt(20.0)) if white else 0.0
+    one, two = third_differences(x) if x.size >= FEWEST else (0.0, 0.0)
+    return one / OF_NORMAL if two < GROWS * one else 0.0

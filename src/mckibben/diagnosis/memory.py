@@ -7,30 +7,25 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.diagnosis.loops import Loop, alike
+from mckibben.diagnosis.loops import Loop
 from mckibben.diagnosis.tracks import Range, Scale, Track
-from mckibben.signals.holds import STILL
+from mckibben.recording import Recording
+from mckibben.signals.holds import STILL, holds, shortest_hold
 
 MOVED = 0.02
 """Output change, as a share of its range, from which the output is taken to have moved."""
 
-SAME = 0.01
-"""Share of the input range beyond which a level is passed."""
+SAME, HUNTED, MINOR = 0.01, 0.05, 0.9
+"""Shares of the input range: a level is passed beyond the first; a regulator hunts over the second; a
+loop larger than the third is a major one."""
 
-HUNTED = 0.05
-"""Share of the input range over which a regulator hunts: what turns back by less is no minor loop."""
+DENSE, SETTLED = 8, 0.1
+"""Samples that a branch must have for the output on it to be read between samples; share of a hold that
+is left out at its start, so that the lag of a jump is not taken for creep."""
 
-DENSE = 8
-"""Samples that a branch must have for the output on it to be read between samples."""
-
-SETTLED = 0.1
-"""Share of a hold that is left out at its start, so that the lag of a jump is not taken for creep."""
-
-ALIKE = 0.05
-"""Share of the amplitude by which the extremes of two cycles may differ for these to be compared."""
-
-SPEED_RATIO = 1.5
-"""Ratio of speeds from which on dependence on rate is judged."""
+ALIKE, SPEED_RATIO = 0.05, 1.5
+"""Cycles are compared whose extremes differ by this share of the amplitude at most, where their speeds
+differ by this ratio at least."""
 
 
 def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list[float]]:
@@ -44,15 +39,13 @@ def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list
     upper: list[float] = []
     lower: list[float] = []
     for track in tracks:
-        threshold = max(MOVED * scale.y_span, 6 * track.y_noise, 2 * scale.y_step)
-        turns, heights = track.turns, track.heights
-        for k in range(1, turns.size - 1):
-            if turns[k + 1] - turns[k] < DENSE:
+        threshold = max(MOVED * scale.y.span, 6 * track.y_noise, 2 * scale.y.step)
+        for k in range(1, track.turns.size - 1):
+            part, way = _branch(track, k)
+            u, y = track.u[part], track.y[part]
+            if u.size <= DENSE:
                 continue
-            way = np.sign(heights[k + 1] - heights[k])
-            piece = slice(turns[k], turns[k + 1] + 1)
-            travel = way * (track.u[piece] - heights[k])
-            moved = scale.sign * way * (track.y[piece] - track.y[turns[k]])
+            travel, moved = way * (u - u[0]), scale.sign * way * (y - y[0])
             once, twice = (_first_reach(travel, moved, limit * threshold) for limit in (1, 2))
             if once is not None and twice is not None:
                 (upper if way < 0 else lower).append(max(0.0, 2 * once - twice))
@@ -86,24 +79,24 @@ def minor_loop_errors(tracks: Sequence[Track], scale: Scale) -> list[float]:
     """
     found = []
     for track in tracks:
-        heights, turns = track.heights, track.turns
-        for departure, back in minor_loops(heights, SAME * scale.u_span):
-            if abs(heights[back] - heights[departure]) < HUNTED * scale.u_span:
+        heights = track.u[track.turns]
+        for departure, back in minor_loops(heights, SAME * scale.u.span):
+            part, way = _branch(track, back)
+            u, y, level = track.u[part], track.y[part], heights[departure]
+            size = abs(u[0] - level) / scale.u.span
+            if not HUNTED <= size <= MINOR or u.size < DENSE:
                 continue
-            returned = _output_at(track, back, float(heights[departure]))
+            returned = _first_reach(y, way * u, way * level)
             if returned is not None:
-                found.append(100 * abs(returned - float(track.y[turns[departure]])) / scale.y_span)
+                missed = abs(returned - float(track.y[track.turns[departure]]))
+                found.append(100 * missed / scale.y.span)
     return found
 
 
-def _output_at(track: Track, branch: int, level: float) -> float | None:
-    """Return the output where a branch first reaches an input level, or None if it is too coarse."""
-    start, stop = int(track.turns[branch]), int(track.turns[branch + 1]) + 1
-    if stop - start < DENSE:
-        return None
-    u = track.u[start:stop]
-    way = 1.0 if u[-1] > u[0] else -1.0
-    return _first_reach(track.y[start:stop], way * u, way * level)
+def _branch(track: Track, k: int) -> tuple[slice, float]:
+    """Return the samples from a turning point to the next, and the sign of the way."""
+    start, stop = track.turns[k : k + 2]
+    return slice(start, stop + 1), float(np.sign(track.u[stop] - track.u[start]))
 
 
 def _first_reach(wanted: Array, x: Array, limit: float) -> float | None:
@@ -117,50 +110,58 @@ def _first_reach(wanted: Array, x: Array, limit: float) -> float | None:
     return float(wanted[i - 1] + share * (wanted[i] - wanted[i - 1]))
 
 
-def creep(u: Array, y: Array, held: Sequence[slice], span: float) -> list[tuple[int, float]]:
-    """Return for how many samples the output creeps in each hold, and how far the way of the input.
+def creep(
+    runs: Sequence[Recording], given: str, wanted: str, scale: Scale
+) -> list[tuple[float, float]]:
+    """Return the times [s] and creep [output unit] of the holds at least half as long as the longest.
 
-    The first tenth of a hold is left out; the means over the second tenth and the last are compared.
-    Holds into which the input did not move are left out.
+    The first tenth of a hold is left out; the means over the second tenth and the last are compared,
+    positive where the output went on as it was going. Holds into which the input did not move are left
+    out.
     """
-    found = []
-    for hold in held:
-        lasts = hold.stop - hold.start
-        before = u[max(0, hold.start - lasts) : hold.start]
-        if before.size == 0 or np.ptp(before) < 2 * STILL * span:
+    span, found = scale.u.span, []
+    for run in runs:
+        u, y = run[given], run[wanted]
+        if run.sample_time is None:
             continue
-        way = np.sign(u[hold.start] - before[np.argmax(np.abs(before - u[hold.start]))])
-        part = max(1, round(SETTLED * lasts))
-        early, late = (y[at : at + part].mean() for at in (hold.start + part, hold.stop - part))
-        found.append((lasts - 2 * part, float(way * (late - early))))
-    return found
+        for hold in holds(u[:, np.newaxis], [span], shortest_hold(u, span)):
+            lasts = hold.stop - hold.start
+            before = u[max(0, hold.start - lasts) : hold.start]
+            if before.size == 0 or np.ptp(before) < 2 * STILL * span:
+                continue
+            came = u[hold.start] - before[np.argmax(np.abs(before - u[hold.start]))]
+            part = max(1, round(SETTLED * lasts))
+            early, late = (y[at : at + part].mean() for at in (hold.start + part, hold.stop - part))
+            crept = scale.sign * float(np.sign(came) * (late - early))
+            found.append((run.sample_time * (lasts - 2 * part), crept))
+    longest = max((time for time, _ in found), default=0.0)
+    return [(time, crept) for time, crept in found if time >= 0.5 * longest]
 
 
-Growth = tuple[float, Range, Range]
-"""How much wider the loop is at twice the speed [%], its 95 % interval, and between which speeds."""
+def rate_dependence(loops: Sequence[Loop]) -> tuple[float, Range, Range] | None:
+    """Return how much wider the loop is at twice the speed [%], its 95 % interval, and between which.
 
-
-def rate_dependence(loops: Sequence[Loop]) -> Growth | None:
-    """Return how the loop width depends on the logarithm of the mean speed, by a straight line.
-
-    Of three or more closed cycles between like extremes that differ most in speed; the first of a
-    recording, which starts from an unknown memory, apart.
+    By a straight line over the logarithm of the mean speed, of three or more closed cycles between like
+    extremes that differ most in speed; the first of a recording, which starts from an unknown memory,
+    apart.
     """
     from scipy.special import stdtrit
 
     timed = [
-        loop.cycle
+        (loop.cycle, np.log2(loop.cycle.rate))
         for loop in loops
         if loop.cycle.rate is not None and loop.closed and not loop.first
     ]
     # Any cycle may be the one to compare with; of very many, fifty will do.
-    wanted = timed[:: max(1, len(timed) // 50)]
-    groups = [[cycle for cycle in timed if alike(one, cycle, ALIKE)] for one in wanted]
-    rates = [np.log2([cycle.rate or 0.0 for cycle in group]) for group in groups]
-    widest = int(np.argmax([np.ptp(rate) for rate in rates])) if rates else 0
-    if not rates or rates[widest].size < 3 or np.ptp(rates[widest]) < np.log2(SPEED_RATIO):
+    groups = [
+        [(rate, cycle.width) for cycle, rate in timed if one.like(cycle, ALIKE)]
+        for one, _ in timed[:: max(1, len(timed) // 50)]
+    ]
+    if not groups:
         return None
-    speed, widths = rates[widest], np.array([cycle.width for cycle in groups[widest]])
+    speed, widths = np.transpose(max(groups, key=lambda group: np.ptp([rate for rate, _ in group])))
+    if speed.size < 3 or np.ptp(speed) < np.log2(SPEED_RATIO):
+        return None
     growth, offset = (float(x) for x in np.polyfit(speed, widths, 1))
     left, freedom = widths - (offset + growth * speed), speed.size - 2
     error = float(np.sqrt(left @ left / freedom / np.sum((speed - speed.mean()) ** 2)))

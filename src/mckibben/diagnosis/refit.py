@@ -37,10 +37,8 @@ class Refit:
         to the rest; of several outputs that of each over its range, on the mean.
     ratio : (float, float)
         95 % interval of new over old, by a paired block bootstrap.
-    n_folds : int
-        Parts.
-    older : int
-        Recordings of older data.
+    n_folds, older : int
+        Parts, and recordings of older data.
     """
 
     model: Block = field(repr=False)
@@ -81,12 +79,9 @@ def refitted(
     if estimator is None:
         return f"No estimator makes models of kind {old.kind!r}."
     inputs, outputs = ([c.name for c in channels] for channels in (old.inputs, old.outputs))
-    whole = [log.select([*inputs, *outputs]) for log in logs]
-    beside = [
-        one.select([*inputs, *outputs])
-        for one in older
-        if all(name in one for name in (*inputs, *outputs))
-    ]
+    names = [*inputs, *outputs]
+    whole = [log.select(names) for log in logs]
+    beside = [one.select(names) for one in older if all(name in one for name in names)]
     driving = [name for name in inputs if name not in old.scheduling]
     settings = {"seed": seed} | estimator.channel_settings(driving, outputs, old.scheduling)
     for part in old.parts if isinstance(old, Series) else (old,):
@@ -120,11 +115,11 @@ def refitted(
     sizes = spans if len(outputs) > 1 else np.ones(1)
     squares = [((errors / sizes) ** 2).mean(axis=1) for errors in after]
     bootstrap = BlockBootstrap([len(log) for log in whole], seed, correlation_length(squares))
-    old_errors, new_errors = np.concatenate(before) / sizes, np.concatenate(after) / sizes
-    tiny = np.finfo(float).tiny
-    ratios = bootstrap.rmse(new_errors) / np.maximum(bootstrap.rmse(old_errors), tiny)
-    rms = [float(np.sqrt((e**2).mean(axis=0)).mean()) for e in (old_errors, new_errors)]
-    return Refit(new, rms[0], rms[1], interval(ratios), len(parts), len(beside))
+    errors = [np.concatenate(each) / sizes for each in (before, after)]
+    of_old, of_new = (bootstrap.rmse(each) for each in errors)
+    ratio = interval(of_new / np.maximum(of_old, np.finfo(float).tiny))
+    missed_by = [float(np.sqrt((each**2).mean(axis=0)).mean()) for each in errors]
+    return Refit(new, missed_by[0], missed_by[1], ratio, len(parts), len(beside))
 
 
 def _kinds(block: Block) -> list[str]:

@@ -18,6 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.free_run import measured_start
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.control.twin import COMMAND
@@ -28,7 +29,7 @@ from mckibben.statistics import NORMAL_95, block_length, correlation_length
 from mckibben.system.showing import DrawsItself
 
 REFERENCE = "reference_"
-"""What the names of channels begin with that hold a desired motion."""
+"""What names of channels of a desired motion begin with."""
 
 LONGEST = 1.0
 """Delay that is looked for [s]; an eighth of the log at most."""
@@ -44,14 +45,8 @@ ROUNDING = 1e-9
 class Delay:
     """How much later one signal is than another, by dead time and lag together.
 
-    Parameters
-    ----------
-    where : str
-        Which is later than which.
-    seconds : float
-        Positive where the first comes later [s].
-    interval : (float, float)
-        Of 95 % [s].
+    ``where`` says which is later than which; ``seconds`` is positive where the first comes later, and
+    ``interval`` its interval of 95 % [s].
     """
 
     where: str
@@ -67,13 +62,11 @@ class Followed:
     ----------
     output, unit : str
         Channel.
-    achieved : float
-        Measured less reference.
+    achieved, residual : float
+        Measured less reference, and less what the model gives for measured pressures.
     predicted, pressure : float or None
         What the model gives for the commands, less reference; and what it gives for measured pressures
         less that. None where commands are not known.
-    residual : float
-        Measured less what the model gives for measured pressures.
     drift, drift_interval : float, (float, float)
         Slope of the residual over time [unit/s], and its interval of 95 %.
     time, reference, measured : array, shape (n,)
@@ -102,10 +95,8 @@ class Review(DrawsItself):
 
     Parameters
     ----------
-    logs : tuple of str
-        Names of the recordings.
-    model : str
-        Kind of the model.
+    logs, model : tuple of str, str
+        Names of the recordings, and the model's kind.
     outputs : tuple of Followed
     delays : tuple of Delay
         Of measured pressures after commands, and of measured after modelled motion, log by log.
@@ -130,14 +121,15 @@ class Review(DrawsItself):
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything for JSON, without samples."""
-        shown = {one.name: getattr(self, one.name) for one in fields(self)}
         outputs = [
             {one.name: getattr(each, one.name) for one in fields(each) if one.repr}
             for each in self.outputs
         ]
-        refit = self.refit.to_dict() if isinstance(self.refit, Refit) else self.refit
-        delays = [asdict(delay) for delay in self.delays]
-        return shown | {"outputs": outputs, "delays": delays, "refit": refit}
+        return {one.name: getattr(self, one.name) for one in fields(self)} | {
+            "outputs": outputs,
+            "delays": [asdict(delay) for delay in self.delays],
+            "refit": self.refit.to_dict() if isinstance(self.refit, Refit) else self.refit,
+        }
 
 
 def review(
@@ -181,12 +173,12 @@ def review(
     check_shared({"review": logs}, inputs, [channel.name for channel in model.outputs])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        links = [_Links(one, model, compensator, inputs) for one in logs]
+        links = [_link(one, model, compensator, inputs) for one in logs]
     found = Review(
         logs=tuple(one.name for one in logs),
         model=model.kind,
-        outputs=tuple(_followed(links, channel.name, channel.unit) for channel in outputs),
-        delays=tuple(delay for link in links for delay in link.delays([c.name for c in outputs])),
+        outputs=tuple(_followed(links, channel) for channel in outputs),
+        delays=tuple(each for link in links for each in link.delays if each is not None),
         clipped=sum(link.clipped for link in links),
         n_samples=sum(len(link.log) for link in links),
         judged_by=links[0].judged_by,
@@ -194,8 +186,7 @@ def review(
     if not refit or all(one.achieved <= ROUNDING * np.ptp(one.reference) for one in found.outputs):
         return found
     older = [one for one in every if not has_reference(one)]
-    again = refitted(model, [link.log for link in links], older, seed=seed)
-    return replace(found, refit=again)
+    return replace(found, refit=refitted(model, [link.log for link in links], older, seed=seed))
 
 
 def has_reference(recording: Recording) -> bool:
@@ -241,56 +232,57 @@ def _check(logs: Sequence[Recording], model: Block, inputs: Sequence[str], follo
     for log in logs:
         if log.sample_time is None:
             raise DataError("the log has no time", file=log.source, remedy="add a time column")
-        for channel in (*model.inputs, *model.outputs):
-            if channel.name in inputs and COMMAND + channel.name in log:
-                continue
-            log[channel.name]  # which says what is absent
+        for name in [channel.name for channel in (*model.inputs, *model.outputs)]:
+            if name not in inputs or COMMAND + name not in log:
+                log[name]  # which says what is absent
 
 
-class _Links:
-    """What the model makes of one log, at its scored samples.
+@dataclass(frozen=True, eq=False)
+class _Link:
+    """The scored samples of a log, and what the model gives for measured pressures and for commands."""
 
-    ``modelled`` has its outputs for measured pressures, ``commanded`` those for commands or None.
-    """
+    log: Recording
+    modelled: Recording
+    commanded: Recording | None
+    delays: Sequence[Delay | None]
+    clipped: int
+    judged_by: str
 
-    def __init__(
-        self, log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]
-    ) -> None:
-        names = [channel.name for channel in model.outputs]
-        sent, self.judged_by = _commands(log, model, compensator, inputs)
-        blind = [name for name in inputs if name not in log]
-        given = log.with_channels(**{n: _shifted(log[COMMAND + n], 1.0) for n in blind})
-        # the first measured output has noise, so its start counts where it leaves less of the log
-        first = given.matrix(channel.name for channel in model.inputs)[0]
-        starts = [model.initial_state(first), measured_start(model, given, names)]
-        runs = [model.simulate(given, initial=start.tolist()) for start in starts]
-        left = [np.sum((run.matrix(names) - given.matrix(names)) ** 2) for run in runs]
-        modelled, start = runs[int(np.argmin(left))], starts[int(np.argmin(left))].tolist()
-        # all counts from time zero on; `track` begins before it
-        begin = int(np.argmax(log.time >= -ROUNDING))
-        self.step, self.log = float(log.sample_time or 1.0), given.slice(begin, len(log))
-        self.modelled = modelled.slice(begin, len(log))
-        self.commanded: Recording | None = None
-        self.pressures: dict[str, tuple[Array, Array]] = {}
-        self.clipped = 0
-        if sent is None:
-            return
+
+def _link(log: Recording, model: Block, compensator: Block | None, inputs: Sequence[str]) -> _Link:
+    names = [channel.name for channel in model.outputs]
+    sent, judged_by = _commands(log, model, compensator, inputs)
+    measured = [name for name in inputs if name in log]
+    blind = {name: _shifted(log[COMMAND + name], 1.0) for name in inputs if name not in log}
+    log = log.with_channels(**blind)
+    # the first measured output has noise, so its start counts where it leaves less of the log
+    first = log.matrix(channel.name for channel in model.inputs)[0]
+    starts = [model.initial_state(first), measured_start(model, log, names)]
+    runs = [(model.simulate(log, initial=start.tolist()), start.tolist()) for start in starts]
+    motion = log.matrix(names)
+    modelled, start = min(runs, key=lambda run: float(np.sum((run[0].matrix(names) - motion) ** 2)))
+    # all counts from time zero on; `track` begins before it
+    scored = slice(int(np.argmax(log.time >= -ROUNDING)), len(log))
+    commanded, pairs, clipped = None, {}, 0
+    if sent is not None:
         # whatever was commanded at first, the muscle was where it was measured
-        whole = {n: np.append(given[n][:1], sent[n][1:]) for n in inputs}
-        commanded = model.simulate(given.with_channels(**whole), initial=start)
-        self.commanded = commanded.slice(begin, len(log))
-        self.pressures = {n: (sent[n][begin:], log[n][begin:]) for n in inputs if n in log}
-        references = [x[begin:] for n, x in log.channels.items() if n.startswith(REFERENCE)]
-        limits = [_at_limit(sent[n][begin:], references) for n in inputs]
-        self.clipped = int(np.any(limits, axis=0).sum())
-
-    def delays(self, outputs: Sequence[str]) -> list[Delay]:
-        """Return how late pressures and outputs are."""
-        pairs = {f"{n} after command": pair for n, pair in self.pressures.items()} | {
-            f"measured after modelled {n}": (self.modelled[n], self.log[n]) for n in outputs
-        }
-        found = [_delay(where, *pair, self.step) for where, pair in pairs.items()]
-        return [delay for delay in found if delay is not None]
+        whole = {name: np.append(log[name][:1], sent[name][1:]) for name in inputs}
+        commanded = model.simulate(log.with_channels(**whole), initial=start)
+        pairs = {f"{name} after command": (sent[name], log[name]) for name in measured}
+        references = [x[scored] for name, x in log.channels.items() if name.startswith(REFERENCE)]
+        limits = [_at_limit(command[scored], references) for command in sent.values()]
+        clipped = int(np.any(limits, axis=0).sum())
+    followed = [name for name in names if REFERENCE + name in log]
+    pairs |= {f"measured after modelled {n}": (modelled[n], log[n]) for n in followed}
+    step = log.sample_time or 1.0
+    return _Link(
+        log=log.slice(scored.start, scored.stop),
+        modelled=modelled.slice(scored.start, scored.stop),
+        commanded=None if commanded is None else commanded.slice(scored.start, scored.stop),
+        delays=[_delay(where, x[scored], y[scored], step) for where, (x, y) in pairs.items()],
+        clipped=clipped,
+        judged_by=judged_by,
+    )
 
 
 def _commands(
@@ -331,16 +323,17 @@ def _at_limit(command: Array, references: Sequence[Array]) -> Array:
     found = np.zeros(command.size, dtype=bool)
     near = ROUNDING * max(float(np.ptp(command)), 1.0)
     for extreme in (command.min(), command.max()):
-        flat = np.concatenate([[0], np.abs(command - extreme) <= near, [0]])
-        edges = np.flatnonzero(np.diff(flat))
+        flat = np.abs(command - extreme) <= near
+        edges = np.flatnonzero(np.diff(flat, prepend=False, append=False))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             moves = any(np.ptp(r[begin:end]) > ROUNDING * np.ptp(r) for r in references)
             found[begin:end] |= end - begin >= HELD and moves
     return found
 
 
-def _followed(links: Sequence[_Links], name: str, unit: str) -> Followed:
-    logs, step = [link.log for link in links], links[0].step
+def _followed(links: Sequence[_Link], channel: Channel) -> Followed:
+    logs, name = [link.log for link in links], channel.name
+    step = logs[0].sample_time or 1.0
     measured, reference = (
         np.concatenate([log[prefix + name] for log in logs]) for prefix in ("", REFERENCE)
     )
@@ -357,7 +350,7 @@ def _followed(links: Sequence[_Links], name: str, unit: str) -> Followed:
     time = logs[0].time if len(logs) == 1 else step * np.arange(measured.size)
     return Followed(
         output=name,
-        unit=unit,
+        unit=channel.unit,
         achieved=_rms(measured - reference),
         predicted=sizes.get("command"),
         pressure=sizes.get("pressure"),
@@ -392,20 +385,20 @@ def _delay(where: str, first: Array, then: Array, step: float) -> Delay | None:
     inner = slice(most, len(first) - most)
     got = then[inner] - then[inner].mean()
 
-    def later(samples: float) -> tuple[Array, Array]:
+    def later(samples: float) -> Array:
         moved = _shifted(first, samples)
-        x, slope = moved[inner], -np.gradient(moved)[inner]
-        return x - x.mean(), slope - slope.mean()
+        columns = np.column_stack([moved, -np.gradient(moved)])[inner]
+        return columns - columns.mean(axis=0)
 
     def explained(samples: float) -> float:
-        x = later(samples)[0]
+        x = later(samples)[:, 0]
         return float((x @ got) ** 2 / (x @ x))
 
     late, gain = float(max(range(-most, most + 1), key=explained)), 1.0
     for _ in range(3):
-        gain, change = np.linalg.lstsq(np.column_stack(later(late)), got, rcond=None)[0]
+        gain, change = np.linalg.lstsq(later(late), got, rcond=None)[0]
         late = float(np.clip(late + change / gain, -most, most))
-    x, slope = later(late)
+    x, slope = later(late).T
     alone = slope - x * (x @ slope) / (x @ x)
     product = alone * (got - gain * x)
     block = block_length(product.size, correlation_length([product]))

@@ -28,6 +28,9 @@ FEWEST, MOST = 400, 6000
 KNOTS = 8
 """Of curves over inputs, shared among them."""
 
+COVERED = (0.25, 0.75)
+"""Quantiles of an input that it has passed when memory from before a run no longer acts."""
+
 WAYS = (0.05, 0.2, 0.6)
 """Parts of half its range by which an input moves back until it is on the other branch."""
 
@@ -89,14 +92,14 @@ def suspects(
         kind: str,
         columns: Sequence[Array],
         channel: str = "",
-        beside: tuple[int, ...] = (0,),
+        beside: tuple[int, ...] | None = None,
         delay: int = 0,
     ) -> tuple[int, ...]:
         first, more = tables[0].shape[1], columns[0].shape[1]
         places = tuple(range(first, first + more))
         if not 0 < more <= room - first:
             return ()
-        groups.append(Group(kind, channel, places, beside, delay))
+        groups.append(Group(kind, channel, places, known if beside is None else beside, delay))
         for i, part in enumerate(columns):
             tables[i] = np.column_stack([tables[i], averaged(part, every)])
         return places
@@ -104,13 +107,15 @@ def suspects(
     modelled = _scaled([run.modelled[:, output] for run in runs])
     causes = {name: _scaled(_samples(runs, name)) for name in _moving(block, runs)}
     driven = [name for name in causes if name in _driven(block)]
-    add("offset", [np.ones((len(y), 1)) for y in modelled], beside=())
+    known: tuple[int, ...] = ()
+    known = add("offset", [np.ones((len(y), 1)) for y in modelled])
+    known += add("start", [_start([causes[name][i] for name in driven]) for i in range(len(runs))])
     delay = _best_delay(runs, output)
     add("lag", [_lagging(y, delay) for y in modelled], delay=delay)
     for name, x in causes.items():
         if name in driven:
             places = add("curve", _hats(x, max(KNOTS // len(driven), 4)), name)
-            add("hysteresis", [_branches(part) for part in x], name, (0, *places))
+            add("hysteresis", [_branches(part) for part in x], name, (*known, *places))
         else:
             acting = zip(x, modelled, strict=True)
             add("load", [np.column_stack([load, load * y]) for load, y in acting], name)
@@ -164,6 +169,16 @@ def _scaled(parts: Sequence[Array]) -> list[Array]:
     """Return samples scaled to a range from -1 to 1."""
     low, high = min(part.min() for part in parts), max(part.max() for part in parts)
     return [2 * (part - low) / ((high - low) or 1.0) - 1 for part in parts]
+
+
+def _start(inputs: Sequence[Array]) -> Array:
+    """Return where memory from before a run may act: until inputs have covered half of their range."""
+    reached = 0
+    for x in inputs:
+        low, high = np.quantile(x, COVERED)
+        reached = max(reached, int(np.argmax(x <= low)), int(np.argmax(x >= high)))
+    before = np.arange(len(inputs[0])) < min(reached, len(inputs[0]) // 2)
+    return before[:, np.newaxis].astype(np.float64)
 
 
 def _hats(parts: Sequence[Array], knots: int) -> list[Array]:

@@ -145,17 +145,15 @@ def characterization_sentences(found: Characterization) -> list[str]:
         f"{y} covers {_spanning(ends, found.output_unit)} while {u} covers "
         f"{_spanning(found.input_range, found.input_unit)}{_gain(found)}."
     ]
-    if not found.depends:
-        p = "" if found.p_dependence is None else f"p = {numeral(found.p_dependence, 2)}, "
-        said.append(
-            f"No dependence of {y} on {u} is visible: {p}{u} and its direction explain "
-            f"{_share(found.loop_share)} of its variance."
-        )
-    elif found.follows_direction:
+    if found.follows_direction:
         said.append(
             f"{y} follows the direction of {u}, as friction does, and has no inverse by {u}: velocity "
             f"explains {_share(found.direction_share)} of its variance, {u} "
             f"{_share(found.position_share)}."
+        )
+    elif found.loop_width is None and not found.adjusted:
+        said.append(
+            f"{u} and its direction explain {_share(found.loop_share)} of the variance of {y}."
         )
     said += [*_loop(found), *_motion(found), *_coupling(found)]
     return [f"{sentence[0].upper()}{sentence[1:]}" for sentence in said]
@@ -174,14 +172,14 @@ def _loop(found: Characterization) -> Iterator[str]:
     elif found.branch_gap is not None:
         shown = "" if found.has_loop else "; a loop is not shown by it"
         yield f"Mean gap between branches: {_figure(found, 'branch_gap', y)}{shown}."
-    if found.branch_gap is not None and not found.drift_excluded:
+    if found.branch_gap is not None and found.p_loop is None:
         yield "No recording has four branches: drift would part rising and falling output as well."
     if found.rate_dependence is not None and found.speeds is not None:
         unit = f"{found.input_unit}/s".lstrip("/")
         speeds = " to ".join(numeral(speed, 2) for speed in found.speeds)
         yield (
-            f"At twice the speed loop width grows by {_figure(found, 'rate_dependence', '%')} of the "
-            f"output range, from cycles at {speeds} {unit}."
+            f"From {speeds} {unit} loop width grows by {_figure(found, 'rate_dependence', '%')} of the "
+            "output range per doubling of speed, on average."
         )
     if found.closure_error is not None and found.loop_width is not None:
         yield f"Minor loops close within {_figure(found, 'closure_error', '%')} of the output range."
@@ -191,9 +189,9 @@ def _motion(found: Characterization) -> Iterator[str]:
     u, y = found.input_unit, found.output_unit
     if found.dead_zone_upper is not None and found.dead_zone_lower is not None:
         yield (
-            f"After a reversal {found.input} changes by {_figure(found, 'dead_zone_upper', u)} from "
-            f"above and {_figure(found, 'dead_zone_lower', u)} from below before {found.output} moves "
-            "back."
+            f"After a reversal, at these speeds, {found.input} changes by "
+            f"{_figure(found, 'dead_zone_upper', u)} from above and "
+            f"{_figure(found, 'dead_zone_lower', u)} from below before {found.output} moves back."
         )
     for name, side in (("onset", "Below"), ("saturation", "Above")):
         if getattr(found, name) is not None:
@@ -271,7 +269,6 @@ def characterization_rows(found: Characterization) -> list[Row]:
             "",
             "share that input and direction explain together",
         ),
-        row("p of dependence", "p_dependence", "", "probability of such slopes without dependence"),
         row("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
         row("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
         row("loop width at mid input", "mid_width", y, "the same in the unit of the output"),
@@ -388,7 +385,10 @@ def check_sentences(found: Validation) -> list[str]:
 
 def missed(one: OutputCheck, finding: Finding) -> str:
     """Return in a few words what a residual follows, and what it may be as well."""
-    kinds = [_KINDS[kind] for kind in (finding.kind, *finding.or_kinds)]
+    causes = [
+        _KINDS[kind].format(channel=channel or "the input")
+        for kind, channel in ((finding.kind, finding.channel), *finding.or_causes)
+    ]
     step, unit = (one.sample_time, "s") if one.sample_time else (1.0, "samples")
     value = finding.coefficient or 0.0
     number = ""
@@ -396,7 +396,7 @@ def missed(one: OutputCheck, finding: Finding) -> str:
         number = f" of {numeral(value, 2)} {one.unit}".rstrip()
     elif finding.kind == "lag" and value:
         number = f", about {numeral(value * step, 2)} {unit}"
-    return " or ".join(kinds).format(channel=finding.channel or "the input") + number
+    return " or ".join(causes) + number
 
 
 WHITE = 0.01
@@ -452,7 +452,7 @@ def _missed(one: OutputCheck, finding: Finding) -> str:
 
 
 def _advice(first: Finding) -> str:
-    return "" if first.or_kinds else _ADVICE.get(first.kind, "").format(channel=first.channel)
+    return "" if first.or_causes else _ADVICE.get(first.kind, "").format(channel=first.channel)
 
 
 def _p(value: float) -> str:
@@ -701,7 +701,10 @@ def inverse(study: Study) -> str:
         text = f"The inverse of {check.model} reaches {low} to {high} {unit}, error {error}"
     if check.uncompensated_error is not None:
         text += f"; a static map: {percent(check.uncompensated_error)}"
-    return f"{text}. The model's own error adds on the muscle."
+    own = next(row.test_error for row in study.leaderboard.rows if row.model == check.model)
+    return (
+        f"{text}. On the muscle the error of the model adds, {numeral(own, 2)} {unit} on the test."
+    )
 
 
 def verdict(study: Study) -> list[str]:

@@ -22,6 +22,9 @@ GROWS = 1.5
 
 FEWEST = 32
 
+OF_NORMAL = 0.6745 * np.sqrt(20.0)
+"""Median size of third differences of N(0, 1), of variance 20; 0.6745 is the median of |N(0, 1)|."""
+
 RANGE_SHARE = 0.01
 """Smallest swing that counts as a movement, relative to the range."""
 
@@ -58,12 +61,20 @@ def noise_level(x: ArrayLike, span: float | None = None) -> float:
     values = _checked(x)
     if values.size < 8:
         return float("nan")
-    scatter, twice = (float(np.median(np.abs(np.diff(values[::k], 3)))) for k in (1, 2))
-    # 0.6745 is the median of |N(0, 1)|, and 20 the variance that third differences give to N(0, 1).
-    noise = scatter / (0.6745 * np.sqrt(20.0))
+    scatter, twice = third_differences(values)
+    noise = scatter / OF_NORMAL
     span = float(np.ptp(values)) if span is None else span
     moves = values.size >= FEWEST and noise > SLIGHT * span and twice > GROWS * scatter
     return noise if noise <= NOISE_SHARE * span and not moves else float("nan")
+
+
+def third_differences(x: Array) -> tuple[float, float]:
+    """Return the median size of third differences, and of those over every second sample.
+
+    Of white noise they are alike; of motion the second is larger.
+    """
+    one, two = (float(np.median(np.abs(np.diff(x[::k], 3)))) for k in (1, 2))
+    return one, two
 
 
 def swing_threshold(noise: float, span: float, n: int) -> float:
@@ -144,8 +155,12 @@ def branches(x: ArrayLike, threshold: float | None = None) -> list[tuple[int, in
     [(0, 3, 1), (2, 4, -1)]
     """
     values = _checked(x)
-    turns = reversals(values, threshold)
-    ways = np.sign(np.diff(values[turns])).astype(int)
+    return branches_between(values, reversals(values, threshold))
+
+
+def branches_between(x: Array, turns: Indices) -> list[tuple[int, int, int]]:
+    """Return the branches between turning points that are known already, as `branches` does."""
+    ways = np.sign(np.diff(x[turns])).astype(int)
     return [
         (int(start), int(stop) + 1, int(way))
         for start, stop, way in zip(turns[:-1], turns[1:], ways, strict=True)

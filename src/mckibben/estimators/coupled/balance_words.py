@@ -21,6 +21,7 @@ from mckibben.estimators.coupled.balance_problem import at_rest, held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.base import LOADS
 from mckibben.numerals import numeral
+from mckibben.statistics import NORMAL_95
 
 POOR = 0.1
 """Error relative to the range from which a model is said not to explain the recordings."""
@@ -124,18 +125,19 @@ def said_of(trial: Trial, one: Measured) -> str:
     channel, output = (*trial.pressures, *trial.others)[one.place], trial.outputs[one.output]
     middle, swing = (numeral(v[one.place], 3) for v in (trial.middle, trial.swing))
     within = f" in {numeral(trial.seconds, 2)} s" if trial.seconds else ""
+    half = NORMAL_95 * one.error
     loop = f"a loop of ± {swing} about {middle} {channel.unit}{within}"
     if one.kind == "creep":
         return (
             f"{channel.name}: of a step of {swing} from {middle} {channel.unit}, held for "
             f"{numeral(trial.seconds, 2)} s, {numeral(100.0 * one.value, 3)} ± "
-            f"{numeral(100.0 * one.error, 2)} % comes after the first second"
+            f"{numeral(100.0 * half, 2)} % (95 %) comes after the first second"
         )
-    number = f"{numeral(one.value, 3)} ± {numeral(one.error, 2)} {one.unit}"
+    number = f"{numeral(one.value, 3)} ± {numeral(half, 2)} {one.unit}"
     if one.kind == "width":
-        return f"{channel.name}: {loop} is {number} wide"
+        return f"{channel.name}: {loop} is {number} wide (95 %)"
     at = " and ".join(numeral(float(p), 3) for p in trial.middle[: len(trial.pressures)])
-    return f"{output.name}: stiffness at {at} {trial.pressures[0].unit}, {loop}: {number}"
+    return f"{output.name}: stiffness at {at} {trial.pressures[0].unit}, {loop}: {number} (95 %)"
 
 
 def sentences(search: Search, z: Array, others: list[Array], balance: Balance) -> list[str]:

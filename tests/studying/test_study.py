@@ -13,6 +13,7 @@ import pytest
 from mckibben import GPI, PI, DataError, Recording, study
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
+from mckibben.diagnosis.check import Validation
 from mckibben.files import read, write
 from mckibben.rigs import load_rig
 from mckibben.signals import triangle
@@ -39,6 +40,16 @@ def test_predictions_are_those_that_were_scored(train: Recording) -> None:
     tail = error[len(found.train[0]) :]
     assert row.test is not None
     assert row.test.rmse == pytest.approx(float(np.sqrt(np.mean(tail**2))), rel=1e-12)
+
+
+def test_check_and_leaderboard_have_one_mean_to_beat(train: Recording) -> None:
+    found = study(train, models=["pi"], jobs=1)
+    assert isinstance(found.check, Validation)
+    assert found.leaderboard.constant is not None
+    (one,) = found.check.outputs
+    assert one.rmse == pytest.approx(found.leaderboard.rows[0].test_error)
+    assert one.mean_error == pytest.approx(found.leaderboard.constant.test_error)
+    assert not one.useless
 
 
 @pytest.mark.parametrize("block", [PI.example(), GPI.example()], ids=lambda b: b.kind)

@@ -132,8 +132,6 @@ def describe(
 
 def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, float]:
     """Return the covariance of a model's parameters, and independent samples; NaN where not known."""
-    if _means_nothing(block):
-        return unknown(block), np.nan
     outputs, inputs = ([c.name for c in some] for some in (block.outputs, block.inputs))
     share = min(1.0, MOST_OPERATIONS / max(_operations(block, recordings), 1.0))
     kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
@@ -145,6 +143,8 @@ def uncertainty(block: Block, recordings: Sequence[Recording]) -> tuple[Array, f
         )
         for r in kept
     )
+    if _means_nothing(block):
+        return unknown(block), np.nan
     data = TrainingData(runs, block.inputs, block.outputs)
     residual = data.target - simulate_started([block], data)[0]
     if not np.isfinite(residual).all():

@@ -184,11 +184,9 @@ def _start(inputs: Sequence[Array]) -> Array:
 def _hats(parts: Sequence[Array], knots: int) -> list[Array]:
     """Return piecewise-linear functions between knots that have as many samples between them."""
     at = np.unique(np.quantile(np.concatenate(parts), np.linspace(0, 1, knots)))
+    units = np.eye(at.size)[1:]
     return [
-        np.array([np.interp(part, at, knot) for knot in np.eye(at.size)[1:]])
-        .reshape(-1, part.size)
-        .T
-        for part in parts
+        np.reshape([np.interp(part, at, one) for one in units], (-1, part.size)).T for part in parts
     ]
 
 
@@ -208,14 +206,14 @@ def _lagging(modelled: Array, delay: int) -> Array:
 def _best_delay(runs: Sequence[Run], output: int) -> int:
     """Return by how many samples the modelled output is best shifted."""
     most = min(MOST_DELAY, min(len(run.inputs) for run in runs) // LONGER)
-    both = [(run.measured[:, output], run.modelled[:, output]) for run in runs]
 
     def left(delay: int) -> float:
-        # the same samples at every delay
-        return sum(
-            float(np.sum((y[most : len(y) - most] - x[most - delay : len(y) - most - delay]) ** 2))
-            for y, x in both
-        )
+        total = 0.0
+        for run in runs:
+            n = len(run.inputs)  # the same samples at every delay
+            y = run.measured[most : n - most, output]
+            total += float(np.sum((y - run.modelled[most - delay : n - most - delay, output]) ** 2))
+        return total
 
     return min(range(-most, most + 1), key=lambda delay: (left(delay), abs(delay)))
 

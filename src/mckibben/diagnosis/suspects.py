@@ -28,8 +28,9 @@ FEWEST, MOST = 400, 6000
 KNOTS = 8
 """Of curves over inputs, shared among them."""
 
-COVERED = (0.25, 0.75)
-"""Quantiles of an input that it has passed when memory from before a run no longer acts."""
+COVERED, START = (0.25, 0.75), 8
+"""Quantiles of an input that it has passed when memory from before a run no longer acts, within the
+first of so many parts of it."""
 
 WAYS = (0.05, 0.2, 0.6)
 """Parts of half its range by which an input moves back until it is on the other branch."""
@@ -172,12 +173,15 @@ def _scaled(parts: Sequence[Array]) -> list[Array]:
 
 
 def _start(inputs: Sequence[Array]) -> Array:
-    """Return where memory from before a run may act: until inputs have covered half of their range."""
+    """Return where memory from before a run may act: until inputs have covered half of their range.
+
+    At most an eighth of a run: over one cycle, more would be a branch.
+    """
     reached = 0
     for x in inputs:
         low, high = np.quantile(x, COVERED)
         reached = max(reached, int(np.argmax(x <= low)), int(np.argmax(x >= high)))
-    before = np.arange(len(inputs[0])) < min(reached, len(inputs[0]) // 2)
+    before = np.arange(len(inputs[0])) < min(reached, len(inputs[0]) // START)
     return before[:, np.newaxis].astype(np.float64)
 
 

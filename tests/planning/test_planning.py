@@ -106,7 +106,7 @@ def test_an_exact_fit_has_no_errors(play: Block) -> None:
 
 @pytest.mark.parametrize("given", [{"rig": "mas20-hanging"}, {"muscle": "dmsp20-150"}])
 def test_without_recordings_errors_are_those_of_a_likely_muscle(given: dict[str, Any]) -> None:
-    found = plan(**given, minutes=1.0)
+    found = plan(**given, minutes=2.0)
     assert {step.what for step in found.steps} >= {"random", "repeats", "holds"}
     assert any(one.after is not None for one in found.parameters)
     assert all(one.now is None for one in found.parameters)

@@ -26,16 +26,11 @@ def told(tell: Callable[[float, str], None], last: str = "") -> Callable[[Standi
     last : str
         What is done when all models are.
     """
-    begun = False
 
     def pass_on(standing: Standing) -> None:
-        nonlocal begun
         text = str(standing)
-        if standing.done and not begun:
-            text = f"going on from what was finished: {text}"
         if standing.done == standing.total and last:
             text += f"; {last}"
-        begun = True
         tell(standing.done / standing.total, text)
 
     return pass_on

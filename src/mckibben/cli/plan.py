@@ -105,7 +105,7 @@ def plan(
 
 
 def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{numeral(100 * share, 2)} %"
+    return "-" if share is None else "over 100 %" if share > 1 else f"{numeral(100 * share, 2)} %"
 
 
 def _how_to_record(planned: Recording, rig: str | None, out: Path) -> str:

@@ -41,9 +41,6 @@ REPEATED, LASTING, CYCLE_POINTS = 0.02, 1.1, 9
 """Cycles are the same where channels are within this share of their ranges at so many points, and times
 within this factor."""
 
-NOISES = 4.0
-"""Standard deviations of noise by which channels of equal cycles may differ beyond that."""
-
 OWN_NOISE = 3.0
 """Scatter of an output over that of the inputs, in shares of their ranges, that is noise of its own."""
 
@@ -143,7 +140,8 @@ def data_gaps(
 def gaps_of(known: Excitation) -> tuple[Gap, ...]:
     """Return the gaps of what recordings contain, most important first."""
     found = [gap for rule in RULES if known.timed or not rule.timed for gap in _gaps(rule, known)]
-    return tuple(sorted(found, key=lambda gap: -gap.severity))
+    still = [gap for gap in found if gap.what == "still"]
+    return tuple(still or sorted(found, key=lambda gap: -gap.severity))
 
 
 def excitation(
@@ -293,6 +291,8 @@ def _load_by_output(known: Excitation) -> Found:
 
 def _together(known: Excitation) -> Found:
     """Give the share of samples in which two channels are both off their most frequent values."""
+    if len(known.moving) < 2:
+        return
     samples = known.pooled(known.moving)[:: max(1, sum(map(len, known.recordings)) // MOST_SAMPLES)]
     off = np.empty(samples.shape, dtype=bool)
     for place, name in enumerate(known.moving):
@@ -365,10 +365,7 @@ def _repeated_cycles(known: Excitation) -> Found:
                 # from the middle of one branch to that of the next: turning points are flat
                 first, last = (branch.middle(recording[name]) for branch in (one, other))
                 at = np.linspace(first, last, CYCLE_POINTS).round().astype(int)
-                path = [
-                    recording[u][at] / (known.span(u) + NOISES * known.noise[u] / REPEATED)
-                    for u in known.moving
-                ]
+                path = [recording[u][at] / known.span(u) for u in known.moving]
                 ends = np.array([one.start, other.start, other.end]) / known.span(name)
                 lasts = np.log((last - first) * (recording.sample_time or 1.0)) / np.log(LASTING)
                 cycles.append([*np.concatenate([ends, *path]) / REPEATED, lasts])

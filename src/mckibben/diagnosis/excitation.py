@@ -14,12 +14,10 @@ from mckibben.recording import Recording
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import (
     FEWEST,
-    GROWS,
-    OF_NORMAL,
     branches_between,
+    noise_level,
     reversals,
     swing_threshold,
-    third_differences,
 )
 
 MOVES, LOAD_MOVES = 0.01, 0.1
@@ -183,5 +181,5 @@ def extremes(recordings: Sequence[Recording], name: str) -> tuple[float, float]:
 
 
 def _white(x: Array) -> float:
-    one, two = third_differences(x) if x.size >= FEWEST else (0.0, 0.0)
-    return one / OF_NORMAL if two < GROWS * one else 0.0
+    noise = noise_level(x) if x.size >= FEWEST else 0.0
+    return 0.0 if np.isnan(noise) else noise

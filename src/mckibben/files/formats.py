@@ -134,6 +134,8 @@ def refusing(path: Path) -> Iterator[None]:
 def _module(path: Path, endings: Collection[str], done: str) -> ModuleType:
     ending = path.suffix.casefold()
     if ending not in endings:
-        problem = f"files ending in {ending or 'nothing'!r} cannot be {done}"
+        problem = (
+            f"files {f'ending in {ending!r}' if ending else 'without an ending'} cannot be {done}"
+        )
         raise DataError(problem, file=path, remedy=f"give one of {', '.join(endings)}")
     return import_module(f"mckibben.files.{READERS[ending]}")

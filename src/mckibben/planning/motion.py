@@ -21,8 +21,8 @@ SHARE = 0.3
 HOLD = 10.0
 """Shortest hold [s]."""
 
-CYCLES = 2
-"""Full cycles of everything together: what comes twice shows how well motion repeats."""
+CYCLES = 3
+"""Full cycles of everything together: of the second and the third, lags of the first have settled."""
 
 PEAK = np.pi / 2
 """Highest over mean speed of a half cosine."""

@@ -264,7 +264,10 @@ def _fitted(known: Excitation, model: str | None, seed: int) -> Block | None:
     """Return a model fitted to recordings; None where the usual one does not apply."""
     usual = "plan of force" if known.outputs == ("force",) else "plan of displacement"
     kind = registry.load("estimators", model or default_model(usual))  # type: ignore[arg-type]
-    settings = kind.channel_settings(known.inputs, known.outputs, known.loads or None)
+    channels = known.inputs, known.outputs, known.loads or None
+    if model is None and kind.objection(list(known.recordings), *channels) is not None:
+        return None
+    settings = kind.channel_settings(*channels)
     try:
         block: Block = kind(**settings, seed=seed).fit(list(known.recordings)).model_
     except MckibbenError:

@@ -164,8 +164,8 @@ def _loop(found: Characterization) -> Iterator[str]:
     if found.loop_width is not None:
         shape = "" if found.asymmetry is None else f"; asymmetry {numeral(found.asymmetry, 2)} %"
         yield (
-            f"Loop width at mid {found.input}: {_figure(found, 'loop_width', '%')} of the output range, "
-            f"{_figure(found, 'mid_width', y)}{shape}."
+            f"Loop width at mid {found.input}: {_figure(found, 'loop_width', '%')} of the output range "
+            f"of the cycle, {_figure(found, 'mid_width', y)}{shape}."
         )
     elif found.branch_gap is not None and found.has_loop is False:
         yield f"No loop: the mean gap between branches is {_figure(found, 'branch_gap', y)}."
@@ -187,7 +187,7 @@ def _loop(found: Characterization) -> Iterator[str]:
 
 def _motion(found: Characterization) -> Iterator[str]:
     u, y = found.input_unit, found.output_unit
-    if found.dead_zone_upper is not None and found.dead_zone_lower is not None:
+    if found.dead_zone_upper and found.dead_zone_lower:
         yield (
             f"After a reversal, at these speeds, {found.input} changes by "
             f"{_figure(found, 'dead_zone_upper', u)} from above and "
@@ -354,7 +354,7 @@ def _share(share: float) -> str:
 
 def _spanning(limits: tuple[float, float], unit: str) -> str:
     """Return limits to about a percent of their distance, so that noise at 0 is not spelled out."""
-    digits = 2 - math.floor(math.log10(abs(limits[1] - limits[0])))
+    digits = 2 - math.floor(math.log10(abs(limits[1] - limits[0]) or 1.0))
     low, high = (f"{round(limit, digits) + 0.0:.6g}" for limit in limits)
     return f"{low} to {high} {unit}".rstrip()
 
@@ -439,7 +439,7 @@ def _residual(one: OutputCheck) -> str:
     residual = f"The residual of {one.output}, {size} RMS ({of_range}),"
     if not one.missing:
         return f"{residual} follows none of {one.n_tests} causes tested."
-    first = one.missing[0]
+    first = max(one.missing, key=lambda finding: finding.share)
     return f"{residual} follows {missed(one, first)}: {percent(first.share)} of its variance."
 
 
@@ -492,7 +492,7 @@ LEFT_OPEN = "Not closed by this plan: {gap} {run}"
 EXTRAPOLATED = "{channel} goes beyond the recordings: errors there are extrapolated."
 RUN = "Record {what}."
 RUNS = {
-    "random": "all inputs and loads moving at random over {levels}",
+    "random": "all inputs and loads moving at random{levels}",
     "speeds": "the same motion three times slower and three times faster",
     "holds": "holds of 30 s at several levels",
     "repeats": "one run twice",
@@ -509,7 +509,7 @@ def gap_sentence(gap: Gap) -> str:
         value=numeral(gap.value, 2),
         needed=numeral(gap.needed, 2),
         percent=f"{numeral(100 * gap.value, 2)} %",
-        levels=_levels(gap),
+        levels=_levels(gap.ranges),
     )
 
 
@@ -520,7 +520,9 @@ def gap_name(gap: Gap) -> str:
 
 def gap_run(gap: Gap) -> str:
     """Return the run that would identify it."""
-    return RUN.format(what=RUNS[gap.run].format(levels=_levels(gap)))
+    moved = {name: ends for name, ends in gap.ranges.items() if ends[0] < ends[1]}
+    levels = f" over {_levels(moved)}" if moved else ""
+    return RUN.format(what=RUNS[gap.run].format(levels=levels))
 
 
 def plan_sentences(plan: Plan) -> list[str]:
@@ -534,13 +536,13 @@ def plan_sentences(plan: Plan) -> list[str]:
     ]
 
 
-def _levels(gap: Gap) -> str:
-    """Return the recorded ranges of the channels of a gap."""
+def _levels(ranges: Mapping[str, tuple[float, float]]) -> str:
+    """Return recorded ranges of channels."""
     return listing(
         [
             " to ".join(dict.fromkeys(f"{end:.3g}" for end in ends))
             + f" {standard_unit(name) or ''}"
-            for name, ends in gap.ranges.items()
+            for name, ends in ranges.items()
         ]
     ).strip()
 
@@ -676,7 +678,7 @@ def _how_far(study: Study) -> str:
     of = f" for {worst}" if len(best.band.coverage) > 1 else ""
     half = numeral(best.band.width[worst] / 2, 2)
     level, held = percent(best.band.level), percent(best.band.coverage[worst])
-    return f"The {level} band{of}, ±{half} {best.band.unit_of_width} wide, held {held} of the test."
+    return f"The {level} band{of}, ±{half} {best.band.unit_of_width}, held {held} of the test."
 
 
 def _record_next(study: Study) -> str:

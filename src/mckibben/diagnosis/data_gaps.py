@@ -196,9 +196,9 @@ def _gaps(rule: Rule, known: Excitation) -> Iterator[Gap]:
 
 
 def _still(known: Excitation) -> Found:
-    """Give the range of outputs that do not move, or of inputs where none does."""
-    names = [name for name in known.outputs if not known.moves(name)]
-    for name in names or ([] if known.moving else known.driven):
+    """Give the outputs that are constant, or the inputs where all are."""
+    names = [name for name in known.outputs if known.constant(name)]
+    for name in names or (known.driven if all(map(known.constant, known.driven)) else ()):
         yield 0.0, (name,)
 
 

@@ -14,10 +14,12 @@ from mckibben.recording import Recording
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import (
     FEWEST,
+    GROWS,
+    OF_NORMAL,
     branches_between,
-    noise_level,
     reversals,
     swing_threshold,
+    third_differences,
 )
 
 MOVES, LOAD_MOVES = 0.01, 0.1
@@ -111,9 +113,12 @@ class Excitation:
 
     def moves(self, channel: str) -> bool:
         """Return whether a channel moves by more than its noise and a small share of its size."""
+        return not self.constant(channel) and self.span(channel) > 10 * self.noise[channel]
+
+    def constant(self, channel: str) -> bool:
+        """Return whether a channel moves by a small share of its size at most."""
         share = LOAD_MOVES if channel in self.loads else MOVES
-        size = share * max(map(abs, self.ranges[channel]))
-        return self.span(channel) > max(size, 10 * self.noise[channel], NARROWEST)
+        return self.span(channel) <= max(share * max(map(abs, self.ranges[channel])), NARROWEST)
 
     def pooled(self, channels: Sequence[str]) -> Array:
         """Return the samples of all recordings, shape (n, channels)."""
@@ -181,5 +186,5 @@ def extremes(recordings: Sequence[Recording], name: str) -> tuple[float, float]:
 
 
 def _white(x: Array) -> float:
-    noise = noise_level(x) if x.size >= FEWEST else 0.0
-    return 0.0 if np.isnan(noise) else noise
+    one, two = third_differences(x) if x.size >= FEWEST else (0.0, 0.0)
+    return one / OF_NORMAL if two < GROWS * one else 0.0

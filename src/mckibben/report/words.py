@@ -412,7 +412,7 @@ _KINDS = {
     "drift": "time within a recording (drift)",
     "speed": "the speed of the output",
     "creep": "slow motion in holds (creep)",
-    "output": "the position (a curve or an end stop)",
+    "output": "the position (curve or stop)",
 }
 
 _ADVICE = {
@@ -462,7 +462,7 @@ def _p(value: float) -> str:
 # --- Data gaps and plans ----------------------------------------------------------------------------
 
 GAPS = {
-    "still": "Nothing can be identified: {channels} moves by no more than its noise.",
+    "still": "Nothing can be identified: {channels} is constant.",
     "hysteresis": "Hysteresis cannot be identified: {channels} has {value} turning points.",
     "minor loops": "Minor loops cannot be identified: {value} turning points of {channels} lie "
     "inside its range on one side, where {needed} are needed.",

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mckibben.diagnosis.conditions import (
+    COVERS,
     Effect,
     effects,
     levelled,
@@ -285,13 +286,16 @@ def _levels(
 ) -> list[Level]:
     """Return what is found at every level of other inputs that shows a loop, or a recording's gap."""
     levels = []
+    low, high = extremes(runs, given)
+    span = high - low
     for at, parts in standing(runs, given, others):
         stretches = [part for _, part in parts]
         if all(np.ptp(part[wanted]) == 0 for part in stretches):
             continue
         found = _measured(stretches, given, wanted)
-        whole = any(len(part) == len(runs[place]) for place, part in parts)
-        if found.loop_width is not None or (whole and found.branch_gap is not None):
+        if all(cycle.amplitude < COVERS * span for cycle in found.cycles):
+            found = _blanked(found, SHAPE - {"branch_gap"})  # of small cycles
+        if found.loop_width is not None or found.branch_gap is not None:
             held = tuple((name, x, runs[0].units[name]) for name, x in zip(others, at, strict=True))
             cycles = tuple(replace(c, recording=parts[c.recording][0]) for c in found.cycles)
             levels.append(Level(held, replace(found, cycles=cycles)))

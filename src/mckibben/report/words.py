@@ -376,7 +376,7 @@ def check_sentences(found: Validation) -> list[str]:
             white = one.whiteness.p_value > WHITE
             own.append(f"It is {'' if white else 'not '}white ({_p(one.whiteness.p_value)}).")
         if one.missing and not one.exact:
-            own.append(_advice(one.missing[0]))
+            own.append(_advice(_largest(one)))
         said += [
             f"{one.output}: {each}" if len(found.outputs) > 1 else each for each in own if each
         ]
@@ -419,7 +419,6 @@ _ADVICE = {
     "load": "Fit a model that reads {channel}.",
     "hysteresis": "Compare models with other hysteresis, as to branches and minor loops.",
     "lag": "Fit a model with a lag, or measure pressure at the muscle.",
-    "drift": "Warm the rig up before recording, or fit again when it has.",
     "speed": "Compare rate-dependent models.",
     "creep": "Compare models with viscoelastic states.",
     "output": "Check the rig for a stop or contact at the ends of its range.",
@@ -439,8 +438,12 @@ def _residual(one: OutputCheck) -> str:
     residual = f"The residual of {one.output}, {size} RMS ({of_range}),"
     if not one.missing:
         return f"{residual} follows none of {one.n_tests} causes tested."
-    first = max(one.missing, key=lambda finding: finding.share)
+    first = _largest(one)
     return f"{residual} follows {missed(one, first)}: {percent(first.share)} of its variance."
+
+
+def _largest(one: OutputCheck) -> Finding:
+    return max(one.missing, key=lambda finding: finding.share)
 
 
 def _missed(one: OutputCheck, finding: Finding) -> str:
@@ -518,9 +521,9 @@ def gap_name(gap: Gap) -> str:
     return GAPS[gap.what].split(" cannot be ")[0].format(channels=listing(gap.channels)).lower()
 
 
-def gap_run(gap: Gap) -> str:
-    """Return the run that would identify it."""
-    moved = {name: ends for name, ends in gap.ranges.items() if ends[0] < ends[1]}
+def gap_run(gap: Gap, ranges: bool = True) -> str:
+    """Return the run that would identify it, perhaps with the ranges recorded so far."""
+    moved = {name: ends for name, ends in gap.ranges.items() if ends[0] < ends[1] and ranges}
     levels = f" over {_levels(moved)}" if moved else ""
     return RUN.format(what=RUNS[gap.run].format(levels=levels))
 
@@ -686,14 +689,14 @@ def _record_next(study: Study) -> str:
         return "No data gaps were found."
     first, *others = study.data_gaps
     more = f" ({len(others)} more in the report)" if others else ""
-    return f"{gap_run(first)[:-1]}: {gap_name(first)} cannot be identified{more}."
+    return f"{gap_run(first, ranges=False)[:-1]}: {gap_name(first)} cannot be identified{more}."
 
 
 def inverse(study: Study) -> str:
     """Return which model is inverted and how well it is followed, or that none is."""
     check, unit = study.inverse, study.leaderboard.unit
     if check is None:
-        return "" if study.leaderboard.pending else "No inverse: no model recommended has one."
+        return "" if study.leaderboard.pending else "No inverse: no recommended model has one."
     error = percent(check.error)
     if check.reachable is None:
         motion = "its own output for the test" if check.own else "the motion of the test"

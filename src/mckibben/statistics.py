@@ -1,6 +1,6 @@
 """Residual statistics: what can be said of errors whose neighbours are alike.
 
-Every interval and test of the package counts dependent samples by these functions. Pieces of a series
+Intervals and tests of time series count dependent samples by these functions. Pieces of a series
 (one per recording) are pooled, and nothing crosses from one into the next.
 """
 
@@ -135,9 +135,22 @@ def autoregression(series: Sequence[Array]) -> Autoregression:
     return Autoregression(chosen, float(np.sqrt(max(power_of_best, 0.0))), variance)
 
 
-def effective_sample_size(series: Sequence[Array]) -> float:
-    """Return how many independent samples determine the mean of pieces (n,) as well as all of them."""
-    return sum(map(len, series)) / max(correlation_length(series), 1.0)
+def hats(x: Array, n_knots: int) -> Array:
+    """Return piecewise-linear functions of samples (n,) between knots with as many samples between.
+
+    Their sum is 1, shape (n, knots).
+    """
+    knots = np.unique(np.quantile(x, np.linspace(0, 1, n_knots)))
+    return np.column_stack([np.interp(x, knots, row) for row in np.eye(knots.size)])
+
+
+def dependence(columns: Array) -> Array:
+    """Return the share of the sum of squares of columns (n, k) that the others explain (R²), (k,)."""
+    size = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(size > 0, size, 1.0)
+    gram = scaled.T @ scaled + 1e-9 * np.eye(size.size)
+    inflation = np.where(size > 0, np.diag(np.linalg.pinv(gram)), 1.0)
+    return np.asarray(1.0 - 1.0 / np.maximum(inflation, 1.0))
 
 
 def block_length(n: int, correlation: float = 1.0) -> int:

@@ -76,9 +76,9 @@ def invert(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write the inverse of a saved model: wished-for output in, input out.
+    """Write the inverse of a saved model: desired output in, input out.
 
-    Of a model of force, what is written gives the pressure by wished-for force and length. With
+    Of a model of force, what is written gives the pressure by desired force and length. With
     --for force, what is written gives the force by measured displacements and pressures: simulate it.
     With --adaptive, what is written also takes what is measured, and learns from it while it runs.
     """

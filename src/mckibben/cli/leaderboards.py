@@ -52,7 +52,7 @@ def print_leaderboard(board: Leaderboard) -> None:
     say(f"Split: {board.split}.")
     print_table(["model", *(column.label for column in columns)], rows)
     say(f"All errors are free-run simulation errors. {words.STARTED}")
-    say("Rank: by test RMSE. Gap: hysteresis width reproduced (100 % is exact).")
+    say("Rank: by test RMSE. Width reproduced: of the hysteresis loop (100 % is exact).")
     if board.level:
         say(f"≈ {words.LEVEL}.")
     if board.constant is not None and board.rows:

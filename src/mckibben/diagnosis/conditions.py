@@ -12,7 +12,7 @@ from mckibben.diagnosis.tracks import FEWEST, Range
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, moves
-from mckibben.statistics import correlation_length
+from mckibben.statistics import correlation_length, dependence, hats
 
 ALIKE, COVERS = 0.02, 0.5
 """Share of all that another input does within which levels are one, and of the input range over which
@@ -95,18 +95,12 @@ def levelled(recordings: Sequence[Recording], given: str, wanted: str) -> list[R
     seen = [one.matrix((given, wanted))[:: -(-len(one) // MOST)] for one in recordings]
     own = np.repeat(np.eye(len(seen)), [len(part) for part in seen], axis=0)
     x, y = np.concatenate(seen).T
-    offsets = np.linalg.lstsq(np.column_stack([own, _hats(x)]), y, rcond=None)[0][: len(seen)]
+    offsets = np.linalg.lstsq(np.column_stack([own, hats(x, KNOTS)]), y, rcond=None)[0][: len(seen)]
     offsets -= offsets @ own.mean(axis=0)
     return [
         one.with_channels({wanted: one.units[wanted]}, **{wanted: one[wanted] - offset})
         for one, offset in zip(recordings, offsets.tolist(), strict=True)
     ]
-
-
-def _hats(x: Array) -> Array:
-    """Return piecewise-linear functions between levels with as many samples between them."""
-    knots = np.unique(np.quantile(x, np.linspace(0, 1, KNOTS)))
-    return np.column_stack([np.interp(x, knots, row) for row in np.eye(knots.size)])
 
 
 def effects(
@@ -124,9 +118,9 @@ def effects(
     lows, highs = seen[:, 2:].min(axis=0), seen[:, 2:].max(axis=0)
     shares = (seen[:, 2:] - lows) / (highs - lows) - 0.5
     k, middle = len(others), 0.5 * (x.min() + x.max())
-    if _together(parts, _hats(x), k):
+    if _together(parts, hats(x, KNOTS), k):
         return ()
-    columns = np.column_stack([shares, shares * (x - middle)[:, np.newaxis], _hats(x)])
+    columns = np.column_stack([shares, shares * (x - middle)[:, np.newaxis], hats(x, KNOTS)])
     # changes of slope are not always told
     for terms in (columns, np.delete(columns, slice(k, 2 * k), axis=1)):
         found, _, rank, _ = np.linalg.lstsq(terms, y, rcond=None)
@@ -165,13 +159,7 @@ def _together(parts: Sequence[Array], hats: Array, k: int) -> bool:
     seen = np.concatenate([part - part.mean(axis=0) for part in parts])[:, 2:]
     curves = np.split(hats, np.cumsum([len(part) for part in parts])[:-1])
     curve = np.concatenate([one - one.mean(axis=0) for one in curves])
-    for j in range(k):
-        beside = np.column_stack([curve, np.delete(seen, j, axis=1)])
-        left = seen[:, j] - beside @ np.linalg.lstsq(beside, seen[:, j], rcond=None)[0]
-        total = float(seen[:, j] @ seen[:, j])
-        if total > 0 and float(left @ left) < (1 - FOLLOWS) * total:
-            return True
-    return False
+    return bool((dependence(np.column_stack([curve, seen]))[-k:] > FOLLOWS).any())
 
 
 def without(

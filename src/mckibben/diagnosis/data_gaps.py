@@ -22,6 +22,7 @@ from mckibben.errors import DataError
 from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording, listed
 from mckibben.signals.reversals import third_differences
+from mckibben.statistics import dependence
 
 if TYPE_CHECKING:
     from mckibben.comparison.channels import Names
@@ -61,7 +62,7 @@ class Gap:
     channels, ranges : tuple of str, mapping of str to (float, float)
         Those concerned, with their lowest and highest values in the recordings.
     run : str
-        Kind of run that would identify it: a key of `planning.RUNS`, or what has to change.
+        Kind of run that would identify it: a key of `report.words.RUNS`, or what has to change.
     severity : float
         From 0 to 1: how wrong a model from these recordings may be.
     """
@@ -274,10 +275,9 @@ def _dependence(known: Excitation) -> Found:
     samples = np.concatenate(
         [one.matrix(names) - one.matrix(names).mean(axis=0) for one in known.recordings]
     )
-    together = np.corrcoef(samples[:: max(1, len(samples) // MOST_SAMPLES)].T)
-    inflation = np.diag(np.linalg.pinv(together + 1e-9 * np.eye(len(together))))
-    for name, factor in zip(names, inflation.tolist(), strict=True):
-        yield 1.0 - 1.0 / max(factor, 1.0), (name,)
+    shares = dependence(samples[:: max(1, len(samples) // MOST_SAMPLES)])
+    for name, share in zip(names, shares.tolist(), strict=True):
+        yield share, (name,)
 
 
 def _load_by_output(known: Excitation) -> Found:

@@ -18,6 +18,7 @@ from mckibben.blocks.hysteresis.pi import PI
 from mckibben.diagnosis.free_runs import Run
 from mckibben.signals.holds import holds
 from mckibben.signals.reversals import reversals
+from mckibben.statistics import hats
 
 PER_BRANCH, PER_COLUMN = 24, 6
 """Blocks to a usual branch of the input, and to a column at least."""
@@ -186,12 +187,9 @@ def _start(inputs: Sequence[Array]) -> Array:
 
 
 def _hats(parts: Sequence[Array], knots: int) -> list[Array]:
-    """Return piecewise-linear functions between knots that have as many samples between them."""
-    at = np.unique(np.quantile(np.concatenate(parts), np.linspace(0, 1, knots)))
-    units = np.eye(at.size)[1:]
-    return [
-        np.reshape([np.interp(part, at, one) for one in units], (-1, part.size)).T for part in parts
-    ]
+    """Return piecewise-linear functions of all parts, but for the first, which the mean makes up for."""
+    found = hats(np.concatenate(parts), knots)[:, 1:]
+    return np.split(found, np.cumsum([len(part) for part in parts])[:-1])
 
 
 def _branches(x: Array) -> Array:

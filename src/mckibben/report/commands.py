@@ -75,7 +75,7 @@ def commands(study: Study, typed: Typed | None = None) -> list[tuple[str, str]]:
     if study.inverse is not None:
         lines.append(
             (
-                f"From a wished-for {board.output} to {board.input}",
+                f"From a desired {board.output} to {board.input}",
                 ["simulate", "inverse.json", "reference.csv", "-o", "feedforward.csv"],
             )
         )

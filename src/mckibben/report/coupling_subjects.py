@@ -23,6 +23,7 @@ from mckibben.report.drawing import (
     axis_label,
     left_out,
 )
+from mckibben.statistics import dependence
 
 SMALL = 500
 """Points of a small picture."""
@@ -124,8 +125,7 @@ def coupling(
     highest = np.max([r.matrix(inputs).max(axis=0) for r in recordings], axis=0)
     ranges = highest - np.min([r.matrix(inputs).min(axis=0) for r in recordings], axis=0)
     effects = (gains / np.where(size > 0, size, 1.0)[:, np.newaxis] * ranges[:, np.newaxis]).T
-    inflation = np.diag(np.linalg.pinv(scaled.T @ scaled + 1e-9 * np.eye(len(inputs))))
-    if (1.0 - 1.0 / np.maximum(inflation, 1.0) > FOLLOWS).any():  # not separate, by R²
+    if (dependence(u) > FOLLOWS).any():
         effects = np.full_like(effects, np.nan)
     total = np.sum(y**2, axis=0)
     left = np.sum((y - scaled @ gains) ** 2, axis=0)

@@ -56,8 +56,8 @@ BY_VALUE = """(a, b, one, other) => {
 ABOUT = (
     "Every model is run from its inputs alone, never put right by what was measured. Models are sorted "
     "by {heading}, their error by {by}; the first is to be chosen, and nothing is chosen by the test. "
-    "{careful}Gap kept: 100 % where the model keeps rising and falling branches as far apart as the "
-    "data do, 0 where it forgot. R² counts from the test's own mean, which may lie closer where the "
+    "{careful}Width reproduced: 100 % where the model has rising and falling branches as far apart as "
+    "the data, 0 where it forgot. R² counts from the test's own mean, which may lie closer where the "
     "test hardly varies. Inverse: exact by a formula, solved in every step, or none, and then "
     "there is nothing to compensate with. Select one or two models to look closer."
 )

@@ -271,8 +271,8 @@ def _leaderboard(board: Leaderboard) -> Table:
         ("test RMSE [mm]", "test.rmse"),
         ("fit RMSE [mm]", "train.rmse"),
         ("R² [%]", "test.r2"),
-        ("gap kept [%]", "memory.gap_ratio"),
-        ("kept in a hold [%]", "memory.hold_ratio"),
+        ("width reproduced [%]", "memory.gap_ratio"),
+        ("width held [%]", "memory.hold_ratio"),
         ("parameters", "n_parameters"),
     ]
     rows: list[tuple[Cell, ...]] = []

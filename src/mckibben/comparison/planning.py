@@ -48,11 +48,6 @@ class Plan:
     empty: Leaderboard
     refused: Mapping[str, str]
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What was done to the recordings."""
-        return self.empty.notes
-
     @cached_property
     def constant(self) -> Constant:
         """The mean of the training output as a model."""

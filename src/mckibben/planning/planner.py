@@ -64,8 +64,6 @@ NOISE = 0.003
 LOADED = 0.3
 """Share of a muscle's largest force that it is loaded with at most, where no load is known."""
 
-GRAVITY = 9.81
-
 USUAL = 0.02
 """Sample time of a plan without recordings [s]."""
 
@@ -290,7 +288,7 @@ def _of_muscle(given: str | Path, rig: Rig | None) -> tuple[Block, Limits]:
     highest = {"bar": sheet.max_pressure_bar, "N": LOADED * sheet.force}
     for channel in block.inputs:
         if rig is not None and channel.unit == "N" and channel.name not in limits:
-            hung = GRAVITY * float(rig.known().get("payload_kg", 0.0))
+            hung = 9.81 * float(rig.known().get("payload_kg", 0.0))
             limits[channel.name] = Limit(hung, hung, 1.0, hung)
         elif rig is None and channel.unit in highest:
             high = highest[channel.unit]

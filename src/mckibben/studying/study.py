@@ -214,7 +214,7 @@ def study(
         predictions={},
         inverse=None,
         load=next(iter(channels.scheduling or ()), None),
-        notes=(*notes, *plan.notes),
+        notes=(*notes, *plan.empty.notes),
         data_gaps=data_gaps(recordings, looped, channels.outputs, tests=tests),
         review=reviewed,
     )

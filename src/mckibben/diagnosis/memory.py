@@ -162,9 +162,10 @@ def rate_dependence(loops: Sequence[Loop]) -> tuple[float, Range, Range] | None:
     speed, widths = np.transpose(max(groups, key=lambda group: np.ptp([rate for rate, _ in group])))
     if speed.size < 3 or np.ptp(speed) < np.log2(SPEED_RATIO):
         return None
-    growth, offset = (float(x) for x in np.polyfit(speed, widths, 1))
-    left, freedom = widths - (offset + growth * speed), speed.size - 2
-    error = float(np.sqrt(left @ left / freedom / np.sum((speed - speed.mean()) ** 2)))
-    half = error * float(stdtrit(freedom, 0.975))
+    _, place, count = np.unique(np.round(4 * speed), return_inverse=True, return_counts=True)
+    # every speed weighs the same, however many cycles have it
+    found, spread = np.polyfit(speed, widths, 1, w=1 / np.sqrt(count[place]), cov=True)
+    growth = float(found[0])
+    half = float(np.sqrt(spread[0, 0]) * stdtrit(speed.size - 2, 0.975))
     ends = float(2 ** speed.min()), float(2 ** speed.max())
     return growth, (growth - half, growth + half), ends

@@ -283,9 +283,9 @@ def _leaderboard(board: Leaderboard) -> Table:
         "The whole field on the same data, lowest test error first",
         ("model", *(heading for heading, _ in columns), "failed because"),
         tuple(rows),
-        "Free-running, plain; cross-validated within the calibration run (not in the quick run). Gap "
-        "kept: the model's gaps between branches over the recorded ones (100 % is perfect); kept in a "
-        "hold: what survives of the model's own gap.",
+        "Free-running, plain; cross-validated within the calibration run (not in the quick run). Width "
+        "reproduced: the model's gaps between branches over the recorded ones (100 % is exact); width "
+        "held: what is left of the model's own gap in a hold.",
     )
 
 

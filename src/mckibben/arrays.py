@@ -10,3 +10,12 @@ Array = NDArray[np.float64]
 
 NARROWEST = 1e-30
 """Least range of a channel that can be computed with, in its unit: products of less would vanish."""
+
+
+def true_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the first of each run of true values and the first after it, shape (m, 2).
+
+    >>> true_runs(np.array([True, False, True, True])).tolist()
+    [[0, 1], [2, 4]]
+    """
+    return np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)

@@ -13,8 +13,8 @@ from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import true_runs
 from mckibben.comparison.channels import channels_of
 from mckibben.comparison.shared_rows import without_copies
 from mckibben.diagnosis.excitation import Excitation, extremes
@@ -337,12 +337,7 @@ def _clipped(known: Excitation) -> Found:
         steps = np.abs(np.diff(known.pooled([name])[:MOST_SAMPLES, 0]))
         if known.moves(name) and known.noise[name] > steps[steps > 0].min(initial=np.inf):
             at_ends = [one[name] == end for one in known.recordings for end in known.ranges[name]]
-            yield max(map(_longest, at_ends)), (name,)
-
-
-def _longest(true: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(true, prepend=False, append=False))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+            yield max(int(np.diff(true_runs(at)).max(initial=0)) for at in at_ends), (name,)
 
 
 def _untimed(known: Excitation) -> Found:

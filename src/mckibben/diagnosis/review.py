@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, true_runs
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
@@ -322,8 +322,7 @@ def _at_limit(command: Array, references: Sequence[Array]) -> Array:
     near = ROUNDING * max(float(np.ptp(command)), 1.0)
     for extreme in (command.min(), command.max()):
         flat = np.abs(command - extreme) <= near
-        edges = np.flatnonzero(np.diff(flat, prepend=False, append=False))
-        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        for begin, end in true_runs(flat):
             moves = any(np.ptp(r[begin:end]) > ROUNDING * np.ptp(r) for r in references)
             found[begin:end] |= end - begin >= HELD and moves
     return found

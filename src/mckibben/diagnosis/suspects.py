@@ -53,8 +53,9 @@ class Group:
     Parameters
     ----------
     kind : str
-        ``offset``, ``curve`` over an input, ``load``, ``hysteresis`` (branches by region), ``lag``,
-        ``drift``, ``speed``, ``creep``, ``output`` (its curve) or ``runs`` (offsets between them).
+        ``offset``, ``start`` (memory from before a run), ``curve`` over an input, ``load``,
+        ``hysteresis`` (branches by region), ``lag``, ``drift``, ``speed``, ``creep``, ``output`` (its
+        curve) or ``runs`` (offsets between them).
     channel : str
         The channel that they are made of; "" for the output and time.
     columns : tuple of int

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, true_runs
 from mckibben.files import timebase
 from mckibben.files.converting import Times
 from mckibben.files.notices import listed
-from mckibben.files.quality import Mask, runs
+from mckibben.files.quality import Mask
 from mckibben.files.request import FEWEST, Source
 from mckibben.files.units import convert
 
@@ -90,7 +90,7 @@ def pieces(
             for name, mask in missing.items()
         }
         begin = start + (step or 1.0) * first if times is None else times.seconds(t[0])
-        marked = begin + (step or 1.0) * (runs(bridged) - [0, 1])
+        marked = begin + (step or 1.0) * (true_runs(bridged) - [0, 1])
         found.append(Piece(samples, step, float(begin), marked.tolist()))
     return found
 

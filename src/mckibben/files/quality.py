@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, true_runs
 from mckibben.files.headers import unit_of
 from mckibben.files.notices import listed
 from mckibben.files.request import Source
@@ -54,11 +54,6 @@ CODES = np.array([sign * size for size in _SIZES for sign in (1.0, -1.0)])
 
 WRAPS = (2.0**8, 2.0**10, 2.0**12, 2.0**16, 2.0**32)
 """Range of integer counters, which begin anew beyond it."""
-
-
-def runs(mask: Mask) -> NDArray[np.intp]:
-    """Return the first of each run of true values and the first after it, shape (m, 2)."""
-    return np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
 
 
 def wraps(values: Array) -> tuple[float, Array] | None:
@@ -143,7 +138,7 @@ def note_outliers(channel: str, values: Array, source: Source) -> None:
         return
     known = values[finite]
     low, high = np.quantile(known, (0.01, 0.99))
-    first, after = runs(np.maximum(known - high, low - known) > high - low).T
+    first, after = true_runs(np.maximum(known - high, low - known) > high - low).T
     lone = (after - first <= 3) & (first > 0) & (after < known.size)
     if high > low and lone.any():
         n, at = np.sum((after - first)[lone]), int(finite[first[lone][0]])

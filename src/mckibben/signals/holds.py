@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, true_runs
 from mckibben.signals.reversals import NOISE_SHARE, noise_level, swing_threshold
 
 STILL = 0.01
@@ -53,17 +53,15 @@ def holds(columns: Array, spans: Sequence[float] | None = None, shortest: int = 
     stretches: list[tuple[int, slice]] = []
     length = shortest
     while length <= n:
-        quiet = np.ones(n - length + 1, dtype=np.int8)
+        quiet = np.ones(n - length + 1, dtype=bool)
         window = slice(length // 2, length // 2 + quiet.size)
         for x, band in zip(columns.T, bands, strict=True):
             swing = maximum_filter1d(x, length) - minimum_filter1d(x, length)
             quiet &= swing[window] <= band
         if not quiet.any():
             break
-        edges = np.flatnonzero(np.diff(quiet, prepend=0, append=0))
         stretches += [
-            (length, slice(int(start), int(stop) - 1 + length))
-            for start, stop in zip(edges[::2], edges[1::2], strict=True)
+            (length, slice(start, stop - 1 + length)) for start, stop in true_runs(quiet).tolist()
         ]
         length *= 2
     found: list[slice] = []

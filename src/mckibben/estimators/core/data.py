@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, true_runs
 from mckibben.blocks.fields import Channel
 from mckibben.errors import DataError
 from mckibben.recording import Recording, listed
@@ -26,8 +26,7 @@ FEWEST_SAMPLES = 10
 
 def stretches(mask: Mask) -> list[tuple[int, int]]:
     """Return where stretches of true values start and stop."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    return [(start, stop) for start, stop in true_runs(mask).tolist()]
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mckibben.papers.activation_pressure.rerun import REST_LENGTH, modelled
 from numpy.typing import NDArray
 
 from mckibben import Recording, Series, compare, load_rig
@@ -30,7 +31,6 @@ from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import track
 from mckibben.measured.sets import parted, sets_in
 from mckibben.papers.activation_pressure.protocol import FORCES
-from mckibben.papers.activation_pressure.rerun import REST_LENGTH, modelled
 from mckibben.papers.mpi_narmax.models import PLAIN, TOLD
 from mckibben.papers.sdchm.compensation import CONTROL_TIME, loop_width, references, settle
 from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS

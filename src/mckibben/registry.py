@@ -147,7 +147,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "validation": "mckibben.report.notebook.findings:ValidationFace",
     },
     "papers": {
-        "activation-pressure": "mckibben.papers.activation_pressure.rerun:activation_pressure",
+        "activation-pressure": "mckibben.papers.activation_pressure.run:RERUN",
         "field-models": "mckibben.papers.field_models.rerun:field_models",
         "mpi-narmax": "mckibben.papers.mpi_narmax.rerun:mpi_narmax",
         "multistate-friction": "mckibben.papers.multistate_friction.rerun:multistate_friction",
@@ -162,7 +162,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "published": {
         "activation-pressure-profile": (
-            "mckibben.papers.activation_pressure.published:activation_pressure"
+            "mckibben.papers.activation_pressure.printed:activation_pressure"
         ),
         "field-models-p2uz": "mckibben.papers.field_models.published:process_model",
         "field-models-pi": "mckibben.papers.field_models.published:prandtl_ishlinskii",

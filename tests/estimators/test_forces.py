@@ -19,7 +19,7 @@ from mckibben.estimators.force.laws import (
     TonduLopezEstimator,
 )
 from mckibben.estimators.force.multistate import MultistateEstimator, extract_hysteresis
-from mckibben.papers.activation_pressure.published import activation_pressure
+from mckibben.papers.activation_pressure.printed import activation_pressure
 from mckibben.papers.multistate_friction.published import static_force
 from tests.estimators.test_balance import recording
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mckibben.cli.grouping import spread
 from mckibben.cli.options import Force, Jobs, Json, Reading, Seed
 from mckibben.cli.output import make_folder, print_json, print_table, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stoppable
@@ -16,21 +18,27 @@ from mckibben.numerals import numeral
 from mckibben.system.locks import alone
 
 if TYPE_CHECKING:
-    from mckibben.papers.reproduction import Reproduction
+    from mckibben.papers.experiment import Reproduction
     from mckibben.recording import Recording
 
 
+@spread
 def reproduce(
+    reading: Reading,
     name: Annotated[str | None, typer.Argument(help="Paper, by short name; see --list.")] = None,
     listed: Annotated[bool, typer.Option("--list", help="List the papers.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Leave out what takes long.")] = False,
-    train: Annotated[
+    data: Annotated[
         Path | None,
-        typer.Option("--train", metavar="FILE", help="field-models only: your calibration run."),
+        typer.Option(
+            "--data",
+            metavar="FOLDER",
+            help="Your own recordings instead of the rig's; see docs/papers.",
+        ),
     ] = None,
-    test: Annotated[
-        Path | None,
-        typer.Option("--test", metavar="FILE", help="field-models only: your test run."),
+    rig: Annotated[
+        str | None,
+        typer.Option("--rig", help="Rig to record, and to close loops on. Default: the paper's."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Folder for report.html and tables.json.")
@@ -49,27 +57,28 @@ def reproduce(
         return
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give --list")
-    from mckibben import registry
     from mckibben.outputs import Results
+    from mckibben.papers.paper import paper
+    from mckibben.rigs import load_rig
     from mckibben.system import threads, workers
 
+    paper(name)
+    recordings = None if data is None else _recordings(data, reading)
+    plant = None if rig is None else load_rig(rig)
     folder = None if out is None else make_folder(out)
     with alone(folder), stoppable(folder):
-        registry.load("papers", name)
         results = None
         if folder is not None:
-            inputs = [file for file in (train, test) if file is not None]
-            results = Results(folder, inputs=inputs, force=force)
+            results = Results(folder, inputs=[] if data is None else [data], force=force)
             results.claim(["report.html", "tables.json"])
-        own = _own(name, train, test)
-        given = {"name": name, "quick": quick, "seed": seed, "jobs": jobs, "folder": folder} | own
+        given: dict[str, Any] = {"name": name, "rig": plant, "data": recordings}
+        given |= {"quick": quick, "seed": seed, "jobs": jobs, "folder": folder}
         # in a process of its own, which can be ended whatever it is at
         with (
             progress_bar(f"{name}:", plainly=True) as tell,
             workers.Workers(1, cores=jobs or threads.cores()) as one,
         ):
-            told = _once_a_word(tell)
-            (outcome,) = one.results(_again, [given], told)
+            (outcome,) = one.results(_again, [given], _only_news(tell))
             found: Reproduction = outcome.result()
         if results is not None:
             from mckibben.report.reproduction import reproduction_page
@@ -87,14 +96,31 @@ def reproduce(
         forget_kept(folder)
 
 
+def _recordings(folder: Path, reading: Reading) -> list[Recording]:
+    """Return the recordings of a folder, each named as its file."""
+    from mckibben.files.sources import inside
+
+    if not folder.is_dir():
+        raise DataError("there is no such folder", file=folder, remedy="name one with recordings")
+    found: list[Recording] = []
+    for path in inside(folder):
+        parts = reading.read([path], None, informative=False)
+        several = len(parts) > 1
+        found += [
+            one.with_meta(name=f"{path.stem}-{place}" if several else path.stem)
+            for place, one in enumerate(parts, start=1)
+        ]
+    return [replace(one, start_time=0.0) for one in found]
+
+
 def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Reproduction:
     """Run a paper again in a worker's process."""
-    from mckibben.papers.reproduction import reproduce as run
+    from mckibben.papers.experiment import reproduce as run
 
     return run(**given, clear=False, progress=tell)
 
 
-def _once_a_word(tell: Callable[[float, str], None]) -> Callable[..., None]:
+def _only_news(tell: Callable[[float, str], None]) -> Callable[..., None]:
     """Return what passes on progress when there is news."""
     last = ""
 
@@ -107,37 +133,16 @@ def _once_a_word(tell: Callable[[float, str], None]) -> Callable[..., None]:
     return told
 
 
-def _own(name: str, train: Path | None, test: Path | None) -> dict[str, Recording]:
-    """Return the user's own recordings, or nothing for the rig's."""
-    if train is None and test is None:
-        return {}
-    if name != "field-models" or train is None or test is None:
-        raise DataError(
-            "--train and --test go together, and with field-models only",
-            remedy="give both files, or neither",
-        )
-    reading = Reading()
-    (first, *_), (second, *_) = (
-        reading.read([file], ["pressure", "displacement"]) for file in (train, test)
-    )
-    return {"train": first, "test": second}
-
-
 def _list(as_json: bool) -> None:
-    from mckibben import registry
+    from mckibben.papers.paper import papers
 
-    papers = {name: _source(name) for name in registry.names("papers")}
+    rows = [[each.number, name, each.title, each.question] for name, each in papers().items()]
+    columns = ["number", "name", "title", "question"]
     if as_json:
-        print_json(papers)
+        print_json([dict(zip(columns, row, strict=True)) for row in rows])
         return
-    print_table(["paper", "what it is"], [[name, source] for name, source in papers.items()])
-
-
-def _source(name: str) -> str:
-    from mckibben import registry
-
-    doc = registry.load("papers", name).__doc__ or ""
-    return str(doc.strip().splitlines()[0])
+    for number, name, title, question in rows:
+        say(f"{number}. {name}: {title}\n   {question}")
 
 
 def _cell(cell: str | float | None) -> str:
@@ -147,8 +152,10 @@ def _cell(cell: str | float | None) -> str:
 
 
 def _print(found: Reproduction) -> None:
+    from mckibben.report.reproduction import heading
+
     for table in found.tables:
-        say(f"\n{table.title}")
+        say(f"\n{heading(table, quick=found.quick)}")
         rows = [[_cell(cell) for cell in row] for row in table.rows]
         print_table(table.columns, rows)
         if table.note:

@@ -1,72 +1,181 @@
-"""The report of a paper's re-run: one HTML file that needs nothing but itself."""
+"""The pages of a paper's re-run: one HTML file that needs nothing but itself, and Markdown."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mckibben.numerals import numeral
 from mckibben.report import interactive, templating
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Mark, Panel
 
 if TYPE_CHECKING:
-    from mckibben.papers.reproduction import Figure, Points, Reproduction, Table
+    from mckibben.papers.experiment import Cell, Figure, Reproduction, Table
+    from mckibben.papers.paper import Item
+
+RECORDED = (
+    "",
+    "virtual",
+    "measured",
+    "sensor",
+    "extracted",
+    "reference",
+    "desired",
+    "of every loop",
+)
+"""Names of curves that are drawn in ink, as what a muscle did."""
+
+
+def heading(one: Table | Figure, *, quick: bool = False) -> str:
+    """Return a title, what of the paper it stands beside, and whether the run was quick."""
+    beside_ = f" ({one.of})" if one.of else ""
+    return f"{one.title}{beside_}{', quick run' if quick else ''}"
 
 
 def reproduction_page(found: Reproduction) -> str:
     """Return the report of a re-run as HTML: what is printed beside ours first, raw signals last."""
-    pictured = [table for table in found.tables if table.drawn is not None]
-    shown = sorted(found.figures, key=lambda figure: len(figure.curves) == 1)
+    pictured = [table for table in found.tables if table.drawn]
     drawings = {f"beside-{place}": beside(table) for place, table in enumerate(pictured)}
-    drawings |= {f"figure-{place}": drawing(figure) for place, figure in enumerate(shown)}
+    drawings |= {f"figure-{place}": drawing(figure) for place, figure in enumerate(found.figures)}
     return templating.page(
         "reproduction.html.j2",
         {name: [interactive.plots(each)] for name, each in drawings.items()},
         found=found,
         pictured=pictured,
-        shown=shown,
+        heading=lambda one: heading(one, quick=found.quick),
         versions=templating.versions(),
     )
 
 
 def beside(table: Table) -> Drawing:
-    """Return a table's drawn columns: what is printed in rings of ink, what was found in colours."""
-    points: Points | None = table.drawn
-    assert points is not None
+    """Return a table's drawn columns: what is printed in rings of ink, what was found in colours.
+
+    Drawn are those in the unit of ``table.drawn``, and all others if none names a unit of its own.
+    """
     curves: list[Curve] = []
     found = n_printed = 0
-    for column in points.columns:
-        if column not in table.columns:  # nothing was to be said in it
-            continue
+    for column in _drawn(table):
         cells = [row[table.columns.index(column)] for row in table.rows]
         places = [place for place, cell in enumerate(cells) if isinstance(cell, int | float)]
-        printed = "printed" in column
+        printed = column.endswith("printed")
         n_printed += printed
         found += not printed
+        ours = f"series-{(found - 1) % N_COLOURS + 1}"
         curves.append(
             Curve(
                 np.array([cells[place] for place in places], dtype=float),
                 np.array(places, dtype=float),
                 column,
-                ("measured" if n_printed == 1 else "input")
-                if printed
-                else f"series-{(found - 1) % N_COLOURS + 1}",
+                ("measured" if n_printed == 1 else "input") if printed else ours,
                 "rings" if printed else "dots",
             )
         )
-    bound = () if points.bound is None else (Mark(points.bound, "printed: below"),)
+    bound = () if table.bound is None else (Mark(table.bound, "printed: below"),)
     names = tuple(str(row[0]) for row in table.rows)
-    return Drawing((Panel(points.measure, "", tuple(curves), marks=bound, categories=names),))
+    return Drawing((Panel(table.drawn, "", tuple(curves), marks=bound, categories=names),))
+
+
+def _drawn(table: Table) -> list[str]:
+    """Return the columns that are drawn: those of the measure, or with a printed figure beside."""
+    named = [column for column in table.columns[1:] if table.drawn in column]
+    printed = {c.removesuffix(", printed") for c in table.columns if c.endswith(", printed")}
+    both = [c for c in table.columns[1:] if c.removesuffix(", printed") in printed]
+    return named or both or list(table.columns[1:])
 
 
 def drawing(figure: Figure) -> Drawing:
     """Return a paper's figure as a drawing: what a muscle did in ink, models in colours on top."""
-    curves = []
-    shown = list(figure.curves.items())[: N_COLOURS + 1]
-    models = 0
-    for place, (name, (x, y)) in enumerate(shown):
-        recorded = place == 0 and name in ("", "virtual", "measured", "sensor", "extracted")
-        models += not recorded
-        colour = "measured" if recorded else f"series-{(models - 1) % N_COLOURS + 1}"
-        curves.append(Curve(x, y, name, colour))
-    return Drawing((Panel(figure.x_label, figure.y_label, tuple(curves)),))
+    panels = []
+    for title, given in figure.panels.items():
+        curves: list[Curve] = []
+        for place, (name, (x, y)) in enumerate([*given.items()][: N_COLOURS + 1]):
+            recorded = place == 0 and name in RECORDED
+            models = place - (1 if next(iter(given)) in RECORDED else 0)
+            colour = "measured" if recorded else f"series-{models % N_COLOURS + 1}"
+            style = "dots" if len(x) < 30 else "line"
+            curves.append(Curve(x, y, name, colour, style))  # type: ignore[arg-type]
+        panels.append(Panel(figure.x, figure.y, tuple(curves), title))
+    return Drawing(tuple(panels))
+
+
+# -- Markdown ------------------------------------------------------------------------------------------
+
+
+def markdown(found: Reproduction, date: str, pictures: str) -> str:
+    """Return a re-run as a page in Markdown: an index of the paper first, then every table and figure.
+
+    Parameters
+    ----------
+    found : Reproduction
+    date : str
+        Of the run, as 2026-11-26.
+    pictures : str
+        Folder of the pictures, relative to the page, each called by its figure's key.
+    """
+    return "\n".join(_lines(found, date, pictures)).rstrip("\n") + "\n"
+
+
+def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
+    paper = found.paper
+    yield f"# {paper.number}. {paper.title}\n"
+    doi = f"[doi:{paper.doi}](https://doi.org/{paper.doi})" if paper.doi else ""
+    yield ". ".join(filter(None, (paper.authors, paper.published, doi))) + ".\n"
+    yield f"{paper.question}\n"
+    command = f"mckibben reproduce {found.name}{' --quick' if found.quick else ''}"
+    kind = "Quick run" if found.quick else "Full run"
+    yield (
+        f"{kind} of {date} by `{command}`, seed {found.seed}, on {found.on}, mckibben "
+        f"{version('mckibben')}. The rig is not the paper's hardware: orders and ratios can be "
+        "compared, digits cannot.\n"
+    )
+    yield f"{paper.protocol}\n"
+    yield "## Where everything is\n"
+    yield "| in the paper | what it is | here | exact, or how it differs | command |"
+    yield "|---|---|---|---|---|"
+    yield from (_indexed(item, found) for item in paper.items)
+    yield "\n## What came out\n"
+    yield from (f"- {sentence}" for sentence in found.summary)
+    yield "\n## Given, and found\n"
+    yield from (f"- Given: {text}" for text in paper.given)
+    yield from (f"- Found: {text}" for text in paper.found)
+    yield "\n## What differs from the paper\n"
+    yield from (f"- {note}" for note in found.notes)
+    yield "\n## Tables\n"
+    for table in found.tables:
+        yield f"### {heading(table, quick=found.quick)}\n"
+        yield "| " + " | ".join(table.columns) + " |\n|---|" + "---:|" * (len(table.columns) - 1)
+        for row in table.rows:
+            yield "| " + " | ".join(_cell(cell) for cell in row) + " |"
+        yield f"\n{table.note}\n" if table.note else ""
+    yield "## Figures\n"
+    for figure in found.figures:
+        yield f"### {heading(figure, quick=found.quick)}\n"
+        yield f"![{figure.title}]({pictures}/{figure.key}.png)\n"
+    yield "## On your own rig\n"
+    yield f"`mckibben reproduce {found.name} --data FOLDER` takes {paper.data}.\n"
+
+
+def _indexed(item: Item, found: Reproduction) -> str:
+    """Return the line of an equation, table or figure in the index."""
+    kind, _, key = item.here.partition(":")
+    shown: tuple[Table | Figure, ...] = found.tables if kind == "table" else found.figures
+    titles = [heading(one, quick=found.quick) for one in shown if one.key == key]
+    here = f"`{item.here}`" if item.here else "–"
+    here = f"[{key}](#{_anchor(titles[0])})" if titles else here
+    command = f"`{item.command}`" if item.command else ""
+    return f"| {item.of} | {item.what} | {here} | {item.differs or 'exact'} | {command} |"
+
+
+def _anchor(title: str) -> str:
+    """Return the anchor that a heading has."""
+    return re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", title.lower()))
+
+
+def _cell(cell: Cell) -> str:
+    if cell is None:
+        return ""
+    return numeral(cell, 4) if isinstance(cell, float) else str(cell).replace("|", "\\|")

@@ -1,0 +1,47 @@
+"""The papers' pages, from full runs: python docs/papers/make.py [PAPER ...].
+
+Each page has an index of the paper (every system, equation, table and figure), and all tables and
+figures with what is printed beside ours. A run that was stopped goes on from there.
+"""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+from matplotlib import rc_context
+
+from mckibben import registry
+from mckibben.checkpoints import Checkpoints
+from mckibben.papers.experiment import reproduce
+from mckibben.report.printed import METADATA, STYLE, drawn
+from mckibben.report.reproduction import drawing, markdown
+
+HERE = Path(__file__).parent
+PICTURES = HERE.parent / "pictures" / "papers"
+RESOLUTION = 130
+"""Dots per inch."""
+
+
+def main() -> None:
+    """Run the papers named, or all, and write their pages."""
+    for name in sys.argv[1:] or registry.names("papers"):
+        kept = HERE / "unfinished" / name
+        found = reproduce(name, folder=kept, clear=False, progress=True)
+        folder = PICTURES / name
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("*.png"):
+            old.unlink()
+        for figure in found.figures:
+            file = folder / f"{figure.key}.png"
+            with rc_context(dict(STYLE)):
+                drawn(drawing(figure)).savefig(file, dpi=RESOLUTION, metadata=dict(METADATA["png"]))
+        date = datetime.now(UTC).date().isoformat()
+        page = markdown(found, date, f"../pictures/papers/{name}")
+        (HERE / f"{name}.md").write_text(page, encoding="utf-8")
+        Checkpoints(kept).clear()
+
+
+if __name__ == "__main__":
+    main()

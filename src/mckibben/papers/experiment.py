@@ -1,0 +1,537 @@
+"""The re-run of a paper: recordings, fits, free runs, tables and figures, by one builder for all papers.
+
+A paper's module says what is recorded, fitted and compared; every word of it is in its ``paper.toml``.
+"""
+
+from __future__ import annotations
+
+import string
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import compress
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from mckibben import registry
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.checkpoints import Checkpoints
+from mckibben.errors import DataError, MckibbenError, ModelWarning
+from mckibben.estimators.optimisers.tracker import whole_searches
+from mckibben.files import read, write
+from mckibben.papers.paper import Paper, paper
+from mckibben.recording import Recording
+from mckibben.rigs import Rig, load_rig, record
+from mckibben.signals.protocol import Protocol, Role, protocol
+from mckibben.system.progress import telling
+from mckibben.system.threads import one_blas_thread
+
+Cell = str | float | None
+Curves = Mapping[str, tuple[Array, Array]]
+Progress = Callable[[float, str], None]
+
+MOST = 2000
+"""Points of a curve that is drawn."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a re-run.
+
+    Parameters
+    ----------
+    key, title, of, note : str
+        As ``paper.toml`` has them, filled in.
+    columns : tuple of str
+        Headings, with units; those of printed figures end with ``", printed"``.
+    rows : tuple of tuple
+        Words, numbers, or None where there is nothing to say.
+    drawn : str
+        What the drawn columns measure; empty if none is.
+    bound : float or None
+        What the paper says that its figures are below.
+    """
+
+    key: str
+    title: str
+    of: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+    drawn: str = ""
+    bound: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table as ``tables.json`` holds it."""
+        rows = [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+        return {
+            "key": self.key,
+            "title": self.title,
+            "of": self.of,
+            "note": self.note,
+            "rows": rows,
+        }
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a re-run: panels of curves on equal axes.
+
+    Parameters
+    ----------
+    key, title, of, x, y : str
+        As ``paper.toml`` has them.
+    panels : mapping of str to mapping
+        Title of a panel -> name of a curve -> its x and y.
+    """
+
+    key: str
+    title: str
+    of: str
+    x: str
+    y: str
+    panels: Mapping[str, Curves]
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """A paper's experiment, run again.
+
+    Parameters
+    ----------
+    name : str
+        As registered.
+    paper : Paper
+    on : str
+        The rig, or the folder of recordings.
+    summary : tuple of str
+        What came out.
+    tables, figures : tuple
+    notes : tuple of str
+        What differs from the paper.
+    quick : bool
+        Whether what takes long was left out.
+    seed : int
+    """
+
+    name: str
+    paper: Paper
+    on: str
+    summary: tuple[str, ...]
+    tables: tuple[Table, ...]
+    figures: tuple[Figure, ...]
+    notes: tuple[str, ...]
+    quick: bool = False
+    seed: int = 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all but the figures, as ``tables.json`` holds it."""
+        return {
+            "name": self.name,
+            "title": self.paper.title,
+            "doi": self.paper.doi,
+            "on": self.on,
+            "quick": self.quick,
+            "seed": self.seed,
+            "summary": list(self.summary),
+            "tables": [table.to_dict() for table in self.tables],
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a fit gave.
+
+    Parameters
+    ----------
+    block : Block
+        The model.
+    rmse : float
+        Its free-running error on the data fitted, in the unit of the output; of several the largest.
+    seconds : float
+        That the fit took [s].
+    standard_errors : tuple of float
+        Of ``block.pack()``, NaN where not known; of several outputs none.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
+
+    block: Block
+    rmse: float
+    seconds: float
+    standard_errors: tuple[float, ...] = field(default=(), compare=False)
+
+
+@dataclass(frozen=True)
+class Labels:
+    """What a recording is for.
+
+    Parameters
+    ----------
+    role : {"train", "validation", "test"}
+    labels : mapping
+        As the paper's protocol gives them: stage, load, frequency.
+    """
+
+    role: Role
+    labels: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Runs(Mapping[str, Recording]):
+    """Recordings by name, with what each is for."""
+
+    recordings: Mapping[str, Recording]
+    labels: Mapping[str, Labels]
+
+    def __getitem__(self, name: str) -> Recording:
+        """Return a recording."""
+        return self.recordings[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names, in the order of the protocol."""
+        return iter(self.recordings)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.recordings)
+
+    def names(self, role: Role | None = None, **labels: Any) -> list[str]:
+        """Return the names of recordings of a role, and with all of the labels."""
+        return [
+            name
+            for name, given in self.labels.items()
+            if role in (None, given.role)
+            and all(given.labels.get(key) == value for key, value in labels.items())
+        ]
+
+    def select(self, role: Role | None = None, **labels: Any) -> list[Recording]:
+        """Return the recordings of a role, and with all of the labels."""
+        return [self.recordings[name] for name in self.names(role, **labels)]
+
+    def of(self, name: str, label: str) -> Any:
+        """Return a label of a recording."""
+        return self.labels[name].labels[label]
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """What a paper's module gives.
+
+    Parameters
+    ----------
+    run : callable
+        Takes an `Experiment` and fills it.
+    sort : callable
+        Takes recordings of one's own and returns what each is for, or None for one without use; raises
+        DataError where one that is needed is not there.
+    """
+
+    run: Callable[[Experiment], None]
+    sort: Callable[[Sequence[Recording]], Sequence[Labels | None]]
+
+
+class Experiment:
+    """A paper's experiment under way.
+
+    Parameters
+    ----------
+    name : str
+        Of the paper.
+    rig : Rig or None
+        That is recorded, and on which loops are closed; None with recordings alone.
+    data : sequence of Recording or None
+        One's own; None to record the rig.
+    quick : bool
+        Whether to leave out what takes long.
+    seed : int
+    jobs : int or None
+        Processes.
+    kept : Checkpoints
+        Where recordings and fits are kept until all is done.
+    tell : callable
+        Is told the share done, and what is next.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        rig: Rig | None,
+        data: Sequence[Recording] | None,
+        *,
+        quick: bool,
+        seed: int,
+        jobs: int | None,
+        kept: Checkpoints,
+        tell: Progress,
+    ) -> None:
+        self.name, self.paper = name, paper(name)
+        self.rig, self.data = rig, data
+        self.quick, self.seed, self.jobs, self.kept, self.tell = quick, seed, jobs, kept, tell
+        self.models: dict[str, Block] = {}
+        self.tables: list[Table] = []
+        self.figures: list[Figure] = []
+        self.facts: dict[str, Any] = {}
+        self.warned: dict[str, None] = {}
+        self._free: dict[tuple[str, int], tuple[Recording, Recording]] = {}
+
+    def within(self, low: float, high: float) -> Progress:
+        """Return what tells the progress of a part."""
+        return lambda share, text: self.tell(low + (high - low) * share, text)
+
+    def record(
+        self,
+        what: Protocol | None = None,
+        names: Sequence[str] | None = None,
+        *,
+        until: float = 0.3,
+    ) -> Runs:
+        """Return the runs of the paper's protocol on the rig, or one's own recordings, sorted.
+
+        Parameters
+        ----------
+        what : Protocol, optional
+            Default the one registered under the paper's name.
+        names : sequence of str, optional
+            Of the runs that are needed; default all.
+        until : float
+            Share of the whole work that is done then.
+        """
+        if self.data is not None:
+            every = zip(self.data, self._sorted(self.data), strict=True)
+            used = {one.name: (one, labels) for one, labels in every if labels is not None}
+            return Runs(
+                {name: one for name, (one, _) in used.items()},
+                {name: labels for name, (_, labels) in used.items()},
+            )
+        plan = protocol(self.name) if what is None else what
+        names = [run.name for run in plan.runs] if names is None else names
+        found = dict(self._recorded(plan, names, self.within(0.0, until)))
+        return Runs(found, {name: Labels(plan[name].role, plan[name].labels) for name in found})
+
+    def _sorted(self, data: Sequence[Recording]) -> Sequence[Labels | None]:
+        """Return what recordings are for: as a rig has noted it, or else by what was driven."""
+        if all(one.meta.get("protocol") == self.name for one in data):
+            return [Labels(one.meta["role"], one.meta["labels"]) for one in data]
+        rerun: Rerun = registry.load("papers", self.name)
+        return rerun.sort(data)
+
+    def _recorded(
+        self, plan: Protocol, names: Sequence[str], tell: Progress
+    ) -> Iterator[tuple[str, Recording]]:
+        """Yield runs in their order, those recorded before read from disk."""
+        files = {
+            n: self.kept.file(n, ".csv", plan.name, plan[n], self.rig, self.seed) for n in names
+        }
+        there = {name: _read(file) for name, file in files.items()}
+        missing = [name for name in names if there[name] is None]
+        fresh = record(plan, self.rig, runs=missing, seed=self.seed, jobs=self.jobs)
+        for done, name in enumerate(names, start=1):
+            recording, file = there[name], files[name]
+            if recording is None:
+                _, recording = next(fresh)
+                if file is not None:
+                    write(recording, file)
+            tell(done / len(names), f"recorded {name}")
+            yield name, recording
+
+    def fit(
+        self, name: str, estimator: Any, recordings: Recording | Sequence[Recording], **how: Any
+    ) -> Fitted:
+        """Return what an estimator finds on recordings, or found before the work was stopped.
+
+        The model is one of ``models`` from then on, under its name. ``how`` is what else its ``fit``
+        takes. Errors are those of its ``fit``.
+        """
+
+        def fit() -> Fitted:
+            with whole_searches(), warnings.catch_warnings():
+                warnings.simplefilter("ignore", ModelWarning)
+                estimator.fit(recordings, **how)
+            found = estimator.diagnostics_
+            errors = tuple(getattr(found, "standard_errors", ()))
+            return Fitted(estimator.model_, float(np.max(found.rmse)), found.seconds, errors)
+
+        settings = (type(estimator).__name__, estimator.get_params())
+        fitted = self.kept.once(name, Fitted, fit, settings, recordings, how)
+        self.models[name] = fitted.block
+        return fitted
+
+    def simulate(self, name: str, recording: Recording) -> Recording:
+        """Return the free run of a model over a recording, run at the first call only."""
+        key = name, id(recording)
+        if key not in self._free:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always", ModelWarning)
+                found = self.models[name].simulate(recording)
+            self.warned |= {f"{name} on {recording.name}: {w.message}.": None for w in caught}
+            self._free[key] = (
+                recording,
+                found,
+            )  # the recording is kept, so that its id stays its own
+        return self._free[key][1]
+
+    def table(
+        self,
+        key: str,
+        columns: Sequence[str],
+        rows: Mapping[str, Sequence[Cell]] | Sequence[Sequence[Cell]],
+        **facts: Any,
+    ) -> None:
+        """Add a table of ours; printed figures of ``paper.toml`` come before the columns they belong to.
+
+        Parameters
+        ----------
+        key : str
+            As ``paper.toml`` has it.
+        columns : sequence of str
+            Headings of what was found, with units.
+        rows : mapping of str to sequence, or sequence of sequences
+            The name of each row, and a cell for every column.
+        **facts
+            That fill the fields of its title and note.
+        """
+        text = self.paper.tables[key]
+        given = [(n, *cells) for n, cells in rows.items()] if isinstance(rows, Mapping) else rows
+        lines = [list(line) for line in given]
+        headings = [text.rows, *columns]
+        for column in [*text.printed]:
+            printed = text.printed[column]
+            place = headings.index(column) if column in headings else len(headings)
+            headings.insert(place, f"{column}, printed")
+            for line in lines:
+                line.insert(place, printed.get(str(line[0])))
+        kept = [any(line[place] is not None for line in lines) for place in range(len(headings))]
+        self.tables.append(
+            Table(
+                *(key, text.title.format(**facts), text.of),
+                tuple(compress(headings, kept)),
+                tuple(tuple(compress(line, kept)) for line in lines),
+                *(text.note.format(**facts), text.drawn, text.bound),
+            )
+        )
+
+    def figure(self, key: str, panels: Mapping[str, Curves]) -> None:
+        """Add a figure: title of a panel -> name of a curve -> its x and y, of which some are drawn."""
+        text = self.paper.figures[key]
+        drawn = {
+            title: {name: (thinned(x), thinned(y)) for name, (x, y) in curves.items()}
+            for title, curves in panels.items()
+        }
+        self.figures.append(Figure(key, text.title, text.of, text.x, text.y, drawn))
+
+    def says(self, **facts: Any) -> None:
+        """Give facts that fill the sentences of ``paper.toml``."""
+        self.facts |= facts
+
+    def done(self, on: str) -> Reproduction:
+        """Return all that came out."""
+        fields = {
+            text: {name for _, name, _, _ in string.Formatter().parse(text) if name}
+            for text in self.paper.summary.values()
+        }
+        given = set(self.facts)
+        roots = {text: {name.partition("[")[0] for name in names} for text, names in fields.items()}
+        sentences = (text.format(**self.facts) for text, names in roots.items() if names <= given)
+        quick = [self.paper.quick] if self.quick else []
+        return Reproduction(
+            *(self.name, self.paper, on, tuple(sentences)),
+            *(tuple(self.tables), tuple(self.figures)),
+            (*self.paper.notes, *quick, *self.warned),
+            *(self.quick, self.seed),
+        )
+
+
+def reproduce(
+    name: str,
+    *,
+    rig: Rig | str | None = None,
+    data: Sequence[Recording] | None = None,
+    quick: bool = False,
+    seed: int = 0,
+    jobs: int | None = None,
+    folder: str | Path | None = None,
+    clear: bool = True,
+    progress: bool | Progress | None = None,
+) -> Reproduction:
+    """Run a paper's experiment again.
+
+    Parameters
+    ----------
+    name : str
+        As ``mckibben reproduce --list`` lists it.
+    rig : Rig or str, optional
+        That is recorded, and on which loops are closed. Default the one that the paper's protocol was
+        made for; with ``data`` none.
+    data : sequence of Recording, optional
+        Recordings of one's own instead. What each is for is seen from what was driven: see ``data`` of
+        `mckibben.papers.paper.Paper`.
+    quick : bool
+        Whether to leave out what takes long: under a minute then.
+    seed : int
+        Of everything random.
+    jobs : int, optional
+        Processes; default as many as there are cores.
+    folder : path, optional
+        Where recordings and models are kept until all is done, so that a re-run that was stopped and
+        is called again goes on from there.
+    clear : bool
+        Whether to forget what was kept when all is done; else the caller does, once it has written
+        what is returned, by ``Checkpoints(folder).clear()``.
+    progress : bool or callable, optional
+        Whether to show a bar; or who is told the share of the work done, and what is next.
+
+    Raises
+    ------
+    ModelError
+        If there is no paper of that name; the text lists those there are.
+    DataError
+        If a recording that the experiment needs is not there.
+    """
+    rerun: Rerun = registry.load("papers", name)
+    if data is not None and not data:
+        raise DataError("there is no recording", remedy=f"give what it needs: {paper(name).data}")
+    if rig is None and data is None:
+        rig = protocol(name).rig
+    plant = load_rig(rig) if isinstance(rig, str) else rig
+    kept = Checkpoints(folder, name, quick, seed)
+    with one_blas_thread(), telling(progress, name) as tell:
+        experiment = Experiment(
+            name,
+            plant,
+            data,
+            quick=quick,
+            seed=seed,
+            jobs=jobs,
+            kept=kept,
+            tell=tell or (lambda share, text: None),
+        )
+        rerun.run(experiment)
+    if clear:
+        kept.clear()
+    on = f"{len(data)} recordings" if data is not None else f"rig {plant.name}" if plant else ""
+    return experiment.done(on)
+
+
+def _read(file: Path | None) -> Recording | None:
+    """Return the recording in a file, or None if it is absent or damaged."""
+    try:
+        (recording,) = read(file, informative=False) if file is not None else (None,)
+    except MckibbenError:
+        return None
+    return recording
+
+
+def rms(errors: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def thinned(values: Sequence[float] | Array, most: int = MOST) -> Array:
+    """Return every k-th value, so that at most so many are left."""
+    array = np.asarray(values, dtype=np.float64)
+    return array[:: max(1, -(-array.size // most))]

@@ -1,0 +1,164 @@
+"""A paper: who wrote it, what it asks and prints, and where each of its equations and tables is here.
+
+All of it is data, ``paper.toml`` in the paper's folder; the code beside it holds what must be computed.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from mckibben import registry
+
+Words = Annotated[str, Field(min_length=1)]
+Printed = dict[str, dict[str, float]]
+"""Heading of a column -> name of a row -> the figure that the paper prints."""
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Item(_Strict):
+    """A system, equation, table or figure of the paper.
+
+    Parameters
+    ----------
+    of : str
+        As the paper numbers it: ``Eq. (3)``, ``Table 2``.
+    what : str
+        What it is.
+    here : str
+        Where it lives: a table or figure of the re-run by its key (``table:NAME``, ``figure:NAME``), a
+        module or class, or nothing.
+    differs : str
+        How it differs from what is printed; empty where it is exact.
+    command : str
+        What computes it.
+    """
+
+    of: Words
+    what: Words
+    here: str = ""
+    differs: str = ""
+    command: str = ""
+
+
+class TableText(_Strict):
+    """What a table of the re-run is called, and what the paper prints in it.
+
+    Parameters
+    ----------
+    title : str
+        May have fields in braces, which the experiment fills.
+    of : str
+        The table or figure of the paper that it stands beside; empty for ours.
+    rows : str
+        Heading of the first column.
+    note : str
+        How it was made; may have fields, too.
+    printed : mapping
+        The paper's figures, by column and row.
+    drawn : str
+        What its columns measure, with the unit, if printed and ours are drawn; else empty.
+    bound : float, optional
+        What the paper says that its figures are below, where it prints no more.
+    """
+
+    title: Words
+    of: str = ""
+    rows: str = "model"
+    note: str = ""
+    printed: Printed = {}
+    drawn: str = ""
+    bound: float | None = None
+
+
+class FigureText(_Strict):
+    """What a figure of the re-run is called, and its axes.
+
+    Parameters
+    ----------
+    title : str
+    of : str
+        The figure of the paper that it redraws; empty for ours.
+    x, y : str
+        Labels of the axes, with units.
+    """
+
+    title: Words
+    of: str = ""
+    x: Words
+    y: Words
+
+
+class Paper(_Strict):
+    """A paper.
+
+    Parameters
+    ----------
+    number : int
+        Among the papers here.
+    title, question : str
+        What it is called, and what its experiment answers.
+    authors, published, doi : str
+        Who, where and when; empty where the text does not say.
+    protocol : str
+        What is driven and measured.
+    data : str
+        What recordings of one's own it needs.
+    given, found : tuple of str
+        What is taken from the paper, or set, and what the recordings determine.
+    summary : mapping of str to str
+        Sentences with fields in braces, which the experiment fills; one without its fields is left out.
+    notes : tuple of str
+        What differs from the paper.
+    quick : str
+        What a quick run leaves out.
+    items : tuple of Item
+        Every system, equation, table and figure.
+    tables, figures : mapping
+        Of the re-run, by key.
+    """
+
+    number: int
+    title: Words
+    question: Words
+    authors: str = ""
+    published: str = ""
+    doi: str = ""
+    protocol: Words
+    data: Words
+    given: tuple[Words, ...]
+    found: tuple[Words, ...]
+    summary: dict[str, Words]
+    notes: tuple[Words, ...]
+    quick: Words
+    items: tuple[Item, ...]
+    tables: dict[str, TableText]
+    figures: dict[str, FigureText]
+
+
+@cache
+def paper(name: str) -> Paper:
+    """Return a paper by its short name.
+
+    Raises
+    ------
+    ModelError
+        If there is none of that name; the text lists those there are.
+    """
+    module = registry.load("papers", name).run.__module__
+    text = resources.files(module.rpartition(".")[0]).joinpath("paper.toml").read_text("utf-8")
+    return Paper.model_validate(tomllib.loads(text))
+
+
+def papers() -> Mapping[str, Paper]:
+    """Return all papers by their short names, in the order of their numbers."""
+    found = {name: paper(name) for name in registry.names("papers")}
+    return dict(sorted(found.items(), key=lambda item: item[1].number))

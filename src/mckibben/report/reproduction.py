@@ -11,23 +11,17 @@ import numpy as np
 
 from mckibben.numerals import numeral
 from mckibben.report import interactive, templating
-from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Mark, Panel
+from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Mark, Panel, Style
 
 if TYPE_CHECKING:
     from mckibben.papers.experiment import Cell, Figure, Reproduction, Table
     from mckibben.papers.paper import Item
 
-RECORDED = (
-    "",
-    "virtual",
-    "measured",
-    "sensor",
-    "extracted",
-    "reference",
-    "desired",
-    "of every loop",
-)
+RECORDED = ("", "virtual", "measured", "sensor", "extracted", "reference", "of every loop")
 """Names of curves that are drawn in ink, as what a muscle did."""
+
+FEWEST = 40
+"""Points of a curve that is drawn as a line; fewer are dots."""
 
 
 def heading(one: Table | Figure, *, quick: bool = False) -> str:
@@ -88,18 +82,24 @@ def _drawn(table: Table) -> list[str]:
 
 
 def drawing(figure: Figure) -> Drawing:
-    """Return a paper's figure as a drawing: what a muscle did in ink, models in colours on top."""
+    """Return a paper's figure as a drawing: what a muscle did in ink, models in colours on top.
+
+    A curve is named in the first panel that has one of its name.
+    """
     panels = []
+    names = dict.fromkeys(name for given in figure.panels.values() for name in given)
+    models = [name for name in names if name not in RECORDED]
+    seen: set[str] = set()
     for title, given in figure.panels.items():
-        curves: list[Curve] = []
-        for place, (name, (x, y)) in enumerate([*given.items()][: N_COLOURS + 1]):
-            recorded = place == 0 and name in RECORDED
-            models = place - (1 if next(iter(given)) in RECORDED else 0)
-            colour = "measured" if recorded else f"series-{models % N_COLOURS + 1}"
-            style = "dots" if len(x) < 30 else "line"
-            curves.append(Curve(x, y, name, colour, style))  # type: ignore[arg-type]
+        curves = []
+        for name, (x, y) in given.items():
+            ink = name not in models
+            colour = "measured" if ink else f"series-{models.index(name) % N_COLOURS + 1}"
+            style: Style = "line" if len(x) > FEWEST else "dots"
+            curves.append(Curve(x, y, "" if name in seen else name, colour, style))
+        seen |= {*given}
         panels.append(Panel(figure.x, figure.y, tuple(curves), title))
-    return Drawing(tuple(panels))
+    return Drawing(tuple(panels), columns=2 if len(panels) in (2, 4) else 3)
 
 
 # -- Markdown ------------------------------------------------------------------------------------------

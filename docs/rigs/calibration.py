@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mckibben.estimators.hysteresis.gpi import GPIEstimator
 from mckibben.estimators.hysteresis.mpi import MPIEstimator
 from mckibben.metrics import err
-from mckibben.papers.field_models.published import prandtl_ishlinskii
+from mckibben.papers.field_models.printed import prandtl_ishlinskii
 from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
 from mckibben.papers.mpi_narmax.published import modified_prandtl_ishlinskii
 from mckibben.papers.multistate_friction.protocol import SHORTEST

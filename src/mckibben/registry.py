@@ -148,7 +148,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "papers": {
         "activation-pressure": "mckibben.papers.activation_pressure.run:RERUN",
-        "field-models": "mckibben.papers.field_models.rerun:field_models",
+        "field-models": "mckibben.papers.field_models.run:RERUN",
         "mpi-narmax": "mckibben.papers.mpi_narmax.rerun:mpi_narmax",
         "multistate-friction": "mckibben.papers.multistate_friction.rerun:multistate_friction",
         "sdchm": "mckibben.papers.sdchm.rerun:sdchm",
@@ -164,8 +164,8 @@ PLUGINS: dict[str, dict[str, str]] = {
         "activation-pressure-profile": (
             "mckibben.papers.activation_pressure.printed:activation_pressure"
         ),
-        "field-models-p2uz": "mckibben.papers.field_models.published:process_model",
-        "field-models-pi": "mckibben.papers.field_models.published:prandtl_ishlinskii",
+        "field-models-p2uz": "mckibben.papers.field_models.printed:process_model",
+        "field-models-pi": "mckibben.papers.field_models.printed:prandtl_ishlinskii",
         "mpi-narmax-mpi": "mckibben.papers.mpi_narmax.published:modified_prandtl_ishlinskii",
         "multistate-friction": "mckibben.papers.multistate_friction.published:multistate_friction",
         "multistate-static-force": "mckibben.papers.multistate_friction.published:static_force",

@@ -18,7 +18,7 @@ from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.blocks.memoryless import Affine, Negative
-from mckibben.papers.field_models.published import process_model
+from mckibben.papers.field_models.printed import process_model
 from mckibben.papers.multistate_friction.published import static_force
 from mckibben.registry import load
 

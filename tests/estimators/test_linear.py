@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mckibben.papers.field_models.affine_match import affine_match
 from numpy.typing import NDArray
 from scipy.optimize import approx_fprime
 from scipy.signal import lfilter
@@ -17,7 +18,6 @@ from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.free_run import run_free
 from mckibben.estimators.core.data import training_data
 from mckibben.estimators.dynamics.prediction_error import Orders, errors
-from mckibben.papers.field_models.affine_match import affine_match
 from mckibben.registry import load
 from tests.golden.plants import runs
 

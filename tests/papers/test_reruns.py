@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mckibben.papers.field_models.methods import LEAST_SQUARES, PRINTED
 
 from mckibben import example
-from mckibben.papers.field_models.methods import LEAST_SQUARES, PRINTED
 from mckibben.papers.mpi_narmax.models import AS_PRINTED, PLAIN, THREE_RATES, UNLOADED
 from mckibben.papers.mpi_narmax.models import OURS as OURS_LOADED
 from mckibben.papers.mpi_narmax.tables import PRINTED_MAE

@@ -136,7 +136,7 @@ def run(experiment: Experiment) -> None:
 
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
-    """Take what turns ever lower, or else the longest, to calibrate, and the longest of the rest to test."""
+    """Take what turns ever lower, or else the longest, to calibrate; the longest of the rest tests."""
     if len(recordings) < 2:
         raise DataError(
             "there is one recording",

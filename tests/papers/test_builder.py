@@ -1,0 +1,169 @@
+"""The builder of all papers: descriptions that hold together, tables, sentences, pages and dates."""
+
+from __future__ import annotations
+
+import re
+import string
+import subprocess
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben import Recording, registry
+from mckibben.checkpoints import Checkpoints
+from mckibben.errors import DataError, ModelError
+from mckibben.papers.experiment import Experiment, Labels, Rerun, Runs, reproduce
+from mckibben.papers.paper import Paper, paper, papers
+from mckibben.report.reproduction import beside, drawing, heading, markdown, reproduction_page
+from mckibben.rigs import rig_names
+
+ROOT = Path(__file__).parents[2]
+PAGES = ROOT / "docs" / "papers"
+PAPERS = registry.names("papers")
+
+
+def experiment(name: str = "field-models", quick: bool = True) -> Experiment:
+    return Experiment(
+        name,
+        None,
+        None,
+        quick=quick,
+        seed=0,
+        jobs=1,
+        kept=Checkpoints(None),
+        tell=lambda share, text: None,
+    )
+
+
+def test_papers_are_numbered_one_after_another() -> None:
+    assert [each.number for each in papers().values()] == [*range(1, len(PAPERS) + 1)]
+    with pytest.raises(ModelError, match="field-models"):
+        paper("nobody")
+
+
+def exists(where: str) -> bool:
+    """Tell whether a dotted name can be imported, or is of a rig."""
+    if where in rig_names():
+        return True
+    parts = where.split(".")
+    for end in range(len(parts), 0, -1):
+        try:
+            found = import_module(".".join(parts[:end]))
+        except ImportError:
+            continue
+        for name in parts[end:]:
+            found = getattr(found, name, None)  # type: ignore[assignment]
+        return found is not None
+    return False
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_every_line_of_an_index_leads_somewhere(name: str) -> None:
+    about: Paper = paper(name)
+    for item in about.items:
+        kind, _, key = item.here.partition(":")
+        known = {"table": about.tables, "figure": about.figures}.get(kind)
+        assert not item.here or (key in known if known is not None else exists(item.here)), item
+    listed = {item.here for item in about.items}
+    for kind, texts in (("table", about.tables), ("figure", about.figures)):
+        for key, text in texts.items():
+            assert not text.of or f"{kind}:{key}" in listed, f"{key} is in no line of the index"
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_pages_are_of_full_runs_after_the_last_change_of_what_they_report(name: str) -> None:
+    text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
+    given = re.search(r"^Full run of (\d{4}-\d\d-\d\d) by `mckibben reproduce", text, re.M)
+    assert given, "the page is not of a full run"
+    anchors = {
+        re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", line.lower()))
+        for line in re.findall(r"^#+ (.*)$", text, re.M)
+    }
+    assert set(re.findall(r"\]\(#([^)]*)\)", text)) <= anchors
+    for picture in re.findall(r"!\[.*?\]\((.*?)\)", text):
+        assert (PAGES / picture).is_file(), picture
+    numbers = f"tests/golden/data/papers/{name}.json"
+    room = registry.load("papers", name).run.__module__.replace(".", "/").rpartition("/")[0]
+    changed = subprocess.run(
+        ["git", "log", "-1", "--format=%cs", "--", numbers, f"src/{room}/paper.toml"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout.strip()
+    if not changed:
+        pytest.skip("no history of the files")
+    assert given[1] >= changed, f"run: python docs/papers/make.py {name}"
+
+
+def test_printed_figures_stand_before_ours() -> None:
+    made = experiment()
+    columns = ["RMSE test [mm]", "failed because"]
+    made.table("errors", columns, {"NARX": [1.0, None], "ours": [0.5, None]}, seeds="0 to 2")
+    (table,) = made.tables
+    assert table.columns[:3] == ("model", "RMSE test [mm], printed", "RMSE test [mm]")
+    assert table.rows[0][:3] == ("NARX", 2.10, 1.0)
+    assert table.rows[1][:3] == ("ours", None, 0.5)
+    assert "failed because" not in table.columns  # nothing to say in it
+    assert "0 to 2" in table.note
+    (panel,) = beside(table).panels
+    assert [curve.style for curve in panel.curves] == ["rings", "dots"]
+    assert "quick" in heading(table, quick=True)
+
+
+def test_a_sentence_without_its_facts_is_left_out_and_models_that_warn_are_named() -> None:
+    made = experiment()
+    made.says(best="NARX", n_seeds=3, best_error=1.5)
+    found = made.done("a rig")
+    assert len(found.summary) == 1
+    assert "1.50 mm" in found.summary[0]
+    assert found.paper.quick in found.notes
+    fields = {
+        name
+        for text in paper("field-models").summary.values()
+        for _, name, _, _ in string.Formatter().parse(text)
+    }
+    assert {"best", "best_error"} <= fields
+
+
+def test_pages_name_the_paper_and_its_figures() -> None:
+    made = experiment()
+    x = np.linspace(0.0, 1.0, 100)
+    made.figure("signals", {"calibration": {"": (x, x)}, "test": {"": (x, x), "ours": (x, x)}})
+    made.says(best="NARX", n_seeds=3, best_error=1.5)
+    found = made.done("rig mas20-hanging")
+    (figure,) = found.figures
+    assert [panel.title for panel in drawing(figure).panels] == ["calibration", "test"]
+    text = markdown(found, "2026-01-01", "pictures")
+    assert "Quick run of 2026-01-01" in text
+    assert "![Pressure](pictures/signals.png)" in text
+    assert "quick run" in next(line for line in text.splitlines() if line.startswith("### "))
+    html = reproduction_page(found)
+    for part in (found.paper.title, found.paper.question, found.paper.authors):
+        assert part in html
+
+
+def test_own_recordings_are_sorted_or_the_paper_says_what_is_missing() -> None:
+    time = np.arange(0.0, 60.0, 0.02)
+    falling = 3.0 + np.sin(time) * (2.0 - time / 40)
+    rising = 3.0 + np.sin(time) * (1.0 + time / 80)
+    runs = [
+        Recording({"pressure": u, "displacement": 5 * u}, 0.02, meta={"name": name})
+        for name, u in (("a", rising), ("b", falling))
+    ]
+    rerun: Rerun = registry.load("papers", "field-models")
+    assert rerun.sort(runs) == [Labels("test", {}), Labels("train", {})]
+    with pytest.raises(DataError, match="two files"):
+        rerun.sort(runs[:1])
+    with pytest.raises(DataError, match="two recordings"):
+        reproduce("field-models", data=[])
+
+
+def test_runs_are_chosen_by_role_and_label() -> None:
+    one = Recording({"pressure": [0.0, 1.0]}, 0.1)
+    runs = Runs({"a": one, "b": one}, {"a": Labels("train", {"p0": 1.0}), "b": Labels("test", {})})
+    assert runs.names("train") == runs.names(p0=1.0) == ["a"]
+    assert runs.of("a", "p0") == 1.0
+    assert len(runs.select()) == 2

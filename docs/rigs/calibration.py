@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from mckibben.estimators.hysteresis.gpi import GPIEstimator
 from mckibben.estimators.hysteresis.mpi import MPIEstimator
 from mckibben.metrics import err
-from mckibben.papers.field_models.printed import prandtl_ishlinskii
 from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
 from mckibben.papers.mpi_narmax.published import modified_prandtl_ishlinskii
 from mckibben.papers.multistate_friction.protocol import SHORTEST
+from mckibben.papers.paper import paper
 from mckibben.papers.sdchm.printed import ORDERS, PREDICTION
 from mckibben.papers.sdchm.protocol import PATTERNS
 from mckibben.recording import Recording
@@ -215,7 +215,7 @@ def hanging() -> Iterator[Row]:
     )
     time = np.arange(1001) * 0.02
     wave = triangle(time, 10.0, 5.5, 1.0)
-    model = np.asarray(prandtl_ishlinskii().simulate(wave))
+    model = np.asarray(paper("field-models").printed("field-models-pi").simulate(wave))
     moved = rig.run(Recording({"pressure": wave}, 0.02))["displacement"]
     yield (
         "loop width of the second major cycle",
@@ -235,7 +235,7 @@ def hanging() -> Iterator[Row]:
             f"{ours:+.1f} %",
             "of the range",
         )
-    printed = prandtl_ishlinskii()
+    printed = paper("field-models").printed("field-models-pi")
     shapes = [printed.simulate(r)["unscaled_displacement"] for r in runs.values()]
     matched, fitted = (
         _range_match(shapes[0], first),

@@ -161,11 +161,6 @@ PLUGINS: dict[str, dict[str, str]] = {
         "sdchm": "mckibben.papers.sdchm.protocol:sdchm",
     },
     "published": {
-        "activation-pressure-profile": (
-            "mckibben.papers.activation_pressure.printed:activation_pressure"
-        ),
-        "field-models-p2uz": "mckibben.papers.field_models.printed:process_model",
-        "field-models-pi": "mckibben.papers.field_models.printed:prandtl_ishlinskii",
         "mpi-narmax-mpi": "mckibben.papers.mpi_narmax.published:modified_prandtl_ishlinskii",
         "multistate-friction": "mckibben.papers.multistate_friction.published:multistate_friction",
         "multistate-static-force": "mckibben.papers.multistate_friction.published:static_force",

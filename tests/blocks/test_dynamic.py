@@ -18,8 +18,8 @@ from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.blocks.memoryless import Affine, Negative
-from mckibben.papers.field_models.printed import process_model
 from mckibben.papers.multistate_friction.published import static_force
+from mckibben.papers.paper import paper
 from mckibben.registry import load
 
 STEP = 0.01
@@ -115,7 +115,7 @@ def test_a_continuous_model_comes_as_it_is_written() -> None:
 
 
 def test_printed_numbers() -> None:
-    poles = np.sort(np.roots(process_model().denominator()))
+    poles = np.sort(np.roots(paper("field-models").printed("field-models-p2uz").denominator()))
     np.testing.assert_allclose(poles, [-3.185, -0.00966], rtol=2e-3)
     assert load("published", "sdchm-coupling")().radius == pytest.approx(0.456, abs=5e-4)
     per_bar, rest = static_force().terms(np.array([190.0]))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, Recording
+from mckibben.blocks.force.activation import ActivationPressure
 from mckibben.blocks.force.laws import ChouHannaford, TonduLopez
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.estimators.coupled.balance_force import BalanceForceEstimator
@@ -19,8 +20,8 @@ from mckibben.estimators.force.laws import (
     TonduLopezEstimator,
 )
 from mckibben.estimators.force.multistate import MultistateEstimator, extract_hysteresis
-from mckibben.papers.activation_pressure.printed import activation_pressure
 from mckibben.papers.multistate_friction.published import static_force
+from mckibben.papers.paper import paper
 from tests.estimators.test_balance import recording
 
 TRUTH = MultistateFriction(
@@ -102,7 +103,9 @@ def sines(frequency: float, force: float) -> Recording:
     time = np.arange(1200) * 0.005
     contraction = 0.1 - 0.03 * np.cos(2 * np.pi * frequency * time)
     given = Recording({"contraction": contraction, "force": np.full(1200, force)}, 0.005)
-    model = replace(activation_pressure(), frequency=frequency)
+    model = paper("activation-pressure").printed("activation-pressure-profile")
+    assert isinstance(model, ActivationPressure)
+    model = replace(model, frequency=frequency)
     return given.with_channels(pressure=model.simulate(given)["pressure"])
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mckibben.papers.field_models.affine_match import affine_match
 from numpy.typing import NDArray
 from scipy.optimize import approx_fprime
 from scipy.signal import lfilter
@@ -18,6 +17,7 @@ from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.free_run import run_free
 from mckibben.estimators.core.data import training_data
 from mckibben.estimators.dynamics.prediction_error import Orders, errors
+from mckibben.papers.field_models.run import matched
 from mckibben.registry import load
 from tests.golden.plants import runs
 
@@ -186,16 +186,14 @@ def test_identify_asks_for_orders_where_none_are_usual(family: str) -> None:
         identify(recorded(0, 300), family)
 
 
-def test_affine_match_by_both_rules() -> None:
+def test_a_model_is_matched_by_ranges() -> None:
     recording = recorded(10, 400, noise=0.0)
     model = TransferFunction((0.5, 0.3), F, STEP)
     twisted = recording.with_channels(
         displacement=3.0 * model.simulate(recording)["displacement"] - 7
     )
-    for rule in ("range", "least-squares"):
-        matched = affine_match(model, twisted, rule)
-        errors_left = matched.simulate(twisted)["displacement"] - twisted["displacement"]
-        assert np.abs(errors_left).max() < 1e-9
+    left = matched(model, twisted).simulate(twisted)["displacement"] - twisted["displacement"]
+    assert np.abs(left).max() < 1e-9
 
 
 WARM = ProcessModel(6.8, (5.7,), 9.1, 156.0, 0.0, 0.0, 2.0)

@@ -158,8 +158,8 @@ def _print(found: Reproduction) -> None:
         say(f"\n{heading(table, quick=found.quick)}")
         rows = [[_cell(cell) for cell in row] for row in table.rows]
         print_table(table.columns, rows)
-        if table.note:
-            say(table.note)
+        if table.text.note:
+            say(table.text.note)
     say()
     for sentence in found.summary:
         say(sentence)

@@ -22,7 +22,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, MckibbenError, ModelWarning
 from mckibben.estimators.optimisers.tracker import whole_searches
 from mckibben.files import read, write
-from mckibben.papers.paper import Paper, paper
+from mckibben.papers.paper import FigureText, Paper, TableText, paper
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, Role, protocol
@@ -39,60 +39,29 @@ MOST = 2000
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a re-run.
+    """A table of a re-run: its words, filled in, headings with units, and rows of cells.
 
-    Parameters
-    ----------
-    key, title, of, note : str
-        As ``paper.toml`` has them, filled in.
-    columns : tuple of str
-        Headings, with units; those of printed figures end with ``", printed"``.
-    rows : tuple of tuple
-        Words, numbers, or None where there is nothing to say.
-    drawn : str
-        What the drawn columns measure; empty if none is.
-    bound : float or None
-        What the paper says that its figures are below.
+    Headings of printed figures end with ``", printed"``.
     """
 
     key: str
-    title: str
-    of: str
+    text: TableText
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
-    note: str = ""
-    drawn: str = ""
-    bound: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table as ``tables.json`` holds it."""
         rows = [dict(zip(self.columns, row, strict=True)) for row in self.rows]
-        return {
-            "key": self.key,
-            "title": self.title,
-            "of": self.of,
-            "note": self.note,
-            "rows": rows,
-        }
+        words = {"title": self.text.title, "of": self.text.of, "note": self.text.note}
+        return {"key": self.key, **words, "rows": rows}
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a re-run: panels of curves on equal axes.
-
-    Parameters
-    ----------
-    key, title, of, x, y : str
-        As ``paper.toml`` has them.
-    panels : mapping of str to mapping
-        Title of a panel -> name of a curve -> its x and y.
-    """
+    """A figure of a re-run: its words, and panels of curves by their titles."""
 
     key: str
-    title: str
-    of: str
-    x: str
-    y: str
+    text: FigureText
     panels: Mapping[str, Curves]
 
 
@@ -406,23 +375,18 @@ class Experiment:
             for line in lines:
                 line.insert(place, printed.get(str(line[0])))
         kept = [any(line[place] is not None for line in lines) for place in range(len(headings))]
-        self.tables.append(
-            Table(
-                *(key, text.title.format(**facts), text.of),
-                tuple(compress(headings, kept)),
-                tuple(tuple(compress(line, kept)) for line in lines),
-                *(text.note.format(**facts), text.drawn, text.bound),
-            )
-        )
+        words = {"title": text.title.format(**facts), "note": text.note.format(**facts)}
+        shown = tuple(tuple(compress(line, kept)) for line in lines)
+        filled = text.model_copy(update=words)
+        self.tables.append(Table(key, filled, tuple(compress(headings, kept)), shown))
 
     def figure(self, key: str, panels: Mapping[str, Curves]) -> None:
         """Add a figure: title of a panel -> name of a curve -> its x and y, of which some are drawn."""
-        text = self.paper.figures[key]
         drawn = {
             title: {name: (thinned(x), thinned(y)) for name, (x, y) in curves.items()}
             for title, curves in panels.items()
         }
-        self.figures.append(Figure(key, text.title, text.of, text.x, text.y, drawn))
+        self.figures.append(Figure(key, self.paper.figures[key], drawn))
 
     def says(self, **facts: Any) -> None:
         """Give facts that fill the sentences of ``paper.toml``."""
@@ -430,19 +394,21 @@ class Experiment:
 
     def done(self, on: str) -> Reproduction:
         """Return all that came out."""
-        fields = {
-            text: {name for _, name, _, _ in string.Formatter().parse(text) if name}
-            for text in self.paper.summary.values()
-        }
-        given = set(self.facts)
-        roots = {text: {name.partition("[")[0] for name in names} for text, names in fields.items()}
-        sentences = (text.format(**self.facts) for text, names in roots.items() if names <= given)
+        sentences = []
+        for text in self.paper.summary.values():
+            if {name for _, name, _, _ in string.Formatter().parse(text) if name} <= {*self.facts}:
+                sentences.append(text.format(**self.facts))
         quick = [self.paper.quick] if self.quick else []
         return Reproduction(
-            *(self.name, self.paper, on, tuple(sentences)),
-            *(tuple(self.tables), tuple(self.figures)),
+            self.name,
+            self.paper,
+            on,
+            tuple(sentences),
+            tuple(self.tables),
+            tuple(self.figures),
             (*self.paper.notes, *quick, *self.warned),
-            *(self.quick, self.seed),
+            self.quick,
+            self.seed,
         )
 
 

@@ -9,11 +9,13 @@ import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from mckibben import registry
+from mckibben.blocks.saving import part_from_dict
+from mckibben.errors import ModelError
 
 Words = Annotated[str, Field(min_length=1)]
 Printed = dict[str, dict[str, float]]
@@ -124,6 +126,8 @@ class Paper(_Strict):
         Every system, equation, table and figure.
     tables, figures : mapping
         Of the re-run, by key.
+    models : mapping
+        Models as printed, by name, each as a model's file holds it.
     """
 
     number: int
@@ -142,6 +146,11 @@ class Paper(_Strict):
     items: tuple[Item, ...]
     tables: dict[str, TableText]
     figures: dict[str, FigureText]
+    models: dict[str, dict[str, Any]] = {}
+
+    def printed(self, name: str) -> Any:
+        """Return the block of a model as printed."""
+        return part_from_dict(self.models[name])
 
 
 @cache
@@ -162,3 +171,30 @@ def papers() -> Mapping[str, Paper]:
     """Return all papers by their short names, in the order of their numbers."""
     found = {name: paper(name) for name in registry.names("papers")}
     return dict(sorted(found.items(), key=lambda item: item[1].number))
+
+
+def printed_models() -> tuple[str, ...]:
+    """Return the names of all models as printed."""
+    return tuple(sorted(name for each in papers().values() for name in each.models))
+
+
+def printed(name: str) -> Any:
+    """Return the block of a model with the parameters that its paper prints.
+
+    Raises
+    ------
+    ModelError
+        If there is none of that name; the text lists those there are.
+
+    Examples
+    --------
+    >>> from mckibben.papers.paper import printed
+    >>> printed("field-models-pi").thresholds[1]
+    0.3392
+    """
+    for each in papers().values():
+        if name in each.models:
+            return each.printed(name)
+    raise ModelError(
+        f"there is no printed model {name!r}. Remedy: use one of {', '.join(printed_models())}."
+    )

@@ -26,13 +26,13 @@ FEWEST = 40
 
 def heading(one: Table | Figure, *, quick: bool = False) -> str:
     """Return a title, what of the paper it stands beside, and whether the run was quick."""
-    beside_ = f" ({one.of})" if one.of else ""
-    return f"{one.title}{beside_}{', quick run' if quick else ''}"
+    beside_ = f" ({one.text.of})" if one.text.of else ""
+    return f"{one.text.title}{beside_}{', quick run' if quick else ''}"
 
 
 def reproduction_page(found: Reproduction) -> str:
     """Return the report of a re-run as HTML: what is printed beside ours first, raw signals last."""
-    pictured = [table for table in found.tables if table.drawn]
+    pictured = [table for table in found.tables if table.text.drawn]
     drawings = {f"beside-{place}": beside(table) for place, table in enumerate(pictured)}
     drawings |= {f"figure-{place}": drawing(figure) for place, figure in enumerate(found.figures)}
     return templating.page(
@@ -48,7 +48,7 @@ def reproduction_page(found: Reproduction) -> str:
 def beside(table: Table) -> Drawing:
     """Return a table's drawn columns: what is printed in rings of ink, what was found in colours.
 
-    Drawn are those in the unit of ``table.drawn``, and all others if none names a unit of its own.
+    Drawn are those in the unit of ``table.text.drawn``, and all others if none names a unit of its own.
     """
     curves: list[Curve] = []
     found = n_printed = 0
@@ -68,14 +68,14 @@ def beside(table: Table) -> Drawing:
                 "rings" if printed else "dots",
             )
         )
-    bound = () if table.bound is None else (Mark(table.bound, "printed: below"),)
+    bound = () if table.text.bound is None else (Mark(table.text.bound, "printed: below"),)
     names = tuple(str(row[0]) for row in table.rows)
-    return Drawing((Panel(table.drawn, "", tuple(curves), marks=bound, categories=names),))
+    return Drawing((Panel(table.text.drawn, "", tuple(curves), marks=bound, categories=names),))
 
 
 def _drawn(table: Table) -> list[str]:
     """Return the columns that are drawn: those of the measure, or with a printed figure beside."""
-    named = [column for column in table.columns[1:] if table.drawn in column]
+    named = [column for column in table.columns[1:] if table.text.drawn in column]
     printed = {c.removesuffix(", printed") for c in table.columns if c.endswith(", printed")}
     both = [c for c in table.columns[1:] if c.removesuffix(", printed") in printed]
     return named or both or list(table.columns[1:])
@@ -98,7 +98,7 @@ def drawing(figure: Figure) -> Drawing:
             style: Style = "line" if len(x) > FEWEST else "dots"
             curves.append(Curve(x, y, "" if name in seen else name, colour, style))
         seen |= {*given}
-        panels.append(Panel(figure.x, figure.y, tuple(curves), title))
+        panels.append(Panel(figure.text.x, figure.text.y, tuple(curves), title))
     return Drawing(tuple(panels), columns=2 if len(panels) in (2, 4) else 3)
 
 
@@ -150,11 +150,11 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
         yield "| " + " | ".join(table.columns) + " |\n|---|" + "---:|" * (len(table.columns) - 1)
         for row in table.rows:
             yield "| " + " | ".join(_cell(cell) for cell in row) + " |"
-        yield f"\n{table.note}\n" if table.note else ""
+        yield f"\n{table.text.note}\n" if table.text.note else ""
     yield "## Figures\n"
     for figure in found.figures:
         yield f"### {heading(figure, quick=found.quick)}\n"
-        yield f"![{figure.title}]({pictures}/{figure.key}.png)\n"
+        yield f"![{figure.text.title}]({pictures}/{figure.key}.png)\n"
     yield "## On your own rig\n"
     yield f"`mckibben reproduce {found.name} --data FOLDER` takes {paper.data}.\n"
 
@@ -166,8 +166,9 @@ def _indexed(item: Item, found: Reproduction) -> str:
     titles = [heading(one, quick=found.quick) for one in shown if one.key == key]
     here = f"`{item.here}`" if item.here else "–"
     here = f"[{key}](#{_anchor(titles[0])})" if titles else here
+    differs = item.differs or ("the same quantities, on the rig" if titles else "exact")
     command = f"`{item.command}`" if item.command else ""
-    return f"| {item.of} | {item.what} | {here} | {item.differs or 'exact'} | {command} |"
+    return f"| {item.of} | {item.what} | {here} | {differs} | {command} |"
 
 
 def _anchor(title: str) -> str:

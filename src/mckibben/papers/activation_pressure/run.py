@@ -21,7 +21,6 @@ from mckibben.estimators.force.activation import (
     dominant_frequency,
     outermost,
 )
-from mckibben.papers.activation_pressure.printed import activation_pressure as printed_profile
 from mckibben.papers.experiment import Cell, Curves, Experiment, Labels, Rerun, rms
 from mckibben.recording import Recording
 from mckibben.signals import reversals
@@ -80,7 +79,7 @@ def run(experiment: Experiment) -> None:
         experiment.table(key, columns, rows)
         for place, whose in enumerate(("theirs", "ours")):
             _said(experiment, f"{key}_{whose}", {c: both[place] for c, both in found.items()})
-    printed = printed_profile()
+    printed = experiment.paper.printed("activation-pressure-profile")
     forces = sorted({force for force, _ in (*slow, *sines)})
     _profile(experiment, printed, theirs, slow or sines)
     _constants(experiment, printed, theirs)

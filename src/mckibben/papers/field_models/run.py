@@ -22,7 +22,7 @@ from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.metrics import score
 from mckibben.papers.experiment import Cell, Curves, Experiment, Labels, Rerun
-from mckibben.papers.field_models.printed import THRESHOLDS, prandtl_ishlinskii, process_model
+from mckibben.papers.paper import paper
 from mckibben.recording import Recording
 from mckibben.registry import load
 from mckibben.signals import reversals
@@ -36,6 +36,7 @@ QUICK = ("balance", "bj", "cpi", "duhem", "gpi", "mpi", "oe", "p2uz", "pi", "pre
 N_FOLDS = 4
 """Of the cross-validation that chooses a model of the field; the quick run has none."""
 
+PRINTED_PI, PRINTED_P2UZ = "field-models-pi", "field-models-p2uz"
 NARX, BJ, P2UZ, SLOPES = "NARX", "BJ", "P2UZ", "PI"
 LEAST_SQUARES = "PI by least squares, ours"
 PAPERS = (NARX, BJ, P2UZ, SLOPES)
@@ -53,14 +54,15 @@ def methods(seed: int) -> dict[str, Estimator]:
     and q^-2. Like P2UZ it starts at rest, as the muscle does. PI has the printed thresholds, and weights
     by the slopes of segments, Eqs. (14) and (15).
     """
+    thresholds = paper("field-models").models[PRINTED_PI]["thresholds"]
     return {
         NARX: load("estimators", "narx-network")(
             n_units=10, delay=1, refine=False, allow_unstable=True, n_starts=5, seed=seed
         ),
         BJ: load("estimators", "bj")(lags=(0, 2), initial="first_sample", seed=seed),
         P2UZ: load("estimators", "p2uz")(initial="first_sample", seed=seed),
-        SLOPES: PIEstimator(thresholds=THRESHOLDS, method="slopes", seed=seed),
-        LEAST_SQUARES: PIEstimator(thresholds=THRESHOLDS, seed=seed),
+        SLOPES: PIEstimator(thresholds=thresholds, method="slopes", seed=seed),
+        LEAST_SQUARES: PIEstimator(thresholds=thresholds, seed=seed),
     }
 
 
@@ -251,7 +253,7 @@ def _parameters(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
         ["a", "b [mm]"],
         {name: [m.gain, m.offset] for name, m in match.items() if isinstance(m, Affine)},
     )
-    printed, found = process_model(), tried[P2UZ].plain
+    printed, found = experiment.paper.printed(PRINTED_P2UZ), tried[P2UZ].plain
     if isinstance(found, ProcessModel):
         rows: dict[str, list[Cell]] = {
             "K": [printed.gain, found.gain],
@@ -272,18 +274,16 @@ def _parameters(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
             name: [*map(float, values), None, None][:3] for name, values in polynomials.items()
         }
         experiment.table("bj", ["z^0", "z^-1", "z^-2"], terms)
-    models = [prandtl_ishlinskii(), tried[SLOPES].plain, tried[LEAST_SQUARES].plain]
-    shares: list[Sequence[Cell]] = [
-        (np.array(model.weights) / np.sum(model.weights)).tolist()
+    models = [experiment.paper.printed(PRINTED_PI), tried[SLOPES].plain, tried[LEAST_SQUARES].plain]
+    columns = ["share printed", "share by slopes", "share by least squares, ours"]
+    shares = {
+        column: (np.array(model.weights) / np.sum(model.weights)).tolist()
+        for column, model in zip(columns, models, strict=True)
         if isinstance(model, PI)
-        else [None] * len(THRESHOLDS)
-        for model in models
-    ]
-    experiment.table(
-        "weights",
-        ["share printed", "share by slopes", "share by least squares, ours"],
-        {f"{r:g}": row for r, *row in zip(THRESHOLDS, *shares, strict=True)},
-    )
+    }
+    thresholds = experiment.paper.models[PRINTED_PI]["thresholds"]
+    rows_of = {f"{r:g}": row for r, *row in zip(thresholds, *shares.values(), strict=True)}
+    experiment.table("weights", [*shares], rows_of)
 
 
 def _board_table(experiment: Experiment, board: Leaderboard) -> None:

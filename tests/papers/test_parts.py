@@ -29,9 +29,8 @@ from tests.cli.conftest import cli as cli  # a fixture
     [
         (["nobody"], "nobody"),
         ([], "--list"),
-        (["field-models", "--train", "x.csv"], "--test"),
-        (["multistate-friction", "--train", "x.csv", "--test", "y.csv"], "field-models"),
-        (["field-models", "--train", "x.csv", "--test", "y.csv"], "x.csv"),
+        (["field-models", "--data", "nowhere"], "nowhere"),
+        (["field-models", "--rig", "no-rig"], "no-rig"),
     ],
 )
 def test_bad_calls_are_refused(cli: Cli, arguments: list[str], said: str) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mckibben.papers.field_models.methods import LEAST_SQUARES, PRINTED
 
 from mckibben import example
+from mckibben.papers.field_models.run import BJ, LEAST_SQUARES, NARX, P2UZ, PAPERS, SLOPES
 from mckibben.papers.mpi_narmax.models import AS_PRINTED, PLAIN, THREE_RATES, UNLOADED
 from mckibben.papers.mpi_narmax.models import OURS as OURS_LOADED
 from mckibben.papers.mpi_narmax.tables import PRINTED_MAE
@@ -34,12 +34,17 @@ def by_model(rows: Rows) -> dict[str, dict[str, Any]]:
     return {str(next(iter(row.values()))): row for row in rows}
 
 
+def keyed(found: dict[str, Any], key: str) -> Rows:
+    """Return the rows of a table."""
+    return next(list(one["rows"]) for one in found["tables"] if one["key"] == key)
+
+
 def test_activation_pressure(cli: Cli, tmp_path: Path) -> None:
     """The static profile is as printed, and both models predict."""
     result = cli("reproduce", "activation-pressure", "--quick", "-o", tmp_path / "run", "--json")
     assert result.code == 0, result.err
     found = json.loads(result.out)
-    points = table(found, "Characteristic points")
+    points = keyed(found, "points")
     assert len(points) == 6
     for row in points:
         assert row["e_3"] < row["e_1"] < row["e_2"] < row["e_4"], row
@@ -48,11 +53,12 @@ def test_activation_pressure(cli: Cli, tmp_path: Path) -> None:
         assert here["static RMSE [bar]"] < 1.1 * printed["static RMSE [bar]"] + 0.1
         for quantity in ("e_3", "e_1", "e_2", "e_4"):
             assert here[quantity] == pytest.approx(printed[quantity], abs=0.025), quantity
-    for title in ("sines", "random waves"):
-        rows = table(found, f"RMSE [% of range] on {title}")
+    for key in ("sines", "waves"):
+        rows = keyed(found, key)
+        assert len(rows) == 12
         for whose, worst in (("the paper's", 10.0), ("ours", 6.0)):
-            assert max(row[c] for row in rows for c in row if c.startswith(whose)) < worst
-    rates = by_model(table(found, "Extracted hysteresis"))
+            assert max(row[f"RMSE [% of range], {whose}"] for row in rows) < worst
+    rates = by_model(keyed(found, "rates"))
     assert rates["slope of gamma [1/Hz]"]["printed"] == pytest.approx(0.267, abs=0.001)
     assert 0.1 < rates["slope of gamma [1/Hz]"]["here"] < 0.4
     assert json.loads((tmp_path / "run" / "tables.json").read_text()) == found
@@ -60,32 +66,38 @@ def test_activation_pressure(cli: Cli, tmp_path: Path) -> None:
 
 def test_field_models(cli: Cli, tmp_path: Path) -> None:
     """Methods as published are as good as their kind; weights by slopes spread."""
-    runs = {"train": "decaying-triangle", "test": "irregular-triangle"}
-    given = [f"--{role}={example.FOLDER / name}.csv" for role, name in runs.items()]
-    result = cli("reproduce", "field-models", "--quick", *given, "-o", tmp_path, "--json")
+    data = tmp_path / "data"
+    data.mkdir()
+    for name in ("decaying-triangle", "irregular-triangle"):
+        (data / f"{name}.csv").write_bytes((example.FOLDER / f"{name}.csv").read_bytes())
+    result = cli("reproduce", "field-models", "--quick", "--data", data, "-o", tmp_path, "--json")
     assert result.code == 0, result.err
     found = json.loads(result.out)
-    seeds = table(found, "The same by seed")
+    seeds = keyed(found, "seeds")
 
     def medians(which: str, match: str) -> dict[str, float]:
         return {r["model"]: r[f"RMSE {which} [mm], median"] for r in seeds if r["match"] == match}
 
-    plain, matched = medians("test", "none"), medians("test", "by range")
+    plain, by_range = medians("test", "none"), medians("test", "by range")
     calibration = medians("calibration", "none")
-    assert set(PRINTED) < {*plain} == {*matched}
-    for name, most in (("NARX", 1.2), ("P2UZ", 2.0), ("Box-Jenkins", 4.0)):
+    assert set(PAPERS) < {*plain} == {*by_range}
+    for name, most in ((NARX, 1.2), (P2UZ, 2.0), (BJ, 4.0)):
         assert plain[name] < most
-    assert calibration["P2UZ"] <= calibration["Box-Jenkins"]  # one of them minimises this error
-    assert calibration[LEAST_SQUARES] <= calibration["PI by slopes"] < 2.5
-    methods = by_model(table(found, "The paper's methods"))
-    for name, printed in PRINTED.items():
-        assert methods[name]["RMSE test [mm], printed"] == printed[2]
-        assert methods[name]["RMSE test [mm], here"] == matched[name]
-    shares = np.array([row["share by slopes"] for row in table(found, "Weights of the PI models")])
+    assert calibration[P2UZ] <= calibration[BJ]  # one of them minimises this error
+    assert calibration[LEAST_SQUARES] <= calibration[SLOPES] < 2.5
+    methods = by_model(keyed(found, "errors"))
+    assert {name: methods[name]["RMSE test [mm], printed"] for name in PAPERS} == {
+        NARX: 2.10,
+        BJ: 3.17,
+        P2UZ: 1.91,
+        SLOPES: 2.48,
+    }
+    assert {name: row["RMSE test [mm]"] for name, row in methods.items()} == by_range
+    shares = np.array([row["share by slopes"] for row in keyed(found, "weights")])
     assert shares.sum() == pytest.approx(1)
     assert shares.min() >= 0
     assert np.sum(shares > 0.1) >= 3  # least squares leaves two
-    errors = [row["test RMSE [mm]"] for row in table(found, "The whole field")]
+    errors = [row["test RMSE [mm]"] for row in keyed(found, "field")]
     assert errors == sorted(errors)
 
 

@@ -137,7 +137,10 @@ def run(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Run one experiment and write the recording."""
+    """Run one experiment and write the recording.
+
+    The rig begins at rest at the first commands, unless its file or --set says where (start.pressure=1).
+    """
     from mckibben.files import write
     from mckibben.outputs import claim_recording
 
@@ -152,6 +155,7 @@ def run(
         given = _read_inputs(rig, inputs)
     else:
         given = _made_inputs(rig, signal or [], duration, rate, seed)
+    rig = rig.changed(_starts(rig, given))
     recording = rig.run(given, seed, ideal=ideal)
     write(recording.with_meta(name=out.stem), out)
     spans = {
@@ -336,6 +340,17 @@ def _made_inputs(
         settings = {key: defaults[key] for key in known if key in defaults} | settings
         channels[channel] = build(kind, time, **settings)
     return Recording(channels, 1 / rate)
+
+
+def _starts(rig: Rig, given: Recording) -> dict[str, float]:
+    """Return the settings by which a rig rests at the first commands, unless it says where it rests."""
+    firsts = {name: float(given[name][0]) for name in rig.inputs if name in given}
+    limits = {name: rig.limits(name) for name in firsts}
+    return {
+        f"start.{name}": min(max(first, limits[name].low), limits[name].high)
+        for name, first in firsts.items()
+        if not rig.start
+    }
 
 
 def _read_inputs(rig: Rig, file: Path) -> Recording:

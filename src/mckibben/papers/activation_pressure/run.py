@@ -55,7 +55,7 @@ def run(experiment: Experiment) -> None:
     for name, recording in runs.items():
         condition = (float(runs.of(name, "force")), float(runs.of(name, "frequency")))
         stages[runs.of(name, "stage")][condition] = with_contraction(recording)
-    slow, sines, waves = stages.values()
+    slow, sines, waves = (dict(sorted(stage.items())) for stage in stages.values())
     train = [*slow.values(), *sines.values()]
     experiment.tell(0.82, "the paper's model")
     theirs = experiment.fit(THEIRS, ActivationPressureEstimator(seed=experiment.seed), train).block

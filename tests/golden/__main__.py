@@ -130,7 +130,7 @@ def main() -> int:
         new = [case for case in cases if load(case.name) is None]
         return update(new, options.because, options.processes)
     here, began = machine(), time.perf_counter()
-    skipped = [case for case in cases if not case.possible]
+    skipped = [case for case in cases if not case.possible or _elsewhere(case, here)]
     counts: dict[str, int] = {"skipped": len(skipped)}
     rows: list[Moved] = []
     slowest: list[tuple[float, str]] = []
@@ -145,7 +145,9 @@ def main() -> int:
             print(f"{case.name}: {word}: {remark}")
     table(rows)
     if skipped:
-        print(f"skipped, as what they need is not here: {', '.join(c.name for c in skipped)}")
+        print(
+            f"skipped, as what they need, or their kind of machine, is not here: {', '.join(c.name for c in skipped)}"
+        )
     if not options.patterns and (left := names() - all_cases().keys()):
         counts["stored without a case"] = len(left)
         print(f"stored without a case: {', '.join(sorted(left))}")
@@ -158,6 +160,12 @@ def main() -> int:
     failed = sum(counts.values()) - good - len(skipped)
     print(f"golden: {good} passed, {failed} failed, {len(skipped)} skipped")
     return int(failed > 0)
+
+
+def _elsewhere(case: Case, here: str) -> bool:
+    """Tell whether a case is compared on another kind of machine alone."""
+    stored = load(case.name) if case.one_machine else None
+    return stored is not None and stored.machine != here
 
 
 def update(cases: list[Case], because: str, processes: int = 1) -> int:

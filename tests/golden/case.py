@@ -41,6 +41,9 @@ class Case:
         Folders of shared recordings, and programs of `tests.tools`, without which the case is skipped.
     slow : bool
         Left out where neither its name nor ``--slow`` asks for it.
+    one_machine : bool
+        Compared on machines of the kind on which it was stored alone: two answers are as good, and the
+        last bits choose.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Case:
     needs: Sequence[str] = ()
     tools: Sequence[str] = ()
     slow: bool = False
+    one_machine: bool = False
 
     @property
     def possible(self) -> bool:

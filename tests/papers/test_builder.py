@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import string
 import subprocess
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -17,7 +18,8 @@ from mckibben.errors import DataError, ModelError
 from mckibben.papers.experiment import Experiment, Labels, Rerun, Runs, reproduce
 from mckibben.papers.paper import Paper, paper, papers
 from mckibben.report.reproduction import beside, drawing, heading, markdown, reproduction_page
-from mckibben.rigs import rig_names
+from mckibben.rigs import load_rig, record, rig_names
+from mckibben.signals.protocol import protocol
 
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "papers"
@@ -167,3 +169,26 @@ def test_runs_are_chosen_by_role_and_label() -> None:
     assert runs.names("train") == runs.names(p0=1.0) == ["a"]
     assert runs.of("a", "p0") == 1.0
     assert len(runs.select()) == 2
+
+
+@pytest.mark.parametrize("scale", [0.3, 1.0])
+def test_sines_and_random_waves_are_seen_without_their_names(scale: float) -> None:
+    plan = protocol("activation-pressure")
+    wanted = [run.name for run in plan.runs if run.labels["force"] in (50.0, 150.0)]
+    rig = load_rig("mckibben-530").changed({"muscle.length": 530.0 * scale})
+    rerun: Rerun = registry.load("papers", plan.name)
+    made = [
+        (run.labels, replace(one, meta={"name": run.name, "rest_length": 530.0 * scale}))
+        for run, one in record(plan, rig, runs=wanted)
+    ]
+    found = rerun.sort([one for _, one in made])
+    for (labels, one), labelled in zip(made, found, strict=True):
+        assert labelled is not None
+        for label in ("stage", "force"):
+            assert labelled.labels[label] == labels[label], one.name
+        if labels["stage"] == "hysteresis":
+            assert labelled.labels["frequency"] == labels["frequency"]
+    with pytest.raises(DataError, match="sines"):
+        rerun.sort([one for labels, one in made if labels["stage"] == "random"])
+    with pytest.raises(DataError, match="--rest-length"):
+        rerun.sort([replace(one, meta={}) for _, one in made])

@@ -138,6 +138,7 @@ def cases() -> Iterator[Case]:
             f"mckibben.compare({plant}, **{dict(options)})",
             partial(own, plant, options),
             TOLERANCES,
+            one_machine=name == "muscle-thinned",
         )
     for name, models in MEASURED.items():
         yield Case(

@@ -95,6 +95,9 @@ COMMANDS: Mapping[str, Sequence[str]] = {
 
 SLOW = {"plan"}
 
+TOOLS = {"export-fmu": ("x86_64-w64-mingw32-gcc",)}
+"""Case -> what it is compared with alone: libraries for all systems."""
+
 REFUSED: Mapping[str, str] = {
     "no-such-file": "info missing.csv",
     "no-such-channel": "characterize train.csv --input voltage",
@@ -209,7 +212,9 @@ def cases() -> Iterator[Case]:
             partial(commanded, commands),
             {f"answer/{key}": value for key, value in TOLERANCES.items()}
             | {"written/*/n_values": 0.0, "*": 0.005},
+            tools=TOOLS.get(name, ()),
             slow=name in SLOW,
+            one_machine=name == "review",
         )
     for name, words in REFUSED.items():
         yield Case(f"commands/refused/{name}", f"mckibben {words}", partial(refused, words))

@@ -188,4 +188,5 @@ def cases() -> Iterator[Case]:
                     f"estimators[{model!r}](**{dict(settings)}).fit(plants.runs({plant!r}))",
                     partial(run, name, model, settings, plant),
                     {"n_*": 0.0, "r*": CHANCE.get(model, 0.005), "*": 0.005},
+                    one_machine=name == "estimators/multistate-18/bench-rougher",
                 )

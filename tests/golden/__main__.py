@@ -145,9 +145,8 @@ def main() -> int:
             print(f"{case.name}: {word}: {remark}")
     table(rows)
     if skipped:
-        print(
-            f"skipped, as what they need, or their kind of machine, is not here: {', '.join(c.name for c in skipped)}"
-        )
+        listed = ", ".join(case.name for case in skipped)
+        print(f"skipped, as what they need, or their kind of machine, is not here: {listed}")
     if not options.patterns and (left := names() - all_cases().keys()):
         counts["stored without a case"] = len(left)
         print(f"stored without a case: {', '.join(sorted(left))}")

@@ -11,7 +11,7 @@ import typer
 
 from mckibben.cli.grouping import spread
 from mckibben.cli.invert_predictive import write_predictive
-from mckibben.cli.options import Force, Json, Reading, Seed
+from mckibben.cli.options import Fields, Force, Json, Reading, Seed, loaded
 from mckibben.cli.output import print_json, say
 from mckibben.numerals import numeral
 
@@ -87,6 +87,7 @@ def invert(
             "instead of solving the model's own; repeatable.",
         ),
     ] = None,
+    fields: Fields = None,
     seed: Seed = 0,
     force: Force = False,
     as_json: Json = False,
@@ -102,7 +103,7 @@ def invert(
     from mckibben.blocks.adaptive import adaptive as learning
     from mckibben.blocks.coupled.load_estimate import load_of
     from mckibben.blocks.force.feedforward import ForceFeedforward
-    from mckibben.blocks.saving import load
+    from mckibben.blocks.inverse import drives
     from mckibben.errors import ModelError
     from mckibben.outputs import claim_model
 
@@ -126,7 +127,7 @@ def invert(
             "--learned is an inverse of its own. Remedy: leave out --adaptive, --predictive or --for."
         )
     claim_model(out, inputs=[model, *(learned or [])], force=force)
-    block = load(model)
+    block = loaded(model, fields)
     if learned:
         _learned(block, reading.read(learned, None, informative=False), seed, out, as_json)
         return
@@ -158,6 +159,14 @@ def invert(
             print_json({"file": str(out), "reachable": {}})
             return
         say("Pressure by force and length, in closed form; track it where length is imposed.")
+        say(f"Written: {out}")
+        return
+    if not block.undoing and drives(block.outputs[0]) and not drives(block.inputs[0]):
+        block.save(out)
+        if as_json:
+            print_json({"file": str(out), "reachable": {}})
+            return
+        say(f"It already gives {_listed(block.outputs)} by {_listed(block.inputs)}.")
         say(f"Written: {out}")
         return
     inverse = (

@@ -193,6 +193,7 @@ class ActivationPressureEstimator(SearchEstimator):
             frequency=1.0,
             rate_time_constant=SMOOTHED * step if smoothed is None else smoothed,
             initial=self.starting_rule,
+            frequency_range=(float(at[moving].min()), float(at[moving].max())),
             **self.channels(data),
         )
         at = at[moving]

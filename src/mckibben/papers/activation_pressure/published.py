@@ -41,4 +41,5 @@ def activation_pressure() -> ActivationPressure:
         phi=tuple(BAR_PER_KPA * value for value in PHI_KPA),
         gamma=GAMMA,
         frequency=1.0,
+        frequency_range=(0.5, 2.0),
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sklearn.metrics import mean_absolute_error, mean_squared_error, r2_score
 
 from mckibben import DataError, metrics
-from mckibben.metrics import Scores, loop_area, loop_width, score
+from mckibben.metrics import Scores, crosstalk, loop_area, loop_width, score
 
 Array = NDArray[np.float64]
 
@@ -89,6 +89,7 @@ def test_width_of_a_parallelogram(gain: float, share: float, n: int) -> None:
     step = 2 * amplitude / n / (amplitude - 2 * radius)
     wanted = 100 * expected / (amplitude - 2 * radius)
     assert loop_width(u, y) == pytest.approx(wanted, abs=100 * step)
+    assert crosstalk(u, y, 4 * y) == pytest.approx(loop_width(u, y) / 4)
     assert loop_area(u, y) == pytest.approx(
         gain * 2 * radius * (amplitude - 2 * radius), rel=0.5 / n, abs=gain * 4 * (4.0 / n) ** 2
     )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mckibben.estimators.hysteresis.gpi import GPIEstimator
 from mckibben.estimators.hysteresis.mpi import MPIEstimator
-from mckibben.metrics import err
+from mckibben.metrics import err, loop_width
 from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
 from mckibben.papers.mpi_narmax.published import modified_prandtl_ishlinskii
 from mckibben.papers.multistate_friction.protocol import SHORTEST
@@ -56,15 +56,6 @@ def last_cycle(recording: Recording, period: float) -> Recording:
     n = round(period / recording.sample_time)
     whole = (len(recording) - 1) // n
     return recording.slice((whole - 1) * n, whole * n + 1)
-
-
-def loop_width(u: Array, y: Array) -> float:
-    """Return |y_up - y_down| at mid input over the range of y [%], of a cycle from its minimum."""
-    top = int(u.argmax())
-    middle = 0.5 * (u[0] + u[top])
-    up = np.interp(middle, u[: top + 1], y[: top + 1])
-    down = np.interp(-middle, -u[top:], y[top:])
-    return float(100 * abs(down - up) / np.ptp(y))
 
 
 def span(values: list[float], digits: int = 1) -> str:

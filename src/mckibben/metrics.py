@@ -149,7 +149,34 @@ def loop_width(u: ArrayLike, y: ArrayLike) -> float:
     >>> loop_width([0.0, 1.0, 2.0, 1.0, 0.0], [0.0, 1.0, 4.0, 3.0, 0.0])
     50.0
     """
+    return crosstalk(u, y, y)
+
+
+def crosstalk(u: ArrayLike, y: ArrayLike, relative_to: ArrayLike) -> float:
+    """Return the same distance of branches over the range of another signal [%].
+
+    For instance how far an output that should rest follows a cycle of another, of what that one moves:
+    of an output that hardly moves `loop_width` is arbitrary.
+
+    Parameters
+    ----------
+    u, y : array_like, shape (n,)
+        As for `loop_width`.
+    relative_to : array_like, shape (n,)
+        The signal whose range counts, in the unit of the output.
+
+    Raises
+    ------
+    DataError
+        On unequal lengths, a signal that is constant, or an input without a rising and a falling branch.
+
+    Examples
+    --------
+    >>> crosstalk([0.0, 1.0, 2.0, 1.0, 0.0], [0.0, 0.0, 1.0, 1.0, 0.0], [0.0, 2.0, 4.0, 2.0, 0.0])
+    25.0
+    """
     along, heights = _pair(u, y)
+    span = float(np.ptp(_pair(u, relative_to)[1]))
     top = int(np.argmax(along))
     bottom = max(along[0], along[-1])
     if not 0 < top < along.size - 1 or bottom >= along[top]:
@@ -157,13 +184,13 @@ def loop_width(u: ArrayLike, y: ArrayLike) -> float:
             "the input does not rise and fall again, so there is no loop",
             remedy="give one whole cycle, such as a slice of mckibben.signals.cycles",
         )
-    if np.ptp(heights) == 0:
+    if span == 0:
         raise DataError("the output is constant", remedy="give one that follows the input")
     middle = 0.5 * (bottom + along[top])
     up, down = (
         _at(middle, along[part], heights[part]) for part in (slice(0, top + 1), slice(top, None))
     )
-    return 100 * abs(up - down) / float(np.ptp(heights))
+    return 100 * abs(up - down) / span
 
 
 def loop_area(u: ArrayLike, y: ArrayLike) -> float:

@@ -39,7 +39,7 @@ BASE = {"arrays", "errors"}
 
 STANDS_ON = {
     "files": {"files", "recording", "registry", "system", *BASE},
-    "rigs": {"rigs", "recording", "signals", "registry", "system", *BASE},
+    "rigs": {"rigs", "recording", "signals", "registry", "system", "metrics", *BASE},
     "export": {"export", "blocks", "registry", "system", *BASE},
     "stream": {"stream", "blocks", *BASE},
     "link": {"link", "export", "blocks", *BASE},

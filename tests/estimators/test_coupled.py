@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, ModelError, registry
-from mckibben.estimators.coupled.fuzzy import Consequents, Problem, Sets, sensitivities
-from tests.estimators.examples import recorded
+from mckibben.estimators.coupled.fuzzy import (
+    Consequents,
+    Problem,
+    Search,
+    Sets,
+    printed_swarm,
+    sensitivities,
+)
+from mckibben.estimators.coupled.sdchm import learned_inverse
+from tests.estimators.examples import quick, recorded
 
 STEP = 0.05
 
@@ -48,3 +56,20 @@ def test_muscles_that_never_move_alone_and_those_that_are_lost_are_refused() -> 
                 registry.load("estimators", "balance")().fit(given)
     with pytest.raises(ModelError, match="degree"):
         registry.load("estimators", "balance")(degree=9).fit(runs)
+
+
+@pytest.mark.filterwarnings("ignore:.* clipped")
+@pytest.mark.parametrize("name", ["sdchm", "sdchm-published"])
+def test_a_network_learned_the_other_way_round_gives_recorded_pressures(name: str) -> None:
+    runs = recorded("two muscles")
+    model = quick(name).fit(runs).model_
+    inverse = learned_inverse(model, runs, search=Search("pso", 600, printed_swarm(6, 6), 0))
+    driven = ["pressure_1", "pressure_2"]
+    assert [channel.name for channel in inverse.outputs] == driven
+    missed = np.concatenate(
+        [inverse.simulate(run).matrix(driven) - run.matrix(driven) for run in runs]
+    )
+    assert np.sqrt(np.mean(missed**2)) < 0.05  # bar, of 2
+    assert inverse != model.inverse()
+    with pytest.raises(ModelError, match="sdchm"):
+        learned_inverse(model.inverse(), runs)

@@ -8,7 +8,7 @@ else here is built on that.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
@@ -113,6 +113,10 @@ class Block(DrawsItself, Parametrised):
 
     filters: ClassVar[bool] = False
     """Whether it is linear with poles of its own, which may be too slow for single precision."""
+
+    settable: ClassVar[Mapping[str, str | None]] = {}
+    """Fields that are not identified and can be set on a saved model: each with the field that has the
+    lowest and highest value it was identified at, or None; see `mckibben.blocks.setting`."""
 
     sample_time: float | None = None
     """Time between samples that a discrete block is bound to [s]; None for any."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mckibben.cli.options import Json
+from mckibben.cli.options import Fields, Json, loaded
 from mckibben.cli.output import print_json, say
 
 if TYPE_CHECKING:
@@ -39,11 +39,10 @@ Overwrite = Annotated[
 ]
 
 
-def _loaded(model: Path, inverse: bool) -> Block:
+def _loaded(model: Path, fields: list[str] | None, inverse: bool) -> Block:
     from mckibben.blocks.force.feedforward import compensator
-    from mckibben.blocks.saving import load
 
-    block = load(model)
+    block = loaded(model, fields)
     return compensator(block) if inverse else block
 
 
@@ -112,6 +111,7 @@ def export_c(
     sample_time: SampleTime = None,
     float32: Annotated[bool, typer.Option("--float32", help="Single precision.")] = False,
     inverse: Inverse = False,
+    fields: Fields = None,
     check: Annotated[
         bool, typer.Option("--check", help="Compile it here and run its self-test.")
     ] = False,
@@ -158,7 +158,7 @@ def export_c(
     serving = _serving(link, limit or [], safe or [], watchdog)
     refuse_inputs(out, [model])
     refuse_folder(out, overwrite=overwrite)
-    block = _loaded(model, inverse)
+    block = _loaded(model, fields, inverse)
     write_c(
         block,
         out,
@@ -189,6 +189,7 @@ def export_fmu(
     name: Name = None,
     sample_time: SampleTime = None,
     inverse: Inverse = False,
+    fields: Fields = None,
     platforms: Annotated[
         str,
         typer.Option(
@@ -212,7 +213,7 @@ def export_fmu(
     refuse_file(out, overwrite=overwrite)
     named = [word.strip() for word in platforms.split(",")]
     write_fmu(
-        _loaded(model, inverse),
+        _loaded(model, fields, inverse),
         out,
         name=name or name_from(model),
         sample_time=sample_time,
@@ -236,6 +237,7 @@ def export_ros2(
     name: Name = None,
     sample_time: SampleTime = None,
     inverse: Inverse = False,
+    fields: Fields = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
@@ -248,7 +250,7 @@ def export_ros2(
     refuse_inputs(out, [model])
     refuse_folder(out, overwrite=overwrite)
     chosen = name or name_from(model).lower()
-    block = _loaded(model, inverse)
+    block = _loaded(model, fields, inverse)
     write_package(block, out, name=chosen, sample_time=sample_time, overwrite=overwrite)
     files = sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
     if as_json:

@@ -88,6 +88,7 @@ def _models(as_json: bool) -> None:
 def _model(file: Path, as_json: bool) -> None:
     from mckibben.blocks.force.feedforward import compensator
     from mckibben.blocks.saving import load
+    from mckibben.blocks.setting import settable
 
     block = load(file)
     try:
@@ -103,10 +104,12 @@ def _model(file: Path, as_json: bool) -> None:
         "n_states": block.n_states,
         "rate_dependent": bool(block.rate_dependent),
         "inverse": inverse,
+        "settable": settable(block),
     }
     if as_json:
         print_json(described)
         return
+    described["settable"] = ", ".join(f"{name}={value}" for name, value in settable(block).items())
     print_table(["", "value"], [[key, str(value)] for key, value in described.items()])
 
 

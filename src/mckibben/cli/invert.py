@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mckibben.cli.grouping import spread
 from mckibben.cli.invert_predictive import write_predictive
-from mckibben.cli.options import Force, Json
+from mckibben.cli.options import Fields, Force, Json, Reading, Seed, loaded
 from mckibben.cli.output import print_json, say
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
     from mckibben.blocks.fields import Channel
+    from mckibben.recording import Recording
 
 
 class Wanted(StrEnum):
@@ -25,7 +28,9 @@ class Wanted(StrEnum):
     force = "force"
 
 
+@spread
 def invert(
+    reading: Reading,
     model: Annotated[Path, typer.Argument(help="Model file (JSON).")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Inverse to write (JSON).")],
     wanted: Annotated[
@@ -73,6 +78,17 @@ def invert(
         float | None,
         typer.Option(help="Fastest rise of all pressures together [bar/s] (--predictive)."),
     ] = None,
+    learned: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--learned",
+            metavar="FILE",
+            help="Of sdchm: train its network on recordings the other way round, as the paper's SDIHC, "
+            "instead of solving the model's own; repeatable.",
+        ),
+    ] = None,
+    fields: Fields = None,
+    seed: Seed = 0,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -87,7 +103,7 @@ def invert(
     from mckibben.blocks.adaptive import adaptive as learning
     from mckibben.blocks.coupled.load_estimate import load_of
     from mckibben.blocks.force.feedforward import ForceFeedforward
-    from mckibben.blocks.saving import load
+    from mckibben.blocks.inverse import drives
     from mckibben.errors import ModelError
     from mckibben.outputs import claim_model
 
@@ -106,8 +122,15 @@ def invert(
         raise ModelError(
             "a horizon and limits are for compensators that look ahead. Remedy: add --predictive."
         )
-    claim_model(out, inputs=[model], force=force)
-    block = load(model)
+    if learned and (adaptive or predictive or wanted is Wanted.force):
+        raise ModelError(
+            "--learned is an inverse of its own. Remedy: leave out --adaptive, --predictive or --for."
+        )
+    claim_model(out, inputs=[model, *(learned or [])], force=force)
+    block = loaded(model, fields)
+    if learned:
+        _learned(block, reading.read(learned, None, informative=False), seed, out, as_json)
+        return
     if predictive:
         write_predictive(
             block.inverse(),
@@ -138,6 +161,14 @@ def invert(
         say("Pressure by force and length, in closed form; track it where length is imposed.")
         say(f"Written: {out}")
         return
+    if not block.undoing and drives(block.outputs[0]) and not drives(block.inputs[0]):
+        block.save(out)
+        if as_json:
+            print_json({"file": str(out), "reachable": {}})
+            return
+        say(f"It already gives {_listed(block.outputs)} by {_listed(block.inputs)}.")
+        say(f"Written: {out}")
+        return
     inverse = (
         learning(block, 60.0 if time is None else time, noise) if adaptive else block.inverse()
     )
@@ -164,6 +195,41 @@ def invert(
     if adaptive:
         say(f"Learns from {_listed(inverse.inputs[-len(block.outputs) :])}, one a step.")
         say(f"Next: mckibben track {out} --plant {model} --reference FILE, or --rig NAME.")
+    say(f"Written: {out}")
+
+
+def _learned(
+    block: Block, recordings: list[Recording], seed: int, out: Path, as_json: bool
+) -> None:
+    """Write the inverse with a learned network, and say how near to the recorded inputs it is."""
+    import numpy as np
+
+    from mckibben.cli.output import progress_bar
+    from mckibben.estimators.coupled.fuzzy import Search, printed_swarm
+    from mckibben.estimators.coupled.sdchm import SDCHMEstimator, learned_inverse
+    from mckibben.estimators.optimisers.tracker import Tracker
+    from mckibben.metrics import rmse
+
+    search = Search("pso", SDCHMEstimator.search_samples, printed_swarm(), seed)
+    with progress_bar("learning the inverse") as tell:
+        tracker = Tracker(progress=lambda share, best: tell(share, f"best {numeral(best)}"))
+        inverse = learned_inverse(block, recordings, search=search, tracker=tracker)
+        tracker.end()
+    inverse.save(out)
+    found = [inverse.simulate(one) for one in recordings]
+    errors = {
+        c.name: rmse(
+            *(np.concatenate([one[c.name] for one in some]) for some in (recordings, found))
+        )
+        for c in inverse.outputs
+    }
+    if as_json:
+        print_json({"file": str(out), "rmse": errors})
+        return
+    for channel in inverse.outputs:
+        say(
+            f"{channel.name}: RMSE {numeral(errors[channel.name], 4)} {channel.unit} on the recordings."
+        )
     say(f"Written: {out}")
 
 

@@ -15,6 +15,7 @@ import typer
 from mckibben.errors import DataError, ModelError
 
 if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
     from mckibben.files.choosing import Seen
     from mckibben.recording import Recording
 
@@ -155,6 +156,14 @@ Settings = Annotated[
         "--set", metavar="[MODEL.]NAME=VALUE", help="Setting of the estimator; repeatable."
     ),
 ]
+Fields = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Field of the saved model that is not identified, as frequency=1.5; repeatable.",
+    ),
+]
 Jobs = Annotated[int | None, typer.Option("--jobs", help="Processes. Default: as many as cores.")]
 Dask = Annotated[
     str | None,
@@ -185,8 +194,8 @@ class Reading:
 
     def options(self) -> dict[str, Any]:
         """Return the options as `mckibben.read` takes them."""
-        columns = _pairs("--column", self.column)
-        units = _pairs("--unit", self.unit)
+        columns = _pairs("--column", self.column, "pressure=P1")
+        units = _pairs("--unit", self.unit, "pressure=kPa")
         calibration = {}
         for channel, (column, gain, offset, unit) in _calibrations(self.calibrate).items():
             columns[channel], calibration[channel] = column, (gain, offset)
@@ -331,15 +340,14 @@ def _is_held(recordings: Sequence[Recording]) -> bool:
     return not any_moves(recordings, ("displacement",))
 
 
-def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
+def _pairs(option: str, given: list[str] | None, instance: str) -> dict[str, str]:
     pairs = {}
     for item in given or []:
         name, equals, value = item.partition("=")
         if not (name and equals and value):
             raise DataError(
-                f"{option} {item!r} is not of the form CHANNEL=VALUE",
-                remedy=f"write for instance {option} pressure="
-                + ("P1" if option == "--column" else "kPa"),
+                f"{option} {item!r} is not of the form NAME=VALUE",
+                remedy=f"write for instance {option} {instance}",
             )
         pairs[name] = value
     return pairs
@@ -364,7 +372,7 @@ def _constants(given: list[str] | None) -> dict[str, tuple[float, str]]:
 def _calibrations(given: list[str] | None) -> dict[str, tuple[str, float, float, str]]:
     """Return column, gain, offset and unit of channels: ``pressure=A0:2.5:-0.5:bar``."""
     found = {}
-    for channel, said in _pairs("--calibrate", given).items():
+    for channel, said in _pairs("--calibrate", given, "pressure=A0:2.5:-0.5:bar").items():
         column, gain, offset, unit = ["", "", "", *said.rsplit(":", 3)][-4:]
         try:
             found[channel] = column, float(gain), float(offset), unit
@@ -388,6 +396,16 @@ def _bytes(size: str) -> float:
     if said is None or number <= 0:
         raise DataError(f"--most {size!r} is no size", remedy="write for instance --most 2GB")
     return number * 1024.0 ** " KMGT".index(said[2].upper() or " ")
+
+
+def loaded(model: Path, given: list[str] | None) -> Block:
+    """Return a saved model, its fields set as given by ``--set NAME=VALUE``."""
+    from mckibben.blocks.saving import load
+    from mckibben.blocks.setting import with_fields
+    from mckibben.estimators.core.settings import setting_value
+
+    values = _pairs("--set", given, "frequency=1.5")
+    return with_fields(load(model), {name: setting_value(text) for name, text in values.items()})
 
 
 def chosen_models(given: str, quick: bool = False) -> str | list[str]:

@@ -252,7 +252,7 @@ def new(
     ],
     payload: Annotated[float, typer.Option(help="Mass hanging from it [kg].")] = 0.0,
     loop_width: Annotated[
-        float, typer.Option(help="Width of its loop, of its stroke, for instance 0.15.")
+        float, typer.Option(help="Loop width e_w as a share of its stroke, for instance 0.15.")
     ] = 0.15,
     force: Force = False,
 ) -> None:

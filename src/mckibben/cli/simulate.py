@@ -8,11 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from mckibben.cli.grouping import spread
-from mckibben.cli.options import (
-    Force,
-    Json,
-    Reading,
-)
+from mckibben.cli.options import Fields, Force, Json, Reading, loaded
 from mckibben.cli.output import print_json, say
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
@@ -42,6 +38,7 @@ def simulate(
             help="Of a calibrated model: also lower and upper ends that hold this share, as 0.9.",
         ),
     ] = None,
+    fields: Fields = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -52,7 +49,6 @@ def simulate(
     """
     from dataclasses import asdict
 
-    from mckibben.blocks.saving import load
     from mckibben.control.beyond import beyond_known
     from mckibben.diagnosis.bands import outside
     from mckibben.files import write
@@ -61,7 +57,7 @@ def simulate(
     from mckibben.report.words import outside_calibration
 
     claim_recording(out, inputs=[model, file], force=force)
-    banded, block = _parted(load(model), interval)
+    banded, block = _parted(loaded(model, fields), interval)
     if banded is not None and horizon is not None:
         raise ModelError("bands are of free runs. Remedy: leave --horizon or --interval out.")
     wanted = [channel.name for channel in block.inputs]

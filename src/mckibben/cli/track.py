@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mckibben import registry
-from mckibben.cli.options import Columns, Force, Json, Rate, Reading, Seed, Units, limits_in
+from mckibben.cli.options import (
+    Columns,
+    Fields,
+    Force,
+    Json,
+    Rate,
+    Reading,
+    Seed,
+    Units,
+    limits_in,
+    loaded,
+)
 from mckibben.cli.output import print_json, print_table, progress_bar, say
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
@@ -75,6 +86,7 @@ def track(
     pressure_loop: Annotated[
         bool, typer.Option(help="Feed measured pressures back inside, as regulators do.")
     ] = True,
+    fields: Fields = None,
     seed: Seed = 0,
     column: Columns = None,
     unit: Units = None,
@@ -88,7 +100,6 @@ def track(
     """
     from mckibben.blocks.base import Block
     from mckibben.blocks.feedback import FeedforwardFeedback
-    from mckibben.blocks.saving import load
     from mckibben.control import (
         UNCOMPENSATED,
         Twin,
@@ -111,7 +122,7 @@ def track(
         inputs.append(out)
     if controller_out is not None:
         claim_model(controller_out, inputs=inputs, force=force)
-    block = load(compensator)
+    block = loaded(compensator, fields)
     plant = _plant(rig, twin, limits or [])
     runs = Reading(column, unit, rate=rate).read([reference], None, informative=False)
     wanted = runs[0]

@@ -271,7 +271,7 @@ def characterization_rows(found: Characterization) -> list[Row]:
         ),
         row("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
         row("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
-        row("loop width at mid input", "mid_width", y, "the same in the unit of the output"),
+        row("branch distance at mid input", "mid_width", y, "the same in the unit of the output"),
         row(
             "asymmetry", "asymmetry", "%", "from its image turned by half a turn; PI models have 0"
         ),

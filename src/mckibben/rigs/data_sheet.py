@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from mckibben.errors import DataError
+from mckibben.metrics import loop_width
 from mckibben.recording import Recording
 from mckibben.rigs.parameters import Air, Creep, Friction, Muscle, Range, Sensor
 from mckibben.rigs.physics.bladder import bladder_force
@@ -74,7 +75,8 @@ def rig_from_data_sheet(
     payload : float
         Mass that hangs from it [kg].
     loop_width : float
-        Width of the loop at mid pressure, of the stroke; within 0.05 and 0.5.
+        e_w of the slow loop (see `mckibben.metrics.loop_width`) as a share, 0.15 for 15 %; within 0.05
+        and 0.5.
 
     Raises
     ------
@@ -221,11 +223,10 @@ def _with_loop_width(rig: MovingEnd, wanted: float, force_per_bar: float) -> Mov
 
 
 def _loop_width(rig: MovingEnd) -> float:
-    """Return the width at mid pressure of the second cycle, of the stroke."""
+    """Return e_w of the second cycle as a share."""
     limits, step = rig.limits("pressure"), 0.02
     half = round(0.5 * PERIOD / step)
     time = np.arange(4 * half + 1) * step
     wave = triangle(time, PERIOD, limits.high, limits.low)
     moved = rig.run(Recording({"pressure": wave}, step), ideal=True)["displacement"][2 * half :]
-    stroke = float(np.ptp(moved))
-    return abs(float(moved[half + half // 2] - moved[half // 2])) / stroke if stroke else 0.0
+    return loop_width(wave[2 * half :], moved) / 100 if np.ptp(moved) else 0.0

@@ -8,7 +8,8 @@ none.
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Interval
@@ -101,9 +102,15 @@ class ActivationPressure(Block):
         Default memory before the first sample: at rest.
     input, force, output : Channel
         Contraction, force and pressure.
+    frequency_range : (float, float), optional
+        Lowest and highest frequency that it was identified at [Hz].
     """
 
     kind = "activation-pressure"
+    settable: ClassVar[Mapping[str, str | None]] = {
+        "frequency": "frequency_range",
+        "rate_time_constant": None,
+    }
     ports = PORTS
     kernel = published_step
     start_kernel = published_start
@@ -148,6 +155,7 @@ class ActivationPressure(Block):
     input: fields.ChannelField = fields.CONTRACTION
     force: fields.ChannelField = fields.FORCE
     output: fields.ChannelField = fields.PRESSURE
+    frequency_range: tuple[fields.NotNegative, fields.NotNegative] | None = None
 
     def __post_init__(self) -> None:
         sizes = (len(self.contractions), len(self.pressures), len(self.phi))
@@ -252,6 +260,7 @@ class ActivationMemory(Block):
     """
 
     kind = "activation-memory"
+    settable: ClassVar[Mapping[str, str | None]] = {"rate_time_constant": None}
     ports = PORTS
     kernel = remembering_step
     start_kernel = remembering_start

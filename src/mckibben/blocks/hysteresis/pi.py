@@ -15,7 +15,9 @@ swing ever wider, into the input limits; a longer `rate_time_constant` prevents 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from pydantic import FiniteFloat
@@ -272,6 +274,7 @@ class RateDependentPI(Invertible):
     """
 
     kind = "rate-dependent-pi"
+    settable: ClassVar[Mapping[str, str | None]] = {"rate_time_constant": None}
     solved = True
     kernel = rate_pi_step
     start_kernel = rate_pi_start

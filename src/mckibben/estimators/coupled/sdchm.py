@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -132,6 +132,20 @@ class SDCHMEstimator(CoupledEstimator):
     def pairs(self) -> bool:
         """Whether these settings need an output to every input: every muscle's hysteresis does."""
         return self.memory is not None
+
+    def fixed(self, block: Block) -> tuple[int, ...]:
+        """Return the places of a muscle's gain to itself, 1, and of what its hysteresis's fit fixes."""
+        places = [
+            place
+            for place, (part, _, index) in enumerate(block.numbers())
+            if isinstance(part, Coupling) and index[0] == index[1]
+        ]
+        if self.memory is not None:
+            own, first = registry.load("estimators", self.memory)(), 0
+            for muscle in block.parts[0].parts:  # type: ignore[attr-defined]
+                places += [first + place for place in own.fixed(muscle)]
+                first += muscle.n_parameters
+        return tuple(places)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         tracker.reached(0.0)
@@ -322,6 +336,72 @@ def coupled(memories: list[Block], runs: list[Run], data: TrainingData) -> Coupl
             if j != i:
                 gains[i, j] = float(v @ run.outputs[:, j]) / float(v @ v)
     return Coupling(rows(gains), data.outputs, data.outputs)
+
+
+def learned_inverse(
+    model: Block,
+    recordings: Recording | Sequence[Recording],
+    *,
+    search: Search | None = None,
+    ridge: float = 1e-9,
+    tracker: Tracker | None = None,
+) -> Series:
+    """Return the inverse whose network is learned: SDIHC, as its paper has it (Section 4).
+
+    A network of the model's shape is trained on recordings with inputs and outputs swapped, from
+    displacements to the coupled hysteresis; friction, coupling and hysteresis have their exact inverses.
+
+    Parameters
+    ----------
+    model : Block
+        As `SDCHMEstimator` finds it, with a network.
+    recordings : Recording or sequence of Recording
+        Of its inputs and outputs.
+    search : Search, optional
+        Of the network's sets; default the paper's swarm, on 6000 samples.
+    ridge : float
+        Damping of what is a rule's own.
+    tracker : Tracker, optional
+        Is shown the progress.
+
+    Raises
+    ------
+    ModelError
+        If the model has not these parts.
+    """
+    parts = model.parts if isinstance(model, Series) else ()
+    kinds = [type(part) for part in parts]
+    if kinds[:3] != [PerChannel, Coupling, FuzzyNetwork]:
+        raise ModelError(
+            f"{model.title!r} is no hysteresis, coupling and fuzzy network, of which the last could be "
+            "learned the other way round. Remedy: give a model of sdchm or sdchm-published."
+        )
+    hysteresis, coupling, network, *friction = parts
+    assert isinstance(network, FuzzyNetwork)
+    given, wanted, beside = (
+        tuple(channel.name for channel in channels)
+        for channels in (hysteresis.inputs, model.outputs, network.scheduled)
+    )
+    data = SDCHMEstimator(input=given, output=wanted, scheduling=beside).data(recordings)
+    before = tuple(part.inverse() for part in reversed(friction))
+    h = network_inputs((hysteresis, coupling), data.runs)[:, : len(data.inputs)]
+    with warnings.catch_warnings():  # noise at the ends is clipped
+        warnings.simplefilter("ignore", ModelWarning)
+        y = network_inputs(before, [replace(run, driven=run.outputs) for run in data.runs])
+    reached = y[:, : len(data.outputs)]
+    learned = fit_network(
+        y,
+        h,
+        len(network.centres[0]),
+        Consequents(network.constants, ridge),
+        search or Search("pso", SDCHMEstimator.search_samples, printed_swarm(), 0),
+        tracker=tracker or Tracker(),
+    )
+    limits = np.column_stack([reached.min(axis=0), reached.max(axis=0)])
+    swapped = as_block(
+        learned, data.outputs, network.driven, data.scheduled, limits, network.constants
+    )
+    return Series((*before, swapped, coupling.inverse(), hysteresis.inverse()))
 
 
 COUPLED_PI = preset(

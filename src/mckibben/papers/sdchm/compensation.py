@@ -10,14 +10,12 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.feedback import PIDFeedback
 from mckibben.checkpoints import Checkpoints
 from mckibben.control import Controller, Tracked, control_law, track, tune_pid
 from mckibben.errors import ModelWarning
-from mckibben.estimators.coupled.fuzzy import Consequents, Search, fit_network, printed_swarm
-from mckibben.estimators.coupled.sdchm import SDCHMEstimator, as_block, network_inputs
-from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.estimators.coupled.fuzzy import Search, printed_swarm
+from mckibben.estimators.coupled.sdchm import learned_inverse
 from mckibben.papers.reproduction import Cell, Figure, Table, thinned
 from mckibben.papers.sdchm import printed
 from mckibben.papers.sdchm.models import (
@@ -187,26 +185,18 @@ def compensators(
 ) -> dict[str, Block]:
     """Return all inverses, the paper's with its network trained from displacements to couplings."""
     published, individual = models[PUBLISHED], models[INDIVIDUAL]
-    assert isinstance(published, Series)
     assert isinstance(individual, Series)
-    hysteresis, coupling, network = published.parts
-    data = SDCHMEstimator().data(train)
-    rest = [run for run in data.runs if "gpi" not in run.name] or list(data.runs)
-    x = network_inputs((hysteresis, coupling), rest)
-    y = np.concatenate([np.column_stack([r.outputs, r.scheduled]) for r in rest])
-    limits = np.column_stack([y[:, :3].min(axis=0), y[:, :3].max(axis=0)])
-
+    rest = [run for run in train if "gpi" not in run.name] or train
     size = QUICK_SWARM if quick else {}
     samples = QUICK_SEARCH["search_samples"] if quick else SEARCH_SAMPLES
 
-    def swapped() -> FuzzyNetwork:
-        search = Search("pso", samples, printed_swarm(**size), seed)
-        learned = fit_network(y, x[:, :3], 3, Consequents(False, 1e-9), search, tracker=Tracker())
-        return as_block(learned, data.outputs, network.inputs[:3], data.scheduled, limits, False)
+    search = Search("pso", samples, printed_swarm(**size), seed)
 
-    inverse_network = kept.once("learned inverse", FuzzyNetwork, swapped, x, y)
+    def swapped() -> Series:
+        return learned_inverse(published, rest, search=search)
+
     return {
-        PAPERS: Series((inverse_network, coupling.inverse(), hysteresis.inverse())),
+        PAPERS: kept.once("learned inverse", Series, swapped, published, rest, search),
         SINGLE: individual.parts[0].inverse(),
         OURS_INVERTED: models[OURS].inverse(),
         BALANCE: models[BALANCE].inverse(),

@@ -1,0 +1,88 @@
+"""Fields of a saved model that were not identified, set to other values without identifying it again."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+from mckibben.blocks.base import Block
+from mckibben.errors import ModelError, ModelWarning
+from mckibben.numerals import numeral
+
+BEYOND = 0.05
+"""Share by which a value may lie beyond those that the model was identified at."""
+
+
+def settable(model: Block) -> dict[str, Any]:
+    """Return the fields of a model and its parts that can be set, with their values.
+
+    >>> from mckibben.blocks.force.activation import ActivationPressure
+    >>> settable(ActivationPressure.example())
+    {'frequency': 1.0, 'rate_time_constant': 0.0}
+    """
+    return {name: getattr(part, name) for part in _parts(model) for name in part.settable}
+
+
+def with_fields(model: Block, values: Mapping[str, Any]) -> Block:
+    """Return a model with other values of fields that were not identified, in whichever part has them.
+
+    Warns where a value lies beyond those that the model was identified at.
+
+    Raises
+    ------
+    ModelError
+        On a field that no part lets be set, or a value that it may not have.
+    """
+    known = settable(model)
+    for name in values:
+        if name not in known:
+            listed = f"set one of {', '.join(known)}" if known else "leave it out"
+            raise ModelError(
+                f"{name!r} of {model.title!r} cannot be set: it is identified, or no such field. "
+                f"Remedy: {listed}."
+            )
+    changed: Block = _changed(model, values)
+    for part in _parts(changed):
+        for name, range_field in part.settable.items():
+            ends = range_field and getattr(part, range_field)
+            value = getattr(part, name)
+            if name in values and ends and not _within(value, *ends):
+                low, high = (numeral(end, 3) for end in ends)
+                where = f"at {low}" if low == high else f"from {low} to {high}"
+                warnings.warn(
+                    f"{name.replace('_', ' ')} is set to {numeral(value, 3)}, and the model was "
+                    f"identified {where}: it extrapolates",
+                    ModelWarning,
+                    stacklevel=2,
+                )
+    return changed
+
+
+def _within(value: float, low: float, high: float) -> bool:
+    return (1 - BEYOND) * low <= value <= (1 + BEYOND) * high
+
+
+def _parts(value: Any) -> Iterator[Block]:
+    """Give a block and all blocks in its fields."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _parts(item)
+    elif isinstance(value, Block) and is_dataclass(value):
+        yield value
+        for field in fields(value):
+            yield from _parts(getattr(value, field.name))
+
+
+def _changed(value: Any, values: Mapping[str, Any]) -> Any:
+    if isinstance(value, tuple):
+        items = tuple(_changed(item, values) for item in value)
+        return value if all(a is b for a, b in zip(items, value, strict=True)) else items
+    if not (isinstance(value, Block) and is_dataclass(value)):
+        return value
+    now = {field.name: getattr(value, field.name) for field in fields(value)}
+    new = {name: _changed(one, values) for name, one in now.items()}
+    new |= {name: values[name] for name in value.settable if name in values}
+    changed = {name: one for name, one in new.items() if one is not now[name]}
+    return replace(value, **changed) if changed else value

@@ -274,7 +274,7 @@ class Recording(DrawsItself):
         return replace(self, channels={**self.channels, **added}, units=kept | dict(units or {}))
 
     def with_derived(self, channels: Iterable[str]) -> Recording:
-        """Return a recording with channels added that others and the rest length give; see `conversion`."""
+        """Return a recording with channels added that others and the rest length give."""
         found: dict[str, Array] = {}
         for wanted in channels:
             if wanted not in self.channels and self.rest_length is not None:

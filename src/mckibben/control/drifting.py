@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.control.roles import Plant
+from mckibben.control.roles import Plant, rest_length_of
 from mckibben.errors import ModelError
 
 GROUPS = ("stiffness", "friction", "gain")
@@ -105,6 +105,11 @@ class Drifting:
     def outputs(self) -> tuple[str, ...]:
         """The rig's."""
         return self.fresh.outputs
+
+    @property
+    def rest_length(self) -> float | None:
+        """The rig's."""
+        return rest_length_of(self.fresh)
 
     @property
     def factors(self) -> Mapping[str, float]:

@@ -55,7 +55,7 @@ def refusal(name: str, compensator: Block, plant: Plant) -> str:
     """
     held = [channel.name for channel in compensator.inputs if channel.name in plant.inputs]
     try:
-        control_law(name, compensator, lambda: untuned_pid(plant, held))
+        control_law(name, compensator, lambda: untuned_pid(plant, held, compensator.inputs))
     except MckibbenError as error:
         return str(error)
     return ""

@@ -16,7 +16,7 @@ from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
 from mckibben.control.reach import Beyond, beyond, ends, outside
-from mckibben.control.roles import Plant, followed_by, resting, roles, wished
+from mckibben.control.roles import Plant, asked, offered, resting, roles
 from mckibben.control.twin import Twin
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording, standard_unit
@@ -96,7 +96,9 @@ def track(
     reference : Recording
         Channels of motion to follow [mm or rad], or without any the force [N], and of what schedules the
         controller and is held on the plant, such as ``pressure_extensor`` or the length in a test stand,
-        as they should be. What a block drives, as pressures recorded with it, is passed over.
+        as they should be. What a block drives, as pressures recorded with it, is passed over. With the
+        rest length of the plant, or of the reference, a displacement, contraction or length is any of
+        these.
     approach : float
         Time to go from rest to the first reference [s], not scored.
     settle : float
@@ -125,7 +127,8 @@ def track(
     Raises
     ------
     DataError
-        If the reference has no time, or no channel that the plant measures.
+        If the reference has no time, or no channel that the plant measures; or if the controller wants
+        or gives another channel than the loop, or in another unit.
     ModelError
         On settings out of range.
     """
@@ -135,15 +138,17 @@ def track(
             "the reference has no time", file=reference.source, remedy="add a time column or --rate"
         )
     _check(approach, settle, noise, delay, slew, step)
+    reference = asked(plant, reference, controller if isinstance(controller, Block) else None)
     if isinstance(controller, Block):
-        reference = wished(controller, reference)
         controller = BlockController(controller)
     preview = controller.preview if preview is None else preview
     further = max(samples_ahead(preview, step) - 1, 0)  # than the next step's, given anyway
     further += controller.samples_ahead
     rng = generator(seed)
-    followed = followed_by(plant, reference)
+    offer = offered(plant, reference)
+    controller.connect(offer)
     driven, held = roles(plant, reference)
+    followed, beside = ([c.name for c in some] for some in (offer.followed, offer.scheduled))
     starts = resting(plant, {name: float(reference[name][0]) for name in held})
     settings: dict[str, float] = {"sample_time": step, **starts}
     scatters = isinstance(plant, Twin) and plant.scatters
@@ -160,8 +165,9 @@ def track(
         raise ModelError(
             "nothing is left to score. Remedy: give a longer reference, or less settle."
         )
-    scheduled = reference.matrix(held) if held else np.empty((len(reference), 0))
+    scheduled = reference.matrix(beside) if beside else np.empty((len(reference), 0))
     scheduled = np.concatenate([np.tile(scheduled[:1], (lead, 1)), scheduled])
+    imposed = scheduled[:, [beside.index(name) for name in held]]
 
     places = {name: place for place, name in enumerate(changed.outputs)}
     at_y = [places[name] for name in followed]
@@ -184,11 +190,9 @@ def track(
             if isinstance(changed, Twin):
                 drawn[t] = changed.drawn
             late = [*late[1:], measured]
-            felt = late[0][at_y] + noise * rng.standard_normal(len(at_y))
-            readings = dict(zip(changed.outputs, late[0].tolist(), strict=True))
-            readings |= dict(zip(followed, felt.tolist(), strict=True))
+            felt = late[0].copy()
+            felt[at_y] += noise * rng.standard_normal(len(at_y))
             started = time.perf_counter()
-            controller.reads(readings)
             if further > 0:
                 then = min(t + further, n - 1)
                 controller.foresees(path[then], scheduled[then])
@@ -209,14 +213,14 @@ def track(
             command = loop.step(allowed, measured[at_p]) if inner else allowed
             commands[t] = command
             action = dict(zip(driven, command.tolist(), strict=True))
-            action |= dict(zip(held, scheduled[t].tolist(), strict=True))
+            action |= dict(zip(held, imposed[t].tolist(), strict=True))
             measured = changed.step(action)
             if tell is not None and t % 200 == 0:
                 tell(t / n)
     # what was asked for at a step is due at the next
     due = np.concatenate([path[:1], path[:-1]])
     errors = seen[:, at_y] - due
-    reached = ends(controller.forward_model, followed)
+    reached = ends(controller.forward_model, offer.followed, offer.rest_length)
     out = {name: outside(due[:, followed.index(name)], *reached[name]) for name in reached}
     clipped |= np.any([*out.values(), np.diff(own, prepend=0)[:-1] > 0], axis=0)
     part, at_limit = errors[scored], clipped[scored]
@@ -224,7 +228,7 @@ def track(
     far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}
     sizes = np.sqrt(np.mean(drawn[scored] ** 2, axis=0))[at_y].tolist() if scatters else []
     return Tracked(
-        _recorded(reference, followed, driven, due, seen, commands, scheduled, held, changed, lead),
+        _recorded(reference, followed, driven, due, seen, commands, imposed, held, changed, lead),
         dict(zip(followed, np.sqrt(np.mean(part**2, axis=0)).tolist(), strict=True)),
         dict(zip(followed, np.abs(part).max(axis=0).tolist(), strict=True)),
         int(at_limit.sum()),

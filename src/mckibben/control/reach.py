@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
+from mckibben.control.connecting import match
 
 ROUNDING = 1e-9
 """Share of what is reached by which a reference touches its end."""
@@ -33,22 +35,30 @@ class Beyond(NamedTuple):
     rmse_elsewhere: float
 
 
-def ends(model: Block | None, followed: Sequence[str]) -> dict[str, tuple[float, float]]:
+def ends(
+    model: Block | None, followed: Sequence[Channel], rest_length: float | None
+) -> dict[str, tuple[float, float]]:
     """Return the lowest and highest that a model can reach of what is followed, as far as it says.
 
     Parameters
     ----------
     model : Block or None
         What a compensator undoes.
-    followed : sequence of str
+    followed : sequence of Channel
+    rest_length : float or None
+        Of the muscle [mm].
     """
+    found: dict[str, tuple[float, float]] = {}
     if model is None:
-        return {}
-    rows = zip(model.outputs, *model.reachable(), strict=True)
-    found = {channel.name: (float(low), float(high)) for channel, low, high in rows}
-    return {
-        name: found[name] for name in followed if name in found and np.isfinite(found[name]).all()
-    }
+        return found
+    for channel in followed:
+        line = match(channel, model.outputs, rest_length)
+        if line is not None:
+            place, gain, offset = line
+            low, high = sorted(float(gain * end[place] + offset) for end in model.reachable())
+            if np.isfinite([low, high]).all():
+                found[channel.name] = low, high
+    return found
 
 
 def outside(reference: Array, low: float, high: float) -> NDArray[np.bool_]:

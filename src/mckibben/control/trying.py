@@ -7,7 +7,7 @@ from typing import Any
 
 from mckibben.blocks.base import Block
 from mckibben.control.loop import Tracked, track
-from mckibben.control.roles import Plant, wished
+from mckibben.control.roles import Plant, asked
 from mckibben.control.suiting import doubts
 from mckibben.control.uncompensated import slow_rise, uncompensated
 from mckibben.errors import MckibbenError
@@ -57,7 +57,7 @@ def before(compensator: Block, plant: Plant, reference: Recording, **settings: A
         As of `track`; a preview is passed over, for no dead time is undone.
     """
     settings.pop("preview", None)
-    reference = wished(compensator, reference)
+    reference = asked(plant, reference, compensator)
     few = {name: settings[name] for name in ("pressure_loop", "seed") if name in settings}
     notes: list[str] = []
     try:

@@ -67,6 +67,8 @@ class Twin:
         In tables and recordings.
     scatter_after : float
         Time from which it scatters [s].
+    rest_length : float, optional
+        Length of the muscle where its displacement is 0 [mm].
 
     Raises
     ------
@@ -95,9 +97,10 @@ class Twin:
         sample_time: float | None = None,
         name: str = "twin",
         scatter_after: float = 0.0,
+        rest_length: float | None = None,
     ) -> None:
         self.model, self.name, self.scatter_after = model, name, scatter_after
-        self.forward = inside(model)
+        self.forward, self.rest_length = inside(model), rest_length
         outputs = tuple(channel.name for channel in self.forward.outputs)
         if commands(self.forward) or any(map(drives, self.forward.outputs)):
             raise ModelError(
@@ -106,6 +109,8 @@ class Twin:
             )
         self.outputs = outputs
         self.inputs = tuple(plain(c.name) for c in self.forward.inputs)
+        ends = (*self.forward.inputs, *self.forward.outputs)
+        self.units = {plain(channel.name): channel.unit for channel in ends}
         own = self.forward.sample_time
         self.sample_time = float(sample_time or own or 0.02)
         if own is not None and abs(self.sample_time - own) > 1e-9 * own:
@@ -196,6 +201,7 @@ class Twin:
             sample_time=step,
             name=self.name,
             scatter_after=after,
+            rest_length=self.rest_length,
         )
 
     def reset(self, seed: int = 0) -> Array:

@@ -40,7 +40,7 @@ class Ramp(Controller):
     def reset(self, sample_time: float) -> None:
         self._done = 0
 
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
         share = min(self._done / self.steps, 1.0)
         self._done += 1
         return self.low + share * (self.high - self.low)
@@ -61,7 +61,7 @@ class StaticMap(Controller):
     def reset(self, sample_time: float) -> None:
         """Do nothing: it has no memory."""
 
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
         pairs = zip(reference, self.curves, strict=True)
         return np.array([np.interp(wanted, *curve) for wanted, curve in pairs])
 
@@ -88,7 +88,7 @@ class StraightMap(Controller):
     def reset(self, sample_time: float) -> None:
         """Do nothing: it has no memory."""
 
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
         from scipy.optimize import lsq_linear  # slow to load
 
         small = SMALLEST * float(np.abs(self.slopes).max()) * np.eye(self.low.size)

@@ -80,10 +80,8 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         try:
             signals[name] = _signal(name, column, source)
         except DataError as error:
-            if (
-                name in derived.values()
-                or request.needs(name)
-                and (unit_of(name) is not None or request.asks_for(name))
+            if name in derived.values() or (
+                request.needs(name) and (unit_of(name) is not None or request.asks_for(name))
             ):
                 raise
             left_out[column.header] = error.problem
@@ -121,9 +119,10 @@ def _derived(channel: str, of: str, signal: Signal, source: Source) -> Signal:
     line = conversion(channel, of, source.rest_length)
     assert line is not None
     samples = line[0] * signal.samples + line[1]
-    if channel.startswith("contraction") and np.nanmax(np.abs(samples), initial=0.0) >= 1.0:
+    largest = np.nanmax(np.abs(samples), initial=0.0)
+    if channel.startswith("contraction") and largest >= 1.0:
         raise source.error(
-            f"{of} and a rest length of {source.rest_length:g} mm make it {np.nanmax(np.abs(samples)):g}",
+            f"{of} and a rest length of {source.rest_length:g} mm make it {largest:g}",
             "give the rest length in millimetres: a contraction is below 1",
             channel,
         )
@@ -313,7 +312,8 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> Uni
     if 0 < largest < plausible.least or largest > plausible.most:
         units = quality.fitting_units(largest, expected, expected)
         options = " or ".join(f"--unit {channel}={unit}" for unit in units)
-        remedy = f"name its unit, as in {options}, or --unit {channel}={expected or 1} where that is right"
+        as_it_is = f"--unit {channel}={expected or 1} where that is right"
+        remedy = f"name its unit, as in {options}, or {as_it_is}"
         if expected == "":
             remedy += f"; where it is in mm, {_in_mm(column)}"
         raise source.error(

@@ -176,9 +176,9 @@ def track(
     limits = [changed.limits(name) for name in driven]
     low, high = (np.array([getattr(limit, end) for limit in limits]) for end in ("low", "high"))
     loop = PressureLoop(low, high, step)
+    controller.reset(step)
     measured = changed.reset(seed)
     late = [measured] * (delay + 1)
-    controller.reset(step)
     seen, commands = np.empty((n, len(measured))), np.empty((n, len(driven)))
     clipped, times = np.zeros(n, dtype=bool), np.empty(n)
     own = np.zeros(n + 1, dtype=int)

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,7 @@ def named(block: Any, inputs: str, outputs: str) -> Any:
 
 
 PLANTS: dict[str, Callable[[], Any]] = {
-    **{name: lambda name=name: load_rig(name) for name in rig_names()},
+    **{name: partial(load_rig, name) for name in rig_names()},
     "twin": lambda: Twin(PI.example(), rest_length=200.0),
     "twin of unknown length": lambda: Twin(PI.example()),
     "twin of length": lambda: Twin(named(PI.example(), "pressure", "length"), rest_length=200.0),
@@ -278,9 +279,11 @@ def test_feedback_is_in_the_unit_of_its_compensator(behind: bool) -> None:
         block = replace(block, **scaled).inverse()
         pid = tune_pid(plant, hold=2.0, references=block.inputs)
         assert pid.driven == block.inputs
-        controller = control_law("feedforward-pid" if behind else "pid", block, lambda pid=pid: pid)
+        controller = control_law(
+            "feedforward-pid" if behind else "pid", block, partial(replace, pid)
+        )
         results.append(closed(controller, plant, reference).recording["command_pressure"])
-    np.testing.assert_allclose(*results, rtol=1e-9)
+    np.testing.assert_allclose(results[0], results[1], rtol=1e-9)
     contraction = named(PI.example(), "pressure", "contraction").inverse()
     with pytest.raises(MckibbenError, match="references=compensator"):
         FeedforwardFeedback.of(contraction, tune_pid(plant, hold=2.0))
@@ -344,8 +347,8 @@ def test_an_estimate_is_made_of_what_it_names(seen: Seen) -> None:
     [
         (named(PI.example(), "pressure", "contraction").inverse(), "twin of unknown length",
          "contraction", "--rest-length"),
-        (named(PI.example(), "voltage", "displacement").inverse(), "twin", "voltage", "commands"),
-        (PI.example().inverse(), "twin of voltage", "pressure", "commands"),
+        (named(PI.example(), "voltage", "displacement").inverse(), "twin", "voltage", "under that name"),
+        (PI.example().inverse(), "twin of voltage", "pressure", "under that name"),
         (replace(PI.example(), output=Channel("displacement", "cm")).inverse(), "twin",
          "displacement", "in mm"),
         (replace(PI.example(), input=Channel("pressure", "kPa")).inverse(), "twin", "pressure",

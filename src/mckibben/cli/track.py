@@ -108,7 +108,7 @@ def track(
         tune_pid,
     )
     from mckibben.control import track as close
-    from mckibben.control.beyond import beyond_known
+    from mckibben.control.identified import beyond_known
     from mckibben.control.roles import asked, offered
     from mckibben.control.suiting import doubts_of_feedback
     from mckibben.control.twin import COMMAND

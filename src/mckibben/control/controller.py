@@ -16,7 +16,16 @@ from mckibben.control.preview import dead_time_undone
 
 
 class Controller(ABC):
-    """Asked once a control step for the pressures of n muscles."""
+    """Asked once a control step for the commands of n muscles."""
+
+    preview: float = 0.0
+    """How far ahead its compensator wants the reference, to make up for dead time [s]."""
+
+    forward_model: Block | None = None
+    """The model that its compensator undoes, if it has one."""
+
+    samples_ahead: int = 0
+    """How many samples further ahead it wants the reference, to plan with."""
 
     def connect(self, offer: Offer) -> None:
         """Learn what a loop gives and takes, before `reset`, and refuse what does not fit."""
@@ -39,21 +48,6 @@ class Controller(ABC):
         scheduled : array
             What schedules the model, `Offer.scheduled`: an extensor's pressure, a load.
         """
-
-    @property
-    def preview(self) -> float:
-        """How far ahead its compensator wants the reference, to make up for dead time [s]."""
-        return 0.0
-
-    @property
-    def forward_model(self) -> Block | None:
-        """The model that its compensator undoes, if it has one."""
-        return None
-
-    @property
-    def samples_ahead(self) -> int:
-        """How many samples further ahead it wants the reference, to plan with."""
-        return 0
 
     @property
     def n_clipped(self) -> int:
@@ -85,20 +79,9 @@ class BlockController(Controller):
 
     block: Block
 
-    @property
-    def preview(self) -> float:
-        """The dead time of what the block undoes."""
-        return dead_time_undone(self.block)
-
-    @property
-    def forward_model(self) -> Block | None:
-        """What the block undoes."""
-        return self.block.forward_model
-
-    @property
-    def samples_ahead(self) -> int:
-        """Those of the horizon of a compensator that looks ahead."""
-        return self.block.samples_ahead
+    def __post_init__(self) -> None:
+        self.preview, self.forward_model = dead_time_undone(self.block), self.block.forward_model
+        self.samples_ahead = self.block.samples_ahead
 
     @property
     def n_clipped(self) -> int:

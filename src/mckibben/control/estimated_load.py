@@ -36,11 +36,9 @@ class EstimatedLoad(Controller):
             raise ModelError(
                 f"filter_time is {self.filter_time}. Remedy: give a positive time in seconds."
             )
-
-    @property
-    def preview(self) -> float:
-        """The controller's."""
-        return self.controller.preview
+        inner = self.controller
+        self.preview, self.forward_model = inner.preview, inner.forward_model
+        self.samples_ahead = inner.samples_ahead
 
     @property
     def n_clipped(self) -> int:
@@ -48,8 +46,8 @@ class EstimatedLoad(Controller):
         return self.controller.n_clipped
 
     def connect(self, offer: Offer) -> None:
-        self._inputs = offer.shown(self.estimate.inputs, self.estimate.title)
-        loads = self.estimate.outputs
+        title, loads = self.estimate.title, self.estimate.outputs
+        self._inputs = offer.selected(self.estimate.inputs, offer.measured, title, offer.plant)
         self.controller.connect(replace(offer, scheduled=(*loads, *offer.scheduled)))
 
     def reset(self, sample_time: float) -> None:

@@ -3,26 +3,48 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
+from mckibben.control.connecting import match
 from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
-from mckibben.control.reach import Beyond, beyond, ends, outside
 from mckibben.control.roles import Plant, asked, offered, resting, roles
 from mckibben.control.twin import Twin
 from mckibben.errors import DataError, ModelError
-from mckibben.recording import Recording, standard_unit
+from mckibben.recording import Recording
 from mckibben.signals.checking import generator
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
+
+ROUNDING = 1e-9
+"""Share of what is reached by which a reference touches its end."""
+
+
+class Beyond(NamedTuple):
+    """Samples of a reference that are out of reach.
+
+    Parameters
+    ----------
+    samples : int
+    low, high : float
+        What the model can reach whatever happened before [mm or N].
+    rmse_elsewhere : float
+        RMSE over all other samples [mm or N]; not a number where there are none.
+    """
+
+    samples: int
+    low: float
+    high: float
+    rmse_elsewhere: float
 
 
 @dataclass(frozen=True)
@@ -227,8 +249,13 @@ def track(
     parts = dict(zip(followed, part.T, strict=True))
     far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}
     sizes = np.sqrt(np.mean(drawn[scored] ** 2, axis=0))[at_y].tolist() if scatters else []
+    references = {f"reference_{c.name}": c.unit for c in offer.followed}
+    sent = {f"command_{c.name}": c.unit for c in offer.driven}
+    channels = dict(zip((*references, *sent), (*due.T, *commands.T), strict=True))
+    channels |= dict(zip(changed.outputs, seen.T, strict=True))
+    channels = dict(zip(held, imposed.T, strict=True)) | channels
     return Tracked(
-        _recorded(reference, followed, driven, due, seen, commands, imposed, held, changed, lead),
+        Recording(channels, step, references | sent, -lead * step, {"plant": changed.name}),
         dict(zip(followed, np.sqrt(np.mean(part**2, axis=0)).tolist(), strict=True)),
         dict(zip(followed, np.abs(part).max(axis=0).tolist(), strict=True)),
         int(at_limit.sum()),
@@ -264,24 +291,33 @@ def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:
     return clipped - free
 
 
-def _recorded(
-    reference: Recording,
-    followed: list[str],
-    driven: list[str],
-    due: Array,
-    seen: Array,
-    commands: Array,
-    scheduled: Array,
-    held: list[str],
-    plant: Plant,
-    lead: int,
-) -> Recording:
-    channels = {f"reference_{name}": due[:, k] for k, name in enumerate(followed)}
-    channels |= {name: seen[:, k] for k, name in enumerate(plant.outputs)}
-    channels |= {f"command_{name}": commands[:, k] for k, name in enumerate(driven)}
-    for k, name in enumerate(held):
-        channels.setdefault(name, scheduled[:, k])
-    units = {f"reference_{name}": reference.units[name] for name in followed}
-    units |= {f"command_{name}": standard_unit(name) or "" for name in driven}
-    step = reference.sample_time or 1.0
-    return Recording(channels, step, units, start_time=-lead * step, meta={"plant": plant.name})
+def ends(
+    model: Block | None, followed: Sequence[Channel], rest_length: float | None
+) -> dict[str, tuple[float, float]]:
+    """Return the lowest and highest that a model can reach of what is followed, as far as it says."""
+    found: dict[str, tuple[float, float]] = {}
+    if model is None:
+        return found
+    for channel in followed:
+        line = match(channel, model.outputs, rest_length)
+        if line is not None:
+            place, gain, offset = line
+            low, high = sorted(float(gain * end[place] + offset) for end in model.reachable())
+            if np.isfinite([low, high]).all():
+                found[channel.name] = low, high
+    return found
+
+
+def outside(reference: Array, low: float, high: float) -> NDArray[np.bool_]:
+    """Return which samples of a reference, shape (n,), lie beyond both ends and rounding."""
+    margin = ROUNDING * (high - low)
+    return np.asarray((reference < low - margin) | (reference > high + margin))
+
+
+def beyond(errors: Array, out: NDArray[np.bool_], low: float, high: float) -> Beyond | None:
+    """Return what of a reference is out of reach, by `outside`, or None."""
+    if not out.any():
+        return None
+    others = errors[~out]
+    elsewhere = float(np.sqrt(np.mean(others**2))) if others.size else float("nan")
+    return Beyond(int(out.sum()), low, high, elsewhere)

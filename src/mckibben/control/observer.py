@@ -14,7 +14,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.control.connecting import Offer, Selection, lines
+from mckibben.control.connecting import Offer
 from mckibben.control.controller import Controller
 from mckibben.errors import ModelError
 
@@ -40,16 +40,8 @@ class DisturbanceObserver(Controller):
                 f"filter_time is {self.filter_time}. Remedy: give a positive time in seconds."
             )
         self._model = self.compensator.inverse()
-
-    @property
-    def preview(self) -> float:
-        """The dead time of the model."""
-        return self._model.dead_time
-
-    @property
-    def forward_model(self) -> Block | None:
-        """The model."""
-        return self._model
+        self.forward_model = self._model
+        self.preview = self._model.dead_time
 
     @property
     def n_clipped(self) -> int:
@@ -60,14 +52,10 @@ class DisturbanceObserver(Controller):
         block, model = self.compensator, self._model
         references = block.inputs[: block.n_driven]
         self._inputs, self._commands = offer.inputs(block), offer.commands(block)
-        self._measured = offer.shown(references, block.title)
-        given = [
-            (channel, place) for place, channel in enumerate((*offer.driven, *offer.scheduled))
-        ]
-        outputs = [(channel, place) for place, channel in enumerate(model.outputs)]
-        length, loop = offer.rest_length, f"a loop on {offer.plant}"
-        self._taken = Selection(lines(model.inputs, given, length, model.title, loop))
-        self._told = Selection(lines(references, outputs, None, block.title, model.title))
+        given = (*offer.driven, *offer.scheduled)
+        self._measured = offer.selected(references, offer.measured, block.title, offer.plant)
+        self._taken = offer.selected(model.inputs, given, model.title, f"a loop on {offer.plant}")
+        self._modelled = offer.selected(references, model.outputs, block.title, model.title)
 
     def reset(self, sample_time: float) -> None:
         self._coming: tuple[Array, Array] | None = None
@@ -96,4 +84,4 @@ class DisturbanceObserver(Controller):
     def applied(self, pressures: Array) -> None:
         """Let the model take the step that the plant takes."""
         taken = self._taken(np.concatenate((pressures, self._scheduled)))
-        self._expected = self._told(self._beside.step(taken))
+        self._expected = self._modelled(self._beside.step(taken))

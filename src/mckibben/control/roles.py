@@ -11,10 +11,10 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.inverse import COMMANDS
-from mckibben.control.connecting import Offer
+from mckibben.control.connecting import Offer, find
 from mckibben.control.twin import Twin, plain
 from mckibben.errors import DataError
-from mckibben.recording import REST_LENGTH, Recording, standard_unit
+from mckibben.recording import REST_LENGTH, Recording, conversion, standard_unit
 
 MOVED = ("displacement", "angle")
 """What motions are called: of a muscle, and of a joint."""
@@ -90,21 +90,14 @@ def offered(plant: Plant, reference: Recording) -> Offer:
     """
     followed = followed_by(plant, reference)
     driven, _ = roles(plant, reference)
-    others = [name for name in reference.channels if name not in (*followed, *driven)]
-    mine = channels_of(plant, (*plant.inputs, *plant.outputs))
-    for channel in mine:
-        if channel.name in reference and reference.units[channel.name] != channel.unit:
-            raise DataError(
-                f"the reference has it in {reference.units[channel.name] or 'no unit'}, and "
-                f"{plant.name} in {channel.unit or 'no unit'}",
-                file=reference.source,
-                channel=channel.name,
-                remedy=f"give it in {channel.unit or 'no unit'}",
-            )
+    given = [Channel(name, unit) for name, unit in reference.units.items()]
+    for channel in channels_of(plant, (*plant.inputs, *plant.outputs)):
+        if channel.name in reference:  # in its unit, or refused
+            find(channel, given, None, plant.name, "the reference")
     return Offer(
         plant.name,
         channels_of(plant, followed),
-        tuple(Channel(name, reference.units[name]) for name in others),
+        tuple(channel for channel in given if channel.name not in (*followed, *driven)),
         channels_of(plant, plant.outputs),
         channels_of(plant, driven),
         reference.rest_length,
@@ -125,20 +118,14 @@ def followed_by(plant: Plant, reference: Recording) -> list[str]:
     if isinstance(plant, Twin):
         followed = followed or measured_too
     if not followed:
+        pairs = [(name, given) for name in plant.outputs for given in reference.channels]
+        state = f", or state {REST_LENGTH}" if any(conversion(*pair, 1.0) for pair in pairs) else ""
         raise DataError(
             f"it has no displacement, angle or force that {plant.name!r} measures",
             file=reference.source,
-            remedy=f"give channels among {', '.join(plant.outputs)}"
-            + (f", or state {REST_LENGTH}" if _restated(plant, reference) else ""),
+            remedy=f"give channels among {', '.join(plant.outputs)}{state}",
         )
     return followed
-
-
-def _restated(plant: Plant, reference: Recording) -> bool:
-    """Tell whether a rest length would make what a plant measures of a reference."""
-    return len(reference.with_meta(rest_length=1.0).with_derived(plant.outputs).channels) > len(
-        reference.channels
-    )
 
 
 def roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:

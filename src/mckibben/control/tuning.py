@@ -111,16 +111,7 @@ def tune_pid(
 def untuned_pid(
     plant: Plant, scheduled: Collection[str] = (), references: Sequence[Channel] = ()
 ) -> PIDFeedback:
-    """Return PID feedback of a plant's channels, without gains.
-
-    Parameters
-    ----------
-    plant : Plant
-        A rig with as many pressures as motions.
-    scheduled : collection of str
-        Other inputs, held.
-    references : sequence of Channel
-        As of `tune_pid`.
+    """Return PID feedback of a plant's channels, without gains; parameters are those of `tune_pid`.
 
     Raises
     ------

@@ -32,6 +32,9 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
 """Units of the standard channels; ``pressure_2`` and ``pressure_extensor`` follow ``pressure``."""
 
 
+REST_LENGTH = 'the rest length (--rest-length MM, or meta["rest_length"] in Python)'
+"""How the length at which a displacement is 0 is stated."""
+
 PROVENANCE = ("file", "sha256")
 """Entries of ``meta`` that say where a recording was read from; recordings are equal without them."""
 
@@ -43,6 +46,30 @@ def standard_unit(channel: str) -> str | None:
     ('bar', 'mm')
     """
     return STANDARD_UNITS.get(channel.partition("_")[0])
+
+
+def conversion(wanted: str, given: str, rest_length: float | None) -> tuple[float, float] | None:
+    """Return gain and offset that make a channel of another, or None where nothing does.
+
+    A displacement is a contraction times the rest length [mm], and a length is that less a displacement.
+
+    >>> conversion("contraction_2", "displacement_2", 200.0), conversion("length", "displacement", 200.0)
+    ((0.005, 0.0), (-1.0, 200.0))
+    """
+    if wanted == given:
+        return 1.0, 0.0
+    (end, _, of), (start, _, also) = wanted.partition("_"), given.partition("_")
+    if of != also or rest_length is None:
+        return None
+    as_displacement = {
+        "displacement": (1.0, 0.0),
+        "contraction": (rest_length, 0.0),
+        "length": (-1.0, rest_length),
+    }
+    if end not in as_displacement or start not in as_displacement:
+        return None
+    (gain, offset), (per, zero) = as_displacement[start], as_displacement[end]
+    return gain / per, (offset - zero) / per
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,10 +192,13 @@ class Recording(DrawsItself):
     def __getitem__(self, channel: str) -> Array:
         """Return the samples of one channel, shape (n,), read-only."""
         if channel not in self.channels:
+            remedy = f"name one of them, or map a column with --column {channel}=COLUMN"
+            if any(conversion(channel, name, 1.0) for name in self.channels):
+                remedy = f"state {REST_LENGTH}, which makes it of another"
             raise DataError(
                 f"there is no channel {channel!r}; there are {', '.join(self.channels)}",
                 file=self.source,
-                remedy=f"name one of them, or map a column with --column {channel}=COLUMN",
+                remedy=remedy,
             )
         return self.channels[channel]
 
@@ -215,6 +245,12 @@ class Recording(DrawsItself):
         return tuple(map(str, several))
 
     @property
+    def rest_length(self) -> float | None:
+        """Length of the muscle where its displacement is 0 [mm], as ``meta["rest_length"]`` has it."""
+        given = self.meta.get("rest_length")
+        return float(given) if isinstance(given, int | float) and 0 < given < np.inf else None
+
+    @property
     def bridged(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Which samples were interpolated over a gap when it was read, shape (n,)."""
         time, within = self.time, 1e-6 * (self.sample_time or 1.0)
@@ -225,7 +261,9 @@ class Recording(DrawsItself):
 
     def matrix(self, channels: Iterable[str]) -> Array:
         """Return several channels side by side, shape (n, number of channels)."""
-        return np.column_stack([self[name] for name in channels])
+        names = list(channels)
+        whole = self.with_derived(names)
+        return np.column_stack([whole[name] for name in names])
 
     def with_channels(
         self, units: Mapping[str, str] | None = None, /, **samples: ArrayLike
@@ -235,16 +273,28 @@ class Recording(DrawsItself):
         kept = {name: unit for name, unit in self.units.items() if name not in added}
         return replace(self, channels={**self.channels, **added}, units=kept | dict(units or {}))
 
+    def with_derived(self, channels: Iterable[str]) -> Recording:
+        """Return a recording with channels added that others and the rest length give."""
+        found: dict[str, Array] = {}
+        for wanted in channels:
+            if wanted not in self.channels and self.rest_length is not None:
+                for name, samples in self.channels.items():
+                    if (line := conversion(wanted, name, self.rest_length)) is not None:
+                        found[wanted] = line[0] * samples + line[1]
+                        break
+        return self.with_channels(**found) if found else self
+
     def with_meta(self, **meta: Any) -> Recording:
         """Return a recording with entries of ``meta`` added or replaced."""
         return replace(self, meta={**self.meta, **meta})
 
     def select(self, channels: Sequence[str]) -> Recording:
         """Return a recording of some channels only, in the order given."""
+        whole = self.with_derived(channels)
         return replace(
             self,
-            channels={name: self[name] for name in channels},
-            units={name: self.units[name] for name in channels},
+            channels={name: whole[name] for name in channels},
+            units={name: whole.units[name] for name in channels},
         )
 
     def slice(self, start: int, stop: int) -> Recording:

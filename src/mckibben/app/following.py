@@ -47,7 +47,7 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Let a controller follow a reference on a model or a virtual rig, and keep the recording."""
     from mckibben.blocks.base import Block
     from mckibben.control import before, control_law, track, tune_pid
-    from mckibben.control.roles import wished
+    from mckibben.control.roles import asked
     from mckibben.control.suiting import doubts_of_feedback
     from mckibben.files import read, write
     from mckibben.rigs import load_rig
@@ -56,12 +56,14 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     compensator = forms.made(workspace, given["model"], form, given.get("settings") or {})
     plant = workspace.twin(own) if own else load_rig(given["rig"])
     (reference,) = read(workspace.path("runs", given["reference"]), informative=False)
-    reference = wished(compensator, reference)
+    reference = asked(plant, reference, compensator)
     kind = given["controller"]
     step = reference.sample_time or 0.02
     held = {name: float(reference[name][0]) for name in plant.inputs if name in reference}
     controller = control_law(
-        kind, compensator, lambda: tune_pid(plant, sample_time=step, scheduled=held)
+        kind,
+        compensator,
+        lambda: tune_pid(plant, sample_time=step, scheduled=held, references=compensator.inputs),
     )
     found = track(
         controller, plant, reference, progress=lambda share: tell(0.5 * share, float("nan"))

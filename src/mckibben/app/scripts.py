@@ -53,7 +53,10 @@ def twin_call(workspace: Workspace, name: str) -> str:
 
 def track_call(law: str, compensator: str, plant: str, reference: str) -> str:
     """Return the calls that let a controller follow a reference, in a file, on a plant."""
-    tuned = "mckibben.control.tune_pid(plant, sample_time=reference.sample_time, scheduled=held)"
+    tuned = (
+        "mckibben.control.tune_pid(plant, sample_time=reference.sample_time, scheduled=held, "
+        "references=compensator.inputs)"
+    )
     return "\n".join(
         [
             *_assigned("compensator", compensator),

@@ -32,6 +32,9 @@ from mckibben.errors import ModelError
 MEASURED = "_measured"
 """What the name of a reference ends with where it is measured."""
 
+BASE = "_base"
+"""What the name of a command ends with that feedback is added to."""
+
 
 @step
 def pid_step(
@@ -177,10 +180,31 @@ class PIDFeedback(Block):
         return cls(*gains, limits, filter_time, references, _called(references, MEASURED), outputs)
 
     def behind(self, compensator: Block) -> Self:
-        """Return the same feedback on top of what a compensator gives."""
+        """Return the same feedback on top of what a compensator gives, matched by name and unit.
+
+        Raises
+        ------
+        ModelError
+            If the compensator has other references or outputs.
+        """
         references, outputs = compensator.inputs[: compensator.n_driven], compensator.outputs
-        beside = (*_called(references, MEASURED), *_called(outputs, "_base"))
-        return replace(self, driven=references, scheduled=beside, given=outputs, late=True)
+        pairs = {channel: place for place, channel in enumerate(self.driven)}
+        if set(pairs) != set(references) or set(map(_sent, self.given)) != set(map(_sent, outputs)):
+            own, theirs = (
+                f"{_listed(ins)} to {_listed(outs)}"
+                for ins, outs in ((self.driven, self.given), (references, outputs))
+            )
+            raise ModelError(
+                f"feedback goes from {own}, and the compensator from {theirs}. Remedy: tune it for the "
+                "compensator's (tune_pid(..., references=compensator.inputs))."
+            )
+        order = [pairs[channel] for channel in references]
+        named = {_sent(channel): channel for channel in outputs}
+        given = tuple(named[_sent(self.given[place])] for place in order)
+        kp, ki, kd = (tuple(gains[k] for k in order) for gains in (self.kp, self.ki, self.kd))
+        beside = (*_called(references, MEASURED), *_called(given, BASE))
+        made = replace(self, kp=kp, ki=ki, kd=kd, late=True)
+        return replace(made, driven=references, scheduled=beside, given=given)
 
     @classmethod
     def example(cls) -> Self:
@@ -195,6 +219,15 @@ class PIDFeedback(Block):
 def _called(channels: Channels, ending: str) -> Channels:
     """Return channels whose names have an ending."""
     return tuple(Channel(f"{channel.name}{ending}", channel.unit) for channel in channels)
+
+
+def _sent(channel: Channel) -> tuple[str, str]:
+    """Return name and unit of a command, whether it was recorded as one or not."""
+    return channel.name.removeprefix("command_"), channel.unit
+
+
+def _listed(channels: Channels) -> str:
+    return ", ".join(f"{channel.name} [{channel.unit or '-'}]" for channel in channels)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -225,14 +258,11 @@ class FeedforwardFeedback(Composition):
 
     def __post_init__(self) -> None:
         self.check_parts()
-        n = len(self.compensator.outputs)
-        n_driven = self.compensator.n_driven
-        if (len(self.feedback.driven), len(self.feedback.scheduled)) != (n_driven, n + n_driven):
+        made = self.feedback.behind(self.compensator)
+        if made.inputs != self.feedback.inputs:
             raise ModelError(
-                f"feedback of {len(self.feedback.driven)} references with "
-                f"{len(self.feedback.scheduled)} measurements and bases does not fit a compensator of "
-                f"{n_driven} references and {n} outputs. Remedy: give one measurement to a reference "
-                "and one base to an output."
+                f"feedback takes {_listed(self.feedback.inputs)}, and behind the compensator "
+                f"{_listed(made.inputs)}. Remedy: make both one with FeedforwardFeedback.of."
             )
         self.check_channels()
 
@@ -263,9 +293,11 @@ class FeedforwardFeedback(Composition):
         return tuple(channel.name for channel in self.inputs[len(self.feedback.driven) :])
 
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
-        own = [self.inputs.index(channel) for channel in self.compensator.inputs]
-        bases = self.compensator.wired(board, [taken[place] for place in own])
-        return self.feedback.wired(board, [*taken[: 2 * len(self.feedback.driven)], *bases])
+        wires = dict(zip(self.inputs, taken, strict=True))
+        bases = self.compensator.wired(board, [wires[one] for one in self.compensator.inputs])
+        wires |= dict(zip(_called(self.outputs, BASE), bases, strict=True))
+        found = self.feedback.wired(board, [wires[channel] for channel in self.feedback.inputs])
+        return [found[self.feedback.given.index(channel)] for channel in self.outputs]
 
     def joined(self, parts: Sequence[str]) -> str:
         """Return the sum of what both give, the feedback from the compensator's references."""

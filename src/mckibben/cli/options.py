@@ -102,6 +102,14 @@ GapPolicy = Annotated[
 Raw = Annotated[
     bool, typer.Option("--raw", help="Read codes for missing samples, and wraps, as measured.")
 ]
+RestLength = Annotated[
+    float | None,
+    typer.Option(
+        "--rest-length",
+        metavar="MM",
+        help="Length at displacement 0, which makes contraction, displacement and length of another.",
+    ),
+]
 Resample = Annotated[
     float | None,
     typer.Option(
@@ -189,6 +197,7 @@ class Reading:
     rate: Rate = None
     gaps: GapPolicy = Gaps.ERROR
     raw: Raw = False
+    rest_length: RestLength = None
     resample: Resample = None
     zero: Zero = None
 
@@ -208,6 +217,7 @@ class Reading:
             "rate": self.rate,
             "gaps": self.gaps.value,
             "raw": self.raw,
+            "rest_length": self.rest_length,
             "most": _bytes(self.most),
         }
 

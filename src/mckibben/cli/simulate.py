@@ -49,7 +49,7 @@ def simulate(
     """
     from dataclasses import asdict
 
-    from mckibben.control.beyond import beyond_known
+    from mckibben.control.identified import beyond_known
     from mckibben.diagnosis.bands import outside
     from mckibben.files import write
     from mckibben.metrics import score

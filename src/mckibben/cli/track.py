@@ -15,6 +15,7 @@ from mckibben.cli.options import (
     Json,
     Rate,
     Reading,
+    RestLength,
     Seed,
     Units,
     limits_in,
@@ -25,10 +26,8 @@ from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
-    from mckibben.blocks.base import Block
     from mckibben.control.loop import Tracked
     from mckibben.control.roles import Plant
-    from mckibben.recording import Recording
 
 
 def track(
@@ -57,6 +56,7 @@ def track(
             help="Of --plant, where the model does not say, as pressure=0:6; repeatable.",
         ),
     ] = None,
+    rest_length: RestLength = None,
     controller: Annotated[
         str,
         typer.Option(
@@ -102,6 +102,7 @@ def track(
     from mckibben.blocks.feedback import FeedforwardFeedback
     from mckibben.control import (
         UNCOMPENSATED,
+        BlockController,
         Twin,
         before,
         control_law,
@@ -109,8 +110,8 @@ def track(
         tune_pid,
     )
     from mckibben.control import track as close
-    from mckibben.control.beyond import beyond_known
-    from mckibben.control.roles import wished
+    from mckibben.control.identified import beyond_known
+    from mckibben.control.roles import asked, offered
     from mckibben.control.suiting import doubts_of_feedback
     from mckibben.control.twin import COMMAND
     from mckibben.files import write
@@ -123,18 +124,19 @@ def track(
     if controller_out is not None:
         claim_model(controller_out, inputs=inputs, force=force)
     block = loaded(compensator, fields)
-    plant = _plant(rig, twin, limits or [])
+    plant = _plant(rig, twin, limits or [], rest_length)
     runs = Reading(column, unit, rate=rate).read([reference], None, informative=False)
-    wanted = runs[0]
-    _fits(block, plant, wanted)
-    wanted = wished(block, wanted)
+    wanted = asked(plant, runs[0], block)
+    BlockController(block).connect(offered(plant, wanted))  # before anything is tuned
     notes = beyond_known(block, wanted)
     held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
     step = wanted.sample_time or 0.02
     commanded = any(channel.name.startswith(COMMAND) for channel in block.outputs)
     with progress_bar(f"{controller} on {plant.name}") as tell:
         chosen = control_law(
-            controller, block, lambda: tune_pid(plant, sample_time=step, scheduled=held)
+            controller,
+            block,
+            lambda: tune_pid(plant, sample_time=step, scheduled=held, references=block.inputs),
         )
         if controller_out is not None and not isinstance(chosen, Block):
             raise ModelError(
@@ -245,7 +247,9 @@ def track(
         say(f"Written: {out}")
 
 
-def _plant(rig: str | None, twin: Path | None, limits: list[str]) -> Plant:
+def _plant(
+    rig: str | None, twin: Path | None, limits: list[str], rest_length: float | None
+) -> Plant:
     """Return what the loop is closed on."""
     from mckibben.blocks.saving import load
     from mckibben.control import Twin
@@ -257,8 +261,9 @@ def _plant(rig: str | None, twin: Path | None, limits: list[str]) -> Plant:
             remedy="give --plant model.json, a model of your own muscle, or --rig NAME",
         )
     if twin is None:
-        if limits:
-            raise DataError("a rig has limits of its own", remedy="leave --limits out")
+        if limits or rest_length is not None:
+            option, own = ("--limits", "limits") if limits else ("--rest-length", "a rest length")
+            raise DataError(f"a rig has {own} of its own", remedy=f"leave {option} out")
         return load_rig(str(rig))
     given = {}
     for channel, numbers in limits_in(limits).items():
@@ -270,7 +275,7 @@ def _plant(rig: str | None, twin: Path | None, limits: list[str]) -> Plant:
                 remedy=f"write --limits {channel}=LOW:HIGH; --slew says how fast pressures change",
             )
         given[channel] = (low, high)
-    return Twin(load(twin), limits=given, name=twin.stem)
+    return Twin(load(twin), limits=given, name=twin.stem, rest_length=rest_length)
 
 
 def _figures(tracked: Tracked | None) -> dict[str, object] | None:
@@ -282,25 +287,3 @@ def _figures(tracked: Tracked | None) -> dict[str, object] | None:
         "largest": dict(tracked.largest),
         "clipped": tracked.clipped,
     }
-
-
-def _fits(block: Block, plant: Plant, reference: Recording) -> None:
-    """Refuse a model in place of an inverse, and references without what the inverse needs."""
-    from mckibben.blocks.feedback import MEASURED
-    from mckibben.control.roles import driven_by
-
-    for name in driven_by(block):
-        if name not in plant.inputs:
-            raise DataError(
-                f"the compensator gives {name!r}, which does not drive {plant.name!r}",
-                remedy="give what mckibben invert wrote, and a rig or model of such a muscle",
-            )
-    fed_back = {f"{name}{MEASURED}" for name in plant.outputs}
-    for channel in block.inputs:
-        if channel.name not in reference and channel.name not in fed_back:
-            raise DataError(
-                "the compensator needs it, but the reference has no such channel",
-                file=reference.source,
-                channel=channel.name,
-                remedy="add the column",
-            )

@@ -9,10 +9,10 @@ from mckibben.control.loop import track as track
 from mckibben.control.observer import DisturbanceObserver as DisturbanceObserver
 from mckibben.control.preview import dead_time_undone as dead_time_undone
 from mckibben.control.preview import previewed as previewed
-from mckibben.control.trying import UNCOMPENSATED as UNCOMPENSATED
-from mckibben.control.trying import Before as Before
-from mckibben.control.trying import before as before
 from mckibben.control.tuning import tune_pid as tune_pid
 from mckibben.control.twin import Twin as Twin
+from mckibben.control.uncompensated import UNCOMPENSATED as UNCOMPENSATED
+from mckibben.control.uncompensated import Before as Before
+from mckibben.control.uncompensated import before as before
 from mckibben.control.uncompensated import slow_rise as slow_rise
 from mckibben.control.uncompensated import uncompensated as uncompensated

@@ -3,53 +3,51 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.blocks.feedback import MEASURED, FeedforwardFeedback
-from mckibben.blocks.running import Stream
+from mckibben.blocks.feedback import BASE, MEASURED, FeedforwardFeedback
+from mckibben.blocks.fields import Channel
+from mckibben.control.connecting import Offer
 from mckibben.control.preview import dead_time_undone
 
 
 class Controller(ABC):
-    """Asked once a control step for the pressures of n muscles."""
+    """Asked once a control step for the commands of n muscles."""
+
+    preview: float = 0.0
+    """How far ahead its compensator wants the reference, to make up for dead time [s]."""
+
+    forward_model: Block | None = None
+    """The model that its compensator undoes, if it has one."""
+
+    samples_ahead: int = 0
+    """How many samples further ahead it wants the reference, to plan with."""
+
+    def connect(self, offer: Offer) -> None:
+        """Learn what a loop gives and takes, before `reset`, and refuse what does not fit."""
+        del offer
 
     @abstractmethod
     def reset(self, sample_time: float) -> None:
         """Forget the past, and get ready for steps of so many seconds."""
 
     @abstractmethod
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        """Return the pressures to apply until the next step [bar], shape (n,).
+    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
+        """Return the commands to apply until the next step [bar or V], shape (n,).
 
         Parameters
         ----------
-        reference : array, shape (n,)
-            Where the muscles should be at the next step [mm].
-        displacement : array, shape (n,)
-            Where they were just measured to be [mm].
-        scheduled : array, shape (s,)
-            What schedules the model: an extensor's pressure, a load.
+        reference : array
+            What `Offer.followed` should be at the next step [mm, rad or N].
+        measured : array
+            What `Offer.measured` just was.
+        scheduled : array
+            What schedules the model, `Offer.scheduled`: an extensor's pressure, a load.
         """
-
-    @property
-    def preview(self) -> float:
-        """How far ahead its compensator wants the reference, to make up for dead time [s]."""
-        return 0.0
-
-    @property
-    def forward_model(self) -> Block | None:
-        """The model that its compensator undoes, if it has one."""
-        return None
-
-    @property
-    def samples_ahead(self) -> int:
-        """How many samples further ahead it wants the reference, to plan with."""
-        return 0
 
     @property
     def n_clipped(self) -> int:
@@ -62,10 +60,6 @@ class Controller(ABC):
         The compensator goes by these, feedback by those of `step`.
         """
         del reference, scheduled
-
-    def reads(self, readings: Mapping[str, float]) -> None:
-        """Learn all that was just measured, by channel, before `step`."""
-        del readings
 
     def applied(self, pressures: Array) -> None:
         """Learn what was applied in the end, after limits."""
@@ -85,51 +79,44 @@ class BlockController(Controller):
 
     block: Block
 
-    @property
-    def preview(self) -> float:
-        """The dead time of what the block undoes."""
-        return dead_time_undone(self.block)
-
-    @property
-    def forward_model(self) -> Block | None:
-        """What the block undoes."""
-        return self.block.forward_model
-
-    @property
-    def samples_ahead(self) -> int:
-        """Those of the horizon of a compensator that looks ahead."""
-        return self.block.samples_ahead
+    def __post_init__(self) -> None:
+        self.preview, self.forward_model = dead_time_undone(self.block), self.block.forward_model
+        self.samples_ahead = self.block.samples_ahead
 
     @property
     def n_clipped(self) -> int:
         """Those of the compensator."""
         return self._stream.block.n_clipped(self._stream.state)
 
-    def reset(self, sample_time: float) -> None:
+    def connect(self, offer: Offer) -> None:
         whole = self.block
-        self._ahead: Array | None = None
-        self._feedback: Stream | None = None
+        self._compensator, self._pid = whole, None
         if isinstance(whole, FeedforwardFeedback):  # which may be given references of two times
-            self._feedback = whole.feedback.stream(sample_time)
-            whole = whole.compensator
-        self._stream = whole.stream(sample_time)
-        felt = [channel.name.endswith(MEASURED) for channel in whole.inputs]
-        self._sample, self._feels = np.empty(len(felt)), np.array(felt)
+            self._compensator, self._pid = whole.compensator, whole.feedback
+        self._inputs = offer.inputs(self._compensator)
+        self._commands = offer.commands(whole)
+        if self._pid is not None:
+            bases = tuple(Channel(f"{c.name}{BASE}", c.unit) for c in self._compensator.outputs)
+            self._beside = offer.inputs(self._pid, bases)
+
+    def reset(self, sample_time: float) -> None:
+        self._ahead: tuple[Array, Array] | None = None
+        self._stream = self._compensator.stream(sample_time)
+        self._feedback = None if self._pid is None else self._pid.stream(sample_time)
+        feels = any(channel.name.endswith(MEASURED) for channel in self._compensator.inputs)
+        # what is measured answers the reference of the last step, or before by a dead time that the
+        # block knows; a plan takes what schedules as it is now
+        self._foresees, self._plans = self.preview > 0.0 or not feels, self.samples_ahead > 0
 
     def foresees(self, reference: Array, scheduled: Array) -> None:
-        self._ahead = np.concatenate([reference, scheduled])
+        self._ahead = reference, scheduled
 
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        given = np.concatenate([reference, scheduled])
-        if self._ahead is not None and (self.preview > 0.0 or not self._feels.any()):
-            # what is measured answers the reference of the last step, or before by a dead time that the
-            # block knows; a plan takes what schedules as it is now
-            known = len(reference) if self.samples_ahead else len(given)
-            given[:known] = self._ahead[:known]
-        if self._feels.any():
-            self._sample[self._feels] = displacement
-        self._sample[~self._feels] = given[: np.count_nonzero(~self._feels)]
-        found = self._stream.step(self._sample)
+    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
+        wanted, beside = reference, scheduled
+        if self._ahead is not None and self._foresees:
+            wanted, beside = self._ahead[0], scheduled if self._plans else self._ahead[1]
+        found = self._stream.step(self._inputs(np.concatenate((wanted, beside, measured))))
         if self._feedback is not None:
-            found = self._feedback.step(np.concatenate([reference, displacement, found]))
-        return found.copy()
+            given = np.concatenate((reference, scheduled, measured, found))
+            found = self._feedback.step(self._beside(given))
+        return self._commands(found)

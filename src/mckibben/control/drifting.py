@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.control.roles import Plant
+from mckibben.control.roles import Plant, rest_length_of
 from mckibben.errors import ModelError
 
 GROUPS = ("stiffness", "friction", "gain")
@@ -86,25 +86,12 @@ class Drifting:
 
     def __init__(self, rig: Ageing, drifts: Sequence[Drift]) -> None:
         self.fresh, self.drifts = rig, tuple(drifts)
+        self.name, self.inputs, self.outputs = rig.name, rig.inputs, rig.outputs
+        self.rest_length = rest_length_of(rig)
         self._now, self._steps = rig, 0
         self._factors = dict.fromkeys(GROUPS, 1.0)
         self._pressed = np.array([name.startswith("pressure") for name in rig.inputs])
         self._felt = np.array([name in rig.inputs and "pressure" in name for name in rig.outputs])
-
-    @property
-    def name(self) -> str:
-        """The rig's."""
-        return self.fresh.name
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The rig's."""
-        return self.fresh.inputs
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The rig's."""
-        return self.fresh.outputs
 
     @property
     def factors(self) -> Mapping[str, float]:

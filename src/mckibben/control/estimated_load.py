@@ -1,14 +1,14 @@
-"""A controller that is told the load by an estimate, where nothing measures it."""
+"""A controller that is given an estimate of the load, where nothing measures it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.control.connecting import Offer
 from mckibben.control.controller import Controller
 from mckibben.errors import ModelError
 
@@ -20,9 +20,9 @@ class EstimatedLoad(Controller):
     Parameters
     ----------
     controller : Controller
-        What is told the load, as its only scheduling input.
+        What the load schedules.
     estimate : Block
-        From what is measured (by channel name) to the load.
+        From what is measured to the load.
     filter_time : float
         Of the estimate [s]; without it, estimate and controller excite one another.
     """
@@ -36,50 +36,38 @@ class EstimatedLoad(Controller):
             raise ModelError(
                 f"filter_time is {self.filter_time}. Remedy: give a positive time in seconds."
             )
-        self._names = [channel.name for channel in self.estimate.inputs]
-
-    @property
-    def preview(self) -> float:
-        """The controller's."""
-        return self.controller.preview
+        inner = self.controller
+        self.preview, self.forward_model = inner.preview, inner.forward_model
+        self.samples_ahead = inner.samples_ahead
 
     @property
     def n_clipped(self) -> int:
         """Those of the controller's compensator."""
         return self.controller.n_clipped
 
-    def foresees(self, reference: Array, scheduled: Array) -> None:
-        """Pass on the reference; the load to come is taken to be that of now."""
-        del scheduled
-        self.controller.foresees(reference, self._load)
+    def connect(self, offer: Offer) -> None:
+        title, loads = self.estimate.title, self.estimate.outputs
+        self._inputs = offer.selected(self.estimate.inputs, offer.measured, title, offer.plant)
+        self.controller.connect(replace(offer, scheduled=(*loads, *offer.scheduled)))
 
     def reset(self, sample_time: float) -> None:
         self.controller.reset(sample_time)
         self._stream = self.estimate.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
-        self._load = np.zeros(1)
+        self._load = np.zeros(len(self.estimate.outputs))
+        self._coming: tuple[Array, Array] | None = None
 
-    def reads(self, readings: Mapping[str, float]) -> None:
-        """Estimate the load from what was measured.
+    def foresees(self, reference: Array, scheduled: Array) -> None:
+        """Pass on the reference; the load to come is taken to be that of now."""
+        self._coming = reference, scheduled
 
-        Raises
-        ------
-        ModelError
-            If something is not measured that the estimate needs.
-        """
-        self.controller.reads(readings)
-        absent = [name for name in self._names if name not in readings]
-        if absent:
-            raise ModelError(
-                f"the estimate of the load needs {absent[0]!r}, which the plant does not measure. "
-                "Remedy: fit it to channels that are measured."
-            )
-        found = self._stream.step([readings[name] for name in self._names])
+    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
+        found = self._stream.step(self._inputs(measured))
         self._load = self._load + self._share * (found - self._load)
-
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        del scheduled
-        return self.controller.step(reference, displacement, self._load)
+        if self._coming is not None:
+            coming, beside = self._coming
+            self.controller.foresees(coming, np.concatenate((self._load, beside)))
+        return self.controller.step(reference, measured, np.concatenate((self._load, scheduled)))
 
     def applied(self, pressures: Array) -> None:
         self.controller.applied(pressures)

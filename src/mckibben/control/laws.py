@@ -44,18 +44,11 @@ def control_law(name: str, compensator: Block, tuned: Tuned) -> Block | Controll
 def refusal(name: str, compensator: Block, plant: Plant) -> str:
     """Return why a law closes no loop of a compensator on a plant, or an empty string.
 
-    It is told by channels alone: nothing is run, and feedback is not tuned.
-
-    Parameters
-    ----------
-    name : str
-        Of the law.
-    compensator : Block
-    plant : Plant
+    Channels alone decide: nothing is run, and feedback is not tuned.
     """
     held = [channel.name for channel in compensator.inputs if channel.name in plant.inputs]
     try:
-        control_law(name, compensator, lambda: untuned_pid(plant, held))
+        control_law(name, compensator, lambda: untuned_pid(plant, held, compensator.inputs))
     except MckibbenError as error:
         return str(error)
     return ""

@@ -3,26 +3,48 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
+from mckibben.control.connecting import match
 from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
-from mckibben.control.reach import Beyond, beyond, ends, outside
-from mckibben.control.roles import Plant, followed_by, resting, roles, wished
+from mckibben.control.roles import Plant, asked, offered, resting, roles
 from mckibben.control.twin import Twin
 from mckibben.errors import DataError, ModelError
-from mckibben.recording import Recording, standard_unit
+from mckibben.recording import Recording
 from mckibben.signals.checking import generator
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
+
+ROUNDING = 1e-9
+"""Share of what is reached by which a reference touches its end."""
+
+
+class Beyond(NamedTuple):
+    """Samples of a reference that are out of reach.
+
+    Parameters
+    ----------
+    samples : int
+    low, high : float
+        What the model can reach whatever happened before [mm or N].
+    rmse_elsewhere : float
+        RMSE over all other samples [mm or N]; not a number where there are none.
+    """
+
+    samples: int
+    low: float
+    high: float
+    rmse_elsewhere: float
 
 
 @dataclass(frozen=True)
@@ -96,7 +118,9 @@ def track(
     reference : Recording
         Channels of motion to follow [mm or rad], or without any the force [N], and of what schedules the
         controller and is held on the plant, such as ``pressure_extensor`` or the length in a test stand,
-        as they should be. What a block drives, as pressures recorded with it, is passed over.
+        as they should be. What a block drives, as pressures recorded with it, is passed over. With the
+        rest length of the plant, or of the reference, a displacement, contraction or length is any of
+        these.
     approach : float
         Time to go from rest to the first reference [s], not scored.
     settle : float
@@ -125,7 +149,8 @@ def track(
     Raises
     ------
     DataError
-        If the reference has no time, or no channel that the plant measures.
+        If the reference has no time, or no channel that the plant measures; or if the controller wants
+        or gives another channel than the loop, or in another unit.
     ModelError
         On settings out of range.
     """
@@ -135,15 +160,17 @@ def track(
             "the reference has no time", file=reference.source, remedy="add a time column or --rate"
         )
     _check(approach, settle, noise, delay, slew, step)
+    reference = asked(plant, reference, controller if isinstance(controller, Block) else None)
     if isinstance(controller, Block):
-        reference = wished(controller, reference)
         controller = BlockController(controller)
     preview = controller.preview if preview is None else preview
     further = max(samples_ahead(preview, step) - 1, 0)  # than the next step's, given anyway
     further += controller.samples_ahead
     rng = generator(seed)
-    followed = followed_by(plant, reference)
+    offer = offered(plant, reference)
+    controller.connect(offer)
     driven, held = roles(plant, reference)
+    followed, beside = ([c.name for c in some] for some in (offer.followed, offer.scheduled))
     starts = resting(plant, {name: float(reference[name][0]) for name in held})
     settings: dict[str, float] = {"sample_time": step, **starts}
     scatters = isinstance(plant, Twin) and plant.scatters
@@ -160,8 +187,9 @@ def track(
         raise ModelError(
             "nothing is left to score. Remedy: give a longer reference, or less settle."
         )
-    scheduled = reference.matrix(held) if held else np.empty((len(reference), 0))
+    scheduled = reference.matrix(beside) if beside else np.empty((len(reference), 0))
     scheduled = np.concatenate([np.tile(scheduled[:1], (lead, 1)), scheduled])
+    imposed = scheduled[:, [beside.index(name) for name in held]]
 
     places = {name: place for place, name in enumerate(changed.outputs)}
     at_y = [places[name] for name in followed]
@@ -170,9 +198,9 @@ def track(
     limits = [changed.limits(name) for name in driven]
     low, high = (np.array([getattr(limit, end) for limit in limits]) for end in ("low", "high"))
     loop = PressureLoop(low, high, step)
+    controller.reset(step)
     measured = changed.reset(seed)
     late = [measured] * (delay + 1)
-    controller.reset(step)
     seen, commands = np.empty((n, len(measured))), np.empty((n, len(driven)))
     clipped, times = np.zeros(n, dtype=bool), np.empty(n)
     own = np.zeros(n + 1, dtype=int)
@@ -184,11 +212,9 @@ def track(
             if isinstance(changed, Twin):
                 drawn[t] = changed.drawn
             late = [*late[1:], measured]
-            felt = late[0][at_y] + noise * rng.standard_normal(len(at_y))
-            readings = dict(zip(changed.outputs, late[0].tolist(), strict=True))
-            readings |= dict(zip(followed, felt.tolist(), strict=True))
+            felt = late[0].copy()
+            felt[at_y] += noise * rng.standard_normal(len(at_y))
             started = time.perf_counter()
-            controller.reads(readings)
             if further > 0:
                 then = min(t + further, n - 1)
                 controller.foresees(path[then], scheduled[then])
@@ -209,22 +235,27 @@ def track(
             command = loop.step(allowed, measured[at_p]) if inner else allowed
             commands[t] = command
             action = dict(zip(driven, command.tolist(), strict=True))
-            action |= dict(zip(held, scheduled[t].tolist(), strict=True))
+            action |= dict(zip(held, imposed[t].tolist(), strict=True))
             measured = changed.step(action)
             if tell is not None and t % 200 == 0:
                 tell(t / n)
     # what was asked for at a step is due at the next
     due = np.concatenate([path[:1], path[:-1]])
     errors = seen[:, at_y] - due
-    reached = ends(controller.forward_model, followed)
+    reached = ends(controller.forward_model, offer.followed, offer.rest_length)
     out = {name: outside(due[:, followed.index(name)], *reached[name]) for name in reached}
     clipped |= np.any([*out.values(), np.diff(own, prepend=0)[:-1] > 0], axis=0)
     part, at_limit = errors[scored], clipped[scored]
     parts = dict(zip(followed, part.T, strict=True))
     far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}
     sizes = np.sqrt(np.mean(drawn[scored] ** 2, axis=0))[at_y].tolist() if scatters else []
+    references = {f"reference_{c.name}": c.unit for c in offer.followed}
+    sent = {f"command_{c.name}": c.unit for c in offer.driven}
+    channels = dict(zip((*references, *sent), (*due.T, *commands.T), strict=True))
+    channels |= dict(zip(changed.outputs, seen.T, strict=True))
+    channels = dict(zip(held, imposed.T, strict=True)) | channels
     return Tracked(
-        _recorded(reference, followed, driven, due, seen, commands, scheduled, held, changed, lead),
+        Recording(channels, step, references | sent, -lead * step, {"plant": changed.name}),
         dict(zip(followed, np.sqrt(np.mean(part**2, axis=0)).tolist(), strict=True)),
         dict(zip(followed, np.abs(part).max(axis=0).tolist(), strict=True)),
         int(at_limit.sum()),
@@ -260,24 +291,33 @@ def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:
     return clipped - free
 
 
-def _recorded(
-    reference: Recording,
-    followed: list[str],
-    driven: list[str],
-    due: Array,
-    seen: Array,
-    commands: Array,
-    scheduled: Array,
-    held: list[str],
-    plant: Plant,
-    lead: int,
-) -> Recording:
-    channels = {f"reference_{name}": due[:, k] for k, name in enumerate(followed)}
-    channels |= {name: seen[:, k] for k, name in enumerate(plant.outputs)}
-    channels |= {f"command_{name}": commands[:, k] for k, name in enumerate(driven)}
-    for k, name in enumerate(held):
-        channels.setdefault(name, scheduled[:, k])
-    units = {f"reference_{name}": reference.units[name] for name in followed}
-    units |= {f"command_{name}": standard_unit(name) or "" for name in driven}
-    step = reference.sample_time or 1.0
-    return Recording(channels, step, units, start_time=-lead * step, meta={"plant": plant.name})
+def ends(
+    model: Block | None, followed: Sequence[Channel], rest_length: float | None
+) -> dict[str, tuple[float, float]]:
+    """Return the lowest and highest that a model can reach of what is followed, as far as it says."""
+    found: dict[str, tuple[float, float]] = {}
+    if model is None:
+        return found
+    for channel in followed:
+        line = match(channel, model.outputs, rest_length)
+        if line is not None:
+            place, gain, offset = line
+            low, high = sorted(float(gain * end[place] + offset) for end in model.reachable())
+            if np.isfinite([low, high]).all():
+                found[channel.name] = low, high
+    return found
+
+
+def outside(reference: Array, low: float, high: float) -> NDArray[np.bool_]:
+    """Return which samples of a reference, shape (n,), lie beyond both ends and rounding."""
+    margin = ROUNDING * (high - low)
+    return np.asarray((reference < low - margin) | (reference > high + margin))
+
+
+def beyond(errors: Array, out: NDArray[np.bool_], low: float, high: float) -> Beyond | None:
+    """Return what of a reference is out of reach, by `outside`, or None."""
+    if not out.any():
+        return None
+    others = errors[~out]
+    elsewhere = float(np.sqrt(np.mean(others**2))) if others.size else float("nan")
+    return Beyond(int(out.sum()), low, high, elsewhere)

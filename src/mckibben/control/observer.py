@@ -14,6 +14,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.control.connecting import Offer
 from mckibben.control.controller import Controller
 from mckibben.errors import ModelError
 
@@ -39,49 +40,48 @@ class DisturbanceObserver(Controller):
                 f"filter_time is {self.filter_time}. Remedy: give a positive time in seconds."
             )
         self._model = self.compensator.inverse()
-
-    @property
-    def preview(self) -> float:
-        """The dead time of the model."""
-        return self._model.dead_time
-
-    @property
-    def forward_model(self) -> Block | None:
-        """The model."""
-        return self._model
+        self.forward_model = self._model
+        self.preview = self._model.dead_time
 
     @property
     def n_clipped(self) -> int:
         """Those of the compensator."""
         return self.compensator.n_clipped(self._ahead.state)
 
+    def connect(self, offer: Offer) -> None:
+        block, model = self.compensator, self._model
+        references = block.inputs[: block.n_driven]
+        self._inputs, self._commands = offer.inputs(block), offer.commands(block)
+        given = (*offer.driven, *offer.scheduled)
+        self._measured = offer.selected(references, offer.measured, block.title, offer.plant)
+        self._taken = offer.selected(model.inputs, given, model.title, f"a loop on {offer.plant}")
+        self._modelled = offer.selected(references, model.outputs, block.title, model.title)
+
     def reset(self, sample_time: float) -> None:
         self._coming: tuple[Array, Array] | None = None
         self._ahead = self.compensator.stream(sample_time)
         self._beside = self._model.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
-        self._disturbance: Array | None = None
+        self._disturbance = np.zeros(self.compensator.n_driven)
         self._expected: Array | None = None
-        self._n_ahead, self._n_beside = len(self.compensator.inputs), len(self._model.inputs)
         self._scheduled = np.empty(0)
 
     def foresees(self, reference: Array, scheduled: Array) -> None:
         self._coming = (reference, scheduled)
 
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        """Return the compensator's pressures for the reference without the disturbance."""
-        if self._disturbance is None:
-            self._disturbance = np.zeros_like(reference)
+    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
+        """Return the compensator's commands for the reference without the disturbance."""
         if self._expected is not None:
-            surprise = displacement - self._expected
+            surprise = self._measured(measured) - self._expected
             self._disturbance += self._share * (surprise - self._disturbance)
         self._scheduled = scheduled
         if self._coming is not None:
             reference, scheduled = self._coming
-        wanted = np.concatenate([reference - self._disturbance, scheduled])
-        return self._ahead.step(wanted[: self._n_ahead]).copy()
+        wanted = self._inputs(np.concatenate((reference, scheduled, measured)))
+        wanted[: self._disturbance.size] -= self._disturbance
+        return self._commands(self._ahead.step(wanted))
 
     def applied(self, pressures: Array) -> None:
         """Let the model take the step that the plant takes."""
-        taken = np.concatenate([pressures, self._scheduled])[: self._n_beside]
-        self._expected = self._beside.step(taken).copy()
+        taken = self._taken(np.concatenate((pressures, self._scheduled)))
+        self._expected = self._modelled(self._beside.step(taken))

@@ -34,13 +34,7 @@ def dead_time_undone(compensator: Block) -> float:
 
 
 def samples_ahead(preview: float, sample_time: float) -> int:
-    """Return a preview in whole samples, rounded.
-
-    Raises
-    ------
-    ModelError
-        Where it is negative, longer than 10⁴ s, or no number.
-    """
+    """Return a preview in whole samples, rounded, or refuse one that is out of range."""
     if not 0 <= preview <= MOST_PREVIEW:
         raise ModelError(f"preview is {preview}. Remedy: give 0 to {MOST_PREVIEW:g} s.")
     return round(preview / sample_time)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Protocol
 
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.inverse import COMMANDS
+from mckibben.control.connecting import Offer, find
 from mckibben.control.twin import Twin, plain
 from mckibben.errors import DataError
-from mckibben.recording import Recording
+from mckibben.recording import REST_LENGTH, Recording, conversion, standard_unit
 
 MOVED = ("displacement", "angle")
 """What motions are called: of a muscle, and of a joint."""
@@ -49,17 +51,57 @@ class Plant(Protocol):
         """Return the same plant with other settings."""
 
 
-def driven_by(compensator: Block) -> list[str]:
-    """Return the inputs of a plant that a compensator drives; commands are recorded under such names."""
-    return [plain(channel.name) for channel in compensator.outputs]
+def rest_length_of(plant: Plant) -> float | None:
+    """Return the length of a plant's muscle where displacement is 0 [mm]; None where it is not known."""
+    length: float | None = getattr(plant, "rest_length", None)
+    return length
 
 
-def wished(compensator: Block, reference: Recording) -> Recording:
-    """Return a reference without pressures recorded with it, which the compensator is to give."""
-    given = {channel.name for channel in compensator.outputs} | set(driven_by(compensator))
-    kept = [name for name in reference.channels if name not in given]
-    # A reference of pressures alone stays as it is, for whoever follows it to say what is missing.
-    return reference.select(kept) if 0 < len(kept) < len(reference.channels) else reference
+def asked(plant: Plant, reference: Recording, compensator: Block | None = None) -> Recording:
+    """Return a reference in the channels of a plant, where a rest length makes them of its own.
+
+    Pressures recorded with it, which a compensator is to give, are left out.
+    """
+    if compensator is not None:
+        outputs = [channel.name for channel in compensator.outputs]
+        given = {*outputs, *map(plain, outputs)}
+        kept = [name for name in reference.channels if name not in given]
+        # one of pressures alone stays as it is, so that whoever follows it finds what is missing
+        if 0 < len(kept) < len(reference.channels):
+            reference = reference.select(kept)
+    if (length := rest_length_of(plant)) is not None:
+        reference = reference.with_meta(rest_length=length)
+    return reference.with_derived([*plant.outputs, *plant.inputs])
+
+
+def channels_of(plant: Plant, names: Iterable[str]) -> tuple[Channel, ...]:
+    """Return channels of a plant with their units: those of a twin's model, or else the package's."""
+    units = plant.units if isinstance(plant, Twin) else {}
+    return tuple(Channel(name, units.get(name, standard_unit(name) or "")) for name in names)
+
+
+def offered(plant: Plant, reference: Recording) -> Offer:
+    """Return what a loop on a plant gives a controller, and takes of it.
+
+    Raises
+    ------
+    DataError
+        If the reference has nothing that the plant measures, or it in another unit.
+    """
+    followed = followed_by(plant, reference)
+    driven, _ = roles(plant, reference)
+    given = [Channel(name, unit) for name, unit in reference.units.items()]
+    for channel in channels_of(plant, (*plant.inputs, *plant.outputs)):
+        if channel.name in reference:  # in its unit, or refused
+            find(channel, given, None, plant.name, "the reference")
+    return Offer(
+        plant.name,
+        channels_of(plant, followed),
+        tuple(channel for channel in given if channel.name not in (*followed, *driven)),
+        channels_of(plant, plant.outputs),
+        channels_of(plant, driven),
+        reference.rest_length,
+    )
 
 
 def followed_by(plant: Plant, reference: Recording) -> list[str]:
@@ -76,10 +118,12 @@ def followed_by(plant: Plant, reference: Recording) -> list[str]:
     if isinstance(plant, Twin):
         followed = followed or measured_too
     if not followed:
+        pairs = [(name, given) for name in plant.outputs for given in reference.channels]
+        state = f", or state {REST_LENGTH}" if any(conversion(*pair, 1.0) for pair in pairs) else ""
         raise DataError(
             f"it has no displacement, angle or force that {plant.name!r} measures",
             file=reference.source,
-            remedy=f"give channels among {', '.join(plant.outputs)}",
+            remedy=f"give channels among {', '.join(plant.outputs)}{state}",
         )
     return followed
 

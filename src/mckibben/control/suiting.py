@@ -24,7 +24,7 @@ BEYOND = 0.25
 recordings of one muscle begin and end a few tenths of a bar apart."""
 
 REMEDY = (
-    "Remedy: try it on a model of your own muscle (--plant model.json), or on a rig of its size"
+    "Remedy: try it on a model of your own muscle (--plant model.json), where that was identified"
 )
 
 
@@ -40,46 +40,25 @@ def of_itself(model: Block | None, plant: Plant) -> bool:
 def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
     """Return what speaks against taking what a compensator does on a plant for what it does on a muscle.
 
-    Parameters
-    ----------
-    compensator : Block
-    plant : Plant
-    rise : Recording
-        What the plant does while its commands rise slowly, from `mckibben.control.slow_rise`.
-
-    Returns
-    -------
-    list of str
-        A sentence each, with its remedy.
+    ``rise`` is what the plant does while its commands rise slowly, from `mckibben.control.slow_rise`.
     """
     model = compensator.forward_model
     if model is None:
         return []
     if of_itself(model, plant):
+        same = "the plant is the very model that the compensator undoes"
         if isinstance(plant, Twin) and plant.scatters:
-            return [
-                "the plant is the very model that the compensator undoes, with its band: errors without "
-                "feedback are draws from the band, and nothing else is told but limits, rates and what "
-                "feedback adds"
-            ]
+            return [f"{same}, with its band: errors without feedback are draws from the band"]
         return [
-            "the plant is the very model that the compensator undoes, which makes it right by "
-            "construction: this tells of limits and rates, and nothing of the muscle. Remedy: try it on "
-            "another model of the muscle, or give this one the band of recordings held back (mckibben "
-            "calibrate model.json FILES -o banded.json; --plant banded.json)"
+            f"{same}, which makes it right by construction: only limits and rates show. Remedy: try it "
+            "on another model of the muscle, or give this one the band of recordings held back "
+            "(mckibben calibrate model.json FILES -o banded.json; --plant banded.json)"
         ]
     return [*_pressures(model, plant, rise), *_strokes(model, plant, rise)]
 
 
 def doubts_of_feedback(law: str, plant: Plant) -> list[str]:
-    """Return what speaks against feedback's errors on a plant: a model without time has no lag.
-
-    Parameters
-    ----------
-    law : str
-        Of the control law; see `mckibben.control.control_law`.
-    plant : Plant
-    """
+    """Return what speaks against feedback's errors on a plant: a model without time has no lag."""
     if law == "feedforward" or not isinstance(plant, Twin) or plant.forward.rate_dependent:
         return []
     return [
@@ -101,7 +80,7 @@ def _pressures(model: Block, plant: Plant, rise: Recording) -> list[str]:
         if high > limits.high + reach or low < limits.low - reach:
             notes.append(
                 f"the compensator is of {name} from {_span(low, high)} {channel.unit}, and {plant.name} "
-                f"takes {_span(limits.low, limits.high)}: {_why(plant)}"
+                f"takes {_span(limits.low, limits.high)}. {REMEDY}"
             )
     return notes
 
@@ -115,7 +94,7 @@ def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
     driven = [name for name, values in given.items() if np.ptp(values) > 0]
     if len(driven) != len(
         model.outputs
-    ):  # of an arm, those that pull against each other move nothing
+    ):  # of an arm, some pull against each other and move nothing
         return []
     for name in driven:
         low, high = known.get(name, (-np.inf, np.inf))
@@ -141,24 +120,9 @@ def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
         if np.abs(ours - theirs).max() > APART * abs(theirs[1] - theirs[0]):
             notes.append(
                 f"in a slow rise ({ends}), {channel.name} of {plant.name} goes from {_span(*ours)} "
-                f"{channel.unit}, and of the compensator's model from {_span(*theirs)}: {_why(plant)}"
+                f"{channel.unit}, and of the compensator's model from {_span(*theirs)}. {REMEDY}"
             )
     return notes
-
-
-def _why(plant: Plant) -> str:
-    """Return what may be the reason, and the remedy."""
-    if isinstance(plant, Twin):
-        known = [
-            f"{plain(name)} {_span(*ends)}" for name, ends in known_ranges(plant.forward).items()
-        ]
-        far = f"recordings of {plant.name} reached {', '.join(known)}: beyond, it extrapolates"
-        within = "within these" if known else "within what was recorded"
-        return (
-            f"the two models disagree there, or are of two muscles. {f'{far}. ' * bool(known)}"
-            f"Remedy: stay {within}, or record more, and fit both again"
-        )
-    return f"it may be of another muscle. {REMEDY}"
 
 
 def _span(low: float, high: float) -> str:

@@ -18,10 +18,10 @@ from mckibben.arrays import Array
 from mckibben.blocks.feedback import PIDFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.inverse import COMMANDS
-from mckibben.control.roles import MOVED, Plant, actuated, resting
+from mckibben.control.connecting import match
+from mckibben.control.roles import MOVED, Plant, actuated, channels_of, rest_length_of, resting
 from mckibben.control.twin import Twin
 from mckibben.errors import ModelError
-from mckibben.recording import standard_unit
 from mckibben.system.progress import Tell, one_by_one, telling
 
 NEVER = 1e9
@@ -40,6 +40,7 @@ def tune_pid(
     closed_loop_time: float | None = None,
     hold: float = 15.0,
     scheduled: dict[str, float] | None = None,
+    references: Sequence[Channel] = (),
     seed: int = 0,
     progress: bool | Tell | None = None,
 ) -> PIDFeedback:
@@ -57,6 +58,9 @@ def tune_pid(
         Time to settle before and after the step [s].
     scheduled : mapping, optional
         Other inputs, held.
+    references : sequence of Channel
+        In which the references will be given, as a compensator has them; default as the plant measures
+        them.
     seed : int
         Of the noise.
     progress : bool or callable, optional
@@ -68,8 +72,9 @@ def tune_pid(
         If nothing moves with a muscle's own pressure, or the rig imposes its length.
     """
     scheduled = scheduled or {}
-    untuned = untuned_pid(plant, scheduled)
-    followed = [channel.name for channel in untuned.driven]
+    measured = untuned_pid(plant, scheduled).driven
+    untuned = untuned_pid(plant, scheduled, references)
+    followed = [channel.name for channel in measured]
     driven = [channel.name for channel in untuned.given]
     starts = resting(plant, scheduled)
     if isinstance(plant, Twin):  # what differs from run to run is no gain
@@ -97,19 +102,16 @@ def tune_pid(
             ramp = np.linspace(limit.low, limit.high, n)
             slow = np.array([rig.step({**rest, name: at})[place] for at in (*ramp, *ramp[::-1])])
             gains.append(_simc(response, size, (slow, ramp), sample_time, closed_loop_time, name))
-    kp, ki = zip(*gains, strict=True)
-    return replace(untuned, kp=kp, ki=ki)
+    pairs = zip(measured, untuned.driven, strict=True)
+    per = [match(own, [one], rest_length_of(plant)) for own, one in pairs]
+    kp, ki = np.transpose(gains) * [1.0 if line is None else line[1] for line in per]
+    return replace(untuned, kp=tuple(kp.tolist()), ki=tuple(ki.tolist()))
 
 
-def untuned_pid(plant: Plant, scheduled: Collection[str] = ()) -> PIDFeedback:
-    """Return PID feedback of a plant's channels, without gains.
-
-    Parameters
-    ----------
-    plant : Plant
-        A rig with as many pressures as motions.
-    scheduled : collection of str
-        Other inputs, held.
+def untuned_pid(
+    plant: Plant, scheduled: Collection[str] = (), references: Sequence[Channel] = ()
+) -> PIDFeedback:
+    """Return PID feedback of a plant's channels, without gains; parameters are those of `tune_pid`.
 
     Raises
     ------
@@ -120,8 +122,17 @@ def untuned_pid(plant: Plant, scheduled: Collection[str] = ()) -> PIDFeedback:
     followed = [_moved_by(name, plant, driven) for name in driven]
     limits, none = [plant.limits(name) for name in driven], [0.0] * len(driven)
     lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
+    length = rest_length_of(plant)
+    channels = [
+        next((one for one in references if match(one, [own], length)), own)
+        for own in channels_of(plant, followed)
+    ]
     return PIDFeedback.of(
-        _channels(followed), _channels(driven), none, none, limits=(float(lowest), float(highest))
+        tuple(channels),
+        channels_of(plant, driven),
+        none,
+        none,
+        limits=(float(lowest), float(highest)),
     )
 
 
@@ -138,10 +149,6 @@ def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
             "Remedy: use the compensator alone, or another rig."
         )
     return found[0]
-
-
-def _channels(names: Sequence[str]) -> tuple[Channel, ...]:
-    return tuple(Channel(name, standard_unit(name) or "") for name in names)
 
 
 def _steepest(response: Array, ramp: Array, size: float) -> float:

@@ -47,6 +47,9 @@ class Ends(NamedTuple):
     high: float
 
 
+ANY = Ends(-np.inf, np.inf)
+
+
 class Twin:
     """A fitted model as a plant, on which a compensator can be tried as on a rig.
 
@@ -67,6 +70,8 @@ class Twin:
         In tables and recordings.
     scatter_after : float
         Time from which it scatters [s].
+    rest_length : float, optional
+        Length of the muscle where its displacement is 0 [mm].
 
     Raises
     ------
@@ -95,9 +100,10 @@ class Twin:
         sample_time: float | None = None,
         name: str = "twin",
         scatter_after: float = 0.0,
+        rest_length: float | None = None,
     ) -> None:
         self.model, self.name, self.scatter_after = model, name, scatter_after
-        self.forward = inside(model)
+        self.forward, self.rest_length = inside(model), rest_length
         outputs = tuple(channel.name for channel in self.forward.outputs)
         if commands(self.forward) or any(map(drives, self.forward.outputs)):
             raise ModelError(
@@ -106,6 +112,8 @@ class Twin:
             )
         self.outputs = outputs
         self.inputs = tuple(plain(c.name) for c in self.forward.inputs)
+        ends = (*self.forward.inputs, *self.forward.outputs)
+        self.units = {plain(channel.name): channel.unit for channel in ends}
         own = self.forward.sample_time
         self.sample_time = float(sample_time or own or 0.02)
         if own is not None and abs(self.sample_time - own) > 1e-9 * own:
@@ -176,12 +184,11 @@ class Twin:
         ModelError
             If the model does not take the sample time.
         """
-        held, step, after = dict(self.held), self.sample_time, self.scatter_after
+        held = dict(self.held)
+        own = {"sample_time": self.sample_time, "scatter_after": self.scatter_after}
         for setting, value in settings.items():
-            if setting == "sample_time":
-                step = float(value)
-            elif setting == "scatter_after":
-                after = float(value)
+            if setting in own:
+                own[setting] = float(value)
             elif setting.startswith("start."):
                 held[setting.removeprefix("start.")] = float(value)
             else:
@@ -189,19 +196,16 @@ class Twin:
                     f"a twin has no setting {setting!r}",
                     remedy="give sample_time, scatter_after, or start.NAME",
                 )
+        given, length = self._given, self.rest_length
         return type(self)(
-            self.model,
-            limits=self._given,
-            held=held,
-            sample_time=step,
-            name=self.name,
-            scatter_after=after,
+            self.model, limits=given, held=held, name=self.name, rest_length=length, **own
         )
 
     def reset(self, seed: int = 0) -> Array:
         """Bring it to rest, lowest commands and all else as held, and return the first measurement."""
         self._begin(seed)
-        return self._measured(self._at_rest())
+        self._rest = np.array([self._resting(name) for name in self.inputs])
+        return self._measured(self._rest)
 
     def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
         """Hold commands for one sample time and return the next measurement, shape (outputs,).
@@ -234,7 +238,7 @@ class Twin:
                 raise DataError(
                     f"an action has shape {row.shape}", remedy=f"give {', '.join(self.inputs)}"
                 )
-        return self._measured(self._limited(row))
+        return self._measured(row)
 
     def run(self, inputs: Recording, seed: int = 0, *, ideal: bool = False) -> Recording:
         """Run it over a recording of its inputs, as ``model.simulate`` does, with its scatter.
@@ -254,7 +258,7 @@ class Twin:
             inputs[name] if name in inputs else np.full(len(inputs), twin._resting(name))
             for name in twin.inputs
         ]
-        found = np.array([twin._measured(twin._limited(row)) for row in np.column_stack(columns)])
+        found = np.array([twin._measured(row) for row in np.column_stack(columns)])
         given = dict(zip(twin.inputs, columns, strict=True))
         return Recording(
             given | dict(zip(twin.outputs, found.T, strict=True)),
@@ -265,6 +269,9 @@ class Twin:
 
     def _begin(self, seed: int, *, ideal: bool = False) -> None:
         rng = generator(seed)
+        free = self.driving.difference(self.held)
+        ends = [self._limits[n] if n in free & set(self._limits) else ANY for n in self.inputs]
+        self._clips = np.transpose(ends)  # what the hardware lets through
         self._scatter = None
         if isinstance(self.model, Banded) and not ideal:
             self._scatter = _Scatter(
@@ -280,10 +287,6 @@ class Twin:
         named = {plain(channel.name) for channel in self.forward.inputs if drives(channel)}
         return named or set(self.inputs).difference(self.held)
 
-    def _at_rest(self) -> Array:
-        self._rest = np.array([self._resting(name) for name in self.inputs])
-        return self._rest
-
     def _resting(self, name: str) -> float:
         if name in self.held:
             return self.held[name]
@@ -295,16 +298,10 @@ class Twin:
             )
         return self.limits(name).low
 
-    def _limited(self, row: Array) -> Array:
-        """Clip commands to what the hardware lets through."""
-        for place, name in enumerate(self.inputs):
-            if name in self.driving and name in self._limits and name not in self.held:
-                row[place] = min(max(row[place], self._limits[name].low), self._limits[name].high)
-        return row
-
     def _measured(self, row: Array) -> Array:
         assert self._stream is not None
-        found = self._stream.step(row)
+        low, high = self._clips
+        found = self._stream.step(np.minimum(np.maximum(row, low), high))
         if self._stream.status != Stream.GOOD:
             raise ModelError(
                 f"{self.forward.title!r} gives no finite output at {', '.join(f'{x:g}' for x in row)}. "

@@ -8,16 +8,23 @@ more muscles than motions pull against each other, each rises alone, and moves a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.base import Block
 from mckibben.control.controller import Controller
-from mckibben.control.loop import track
-from mckibben.control.roles import Plant, actuated, followed_by
-from mckibben.errors import ModelError
+from mckibben.control.loop import Tracked, track
+from mckibben.control.roles import Plant, asked, followed_by, roles
+from mckibben.control.suiting import doubts
+from mckibben.errors import MckibbenError, ModelError
 from mckibben.recording import Recording
+
+UNCOMPENSATED = "no compensation"
+"""What that is called in tables and pictures."""
 
 RISE = 30.0
 """Time in which pressures rise [s]: slow beside air and creep of a loop's length."""
@@ -30,72 +37,33 @@ SMALLEST = 1e-3
 
 
 @dataclass
-class Ramp(Controller):
-    """All commands from lowest to highest, evenly in so many steps."""
+class Rule(Controller):
+    """Commands that a function gives for the reference alone."""
 
-    low: Array
-    high: Array
-    steps: int
-
-    def reset(self, sample_time: float) -> None:
-        self._done = 0
-
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        share = min(self._done / self.steps, 1.0)
-        self._done += 1
-        return self.low + share * (self.high - self.low)
-
-
-@dataclass
-class StaticMap(Controller):
-    """References read off curves, one a muscle.
-
-    Parameters
-    ----------
-    curves : sequence of (array, array)
-        Displacement [mm], or force [N], rising, and the command there [bar].
-    """
-
-    curves: list[tuple[Array, Array]]
+    commands: Callable[[Array], Array]
 
     def reset(self, sample_time: float) -> None:
         """Do nothing: it has no memory."""
 
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        pairs = zip(reference, self.curves, strict=True)
-        return np.array([np.interp(wanted, *curve) for wanted, curve in pairs])
+    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
+        return self.commands(reference)
 
 
-@dataclass
-class StraightMap(Controller):
-    """References by straight lines, one a muscle and motion, and of all commands the smallest.
+def straight(rest: Array, slopes: Array, low: Array, high: Array) -> Callable[[Array], Array]:
+    """Return a rule of straight lines, which gives of all commands the smallest.
 
-    Parameters
-    ----------
-    rest : array, shape (m,)
-        What is followed, where all commands are lowest.
-    slopes : array, shape (m, n)
-        Of what is followed over the commands.
-    low, high : array, shape (n,)
-        Commands.
+    At the lowest commands what is followed is at ``rest``, shape (m,), and its slopes have shape (m, n).
     """
+    from scipy.optimize import lsq_linear  # slow to load
 
-    rest: Array
-    slopes: Array
-    low: Array
-    high: Array
+    small = SMALLEST * float(np.abs(slopes).max()) * np.eye(low.size)
 
-    def reset(self, sample_time: float) -> None:
-        """Do nothing: it has no memory."""
+    def commands(reference: Array) -> Array:
+        wanted = np.concatenate([reference - rest, np.zeros(low.size)])
+        limits = (0.0, high - low)
+        return low + lsq_linear(np.vstack([slopes, small]), wanted, limits, method="bvls").x
 
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        from scipy.optimize import lsq_linear  # slow to load
-
-        small = SMALLEST * float(np.abs(self.slopes).max()) * np.eye(self.low.size)
-        wanted = np.concatenate([reference - self.rest, np.zeros(self.low.size)])
-        limits = (0.0, self.high - self.low)
-        found = lsq_linear(np.vstack([self.slopes, small]), wanted, limits, method="bvls")
-        return np.asarray(self.low + found.x)
+    return commands
 
 
 def slow_rise(
@@ -130,26 +98,34 @@ def slow_rise(
     DataError, ModelError
         As of `track`.
     """
-    followed = followed_by(plant, reference)
-    held = [name for name in plant.inputs if name in reference]
-    driven = actuated(plant, held)
-    ends = np.array([[plant.limits(name).low, plant.limits(name).high] for name in driven])
+    followed, driven, held = _roles(plant, reference)
+    low, high = _limits(plant, driven)
     if only is not None:
-        ends[:, 1] = np.where([name == only for name in driven], ends[:, 1], ends[:, 0])
+        high = np.where([name == only for name in driven], high, low)
     steps = round(RISE / (reference.sample_time or 1.0))
     first = {name: np.full(steps + 2, reference[name][0]) for name in (*followed, *held)}
-    ramp = Ramp(ends[:, 0], ends[:, 1], steps)
+    shares = np.minimum(np.arange(steps + 2) / steps, 1.0)
+    rise = low + shares[:, np.newaxis] * (high - low)
+    rows = iter(rise)
     given = Recording(first, reference.sample_time, {n: reference.units[n] for n in first})
+    ramp = Rule(lambda _: next(rows))
     found = track(
         ramp, plant, given, approach=0.0, pressure_loop=pressure_loop, seed=seed
     ).recording
-    share = np.arange(steps + 1) / steps
-    commands = {
-        name: low + share * (high - low) for name, (low, high) in zip(driven, ends, strict=True)
-    }
-    channels = {name: first[name][:-1] for name in held} | commands
+    channels = {name: first[name][:-1] for name in held}
+    channels |= dict(zip(driven, rise[:-1].T, strict=True))
     channels |= {name: found[name][1:] for name in followed}
     return Recording(channels, reference.sample_time)
+
+
+def _roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str], list[str]]:
+    """Return what is followed, what is driven, and what is held."""
+    return followed_by(plant, reference), *roles(plant, reference)
+
+
+def _limits(plant: Plant, driven: list[str]) -> tuple[Array, Array]:
+    ends = [plant.limits(name) for name in driven]
+    return np.array([end.low for end in ends]), np.array([end.high for end in ends])
 
 
 def uncompensated(
@@ -177,32 +153,21 @@ def uncompensated(
     ModelError
         If something does not move.
     """
-    followed = followed_by(plant, reference)
-    driven = actuated(plant, [name for name in plant.inputs if name in reference])
+    followed, driven, _ = _roles(plant, reference)
     if len(followed) != len(driven):
-        slopes, rests = [], []
+        found = []
         for name in driven:
             alone = slow_rise(plant, reference, only=name, pressure_loop=pressure_loop, seed=seed)
-            line = np.polynomial.polynomial.polyfit(
-                alone[name] - alone[name][0], alone.matrix(followed), 1
-            )
-            rests.append(line[0])
-            slopes.append(line[1])
-        ends = [plant.limits(name) for name in driven]
-        low, high = (np.array([getattr(each, end) for each in ends]) for end in ("low", "high"))
-        return StraightMap(np.mean(rests, axis=0), np.column_stack(slopes), low, high)
-    return StaticMap([curve(rise[u], rise[y], y) for u, y in zip(driven, followed, strict=True)])
+            risen = alone[name] - alone[name][0]
+            found.append(np.polynomial.polynomial.polyfit(risen, alone.matrix(followed), 1))
+        rests, slopes = np.transpose(found, (1, 2, 0))
+        return Rule(straight(rests.mean(axis=1), slopes, *_limits(plant, driven)))
+    curves = [curve(rise[u], rise[y], y) for u, y in zip(driven, followed, strict=True)]
+    return Rule(lambda y: np.array([np.interp(x, *one) for x, one in zip(y, curves, strict=True)]))
 
 
 def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
     """Return a monotone curve of a slow rise: what is moved, rising, and the command there.
-
-    Parameters
-    ----------
-    command, moved : array, shape (n,)
-        Of the rise.
-    name : str
-        Of what is moved.
 
     Raises
     ------
@@ -223,3 +188,55 @@ def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
     at = np.bincount(of, command) / np.bincount(of)  # of a stretch that is flat, its middle
     knots = np.linspace(places[0], places[-1], KNOTS)
     return knots, np.interp(knots, places, at)
+
+
+@dataclass(frozen=True)
+class Before:
+    """What is to be known before a compensator is believed.
+
+    Parameters
+    ----------
+    tracked : Tracked or None
+        What no compensation makes of the reference: pressures read off the plant's own slow rise. None
+        where that cannot be.
+    notes : tuple of str
+        Whether plant and compensator are of one muscle, and why nothing was tracked.
+    """
+
+    tracked: Tracked | None
+    notes: tuple[str, ...]
+
+    def beside(self, recording: Recording) -> Recording:
+        """Return a loop's recording with what no compensation gave, as ``uncompensated_...``."""
+        if self.tracked is None:
+            return recording
+        units, without = recording.units, self.tracked.recording
+        return recording.with_channels(
+            {f"uncompensated_{name}": units[name] for name in self.tracked.rmse},
+            **{f"uncompensated_{name}": without[name] for name in self.tracked.rmse},
+        )
+
+
+def before(compensator: Block, plant: Plant, reference: Recording, **settings: Any) -> Before:
+    """Let a plant follow a reference without compensation, and look whether a compensator is of it.
+
+    Parameters
+    ----------
+    compensator : Block
+        What is to be tried.
+    plant : Plant
+    reference : Recording
+    **settings
+        As of `track`; a preview is passed over, for no dead time is undone.
+    """
+    settings.pop("preview", None)
+    reference = asked(plant, reference, compensator)
+    few = {name: settings[name] for name in ("pressure_loop", "seed") if name in settings}
+    notes: list[str] = []
+    try:
+        rise = slow_rise(plant, reference, **few)
+        notes += doubts(compensator, plant, rise)
+        controller = uncompensated(plant, reference, rise, **few)
+        return Before(track(controller, plant, reference, **settings), tuple(notes))
+    except MckibbenError as error:
+        return Before(None, (*notes, f"there is no run without compensation: {error}"))

@@ -16,6 +16,7 @@ from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column, Table
 from mckibben.files.units import find, weight
+from mckibben.recording import REST_LENGTH, conversion
 
 
 @dataclass(frozen=True)
@@ -252,10 +253,12 @@ def _require(named: Mapping[str, Column], source: Source) -> None:
     """Refuse channels that are asked for and not there."""
     request, table = source.request, source.table
     for channel in request.channels or ():
-        if channel not in named:
+        if channel not in named and channel not in source.derived(named):
             hint = matrix_hint(table, time="time" not in named)
             problem = f"there is no such channel; the columns are {_headers(table)}"
             remedy = f"name its column with --column {channel}=COLUMN{hint}"
+            if others := [name for name in named if conversion(channel, name, 1.0)]:
+                remedy = f"state {REST_LENGTH}, which makes it of {others[0]}"
             raise source.error(problem, remedy, channel)
     for option, given in (("--calibrate", request.calibration), ("--unit", request.units)):
         for channel in given:

@@ -19,6 +19,7 @@ from mckibben.files.notices import listed
 from mckibben.files.request import Source
 from mckibben.files.table import Column
 from mckibben.files.units import COUNTS, Unit, convert, find, weight
+from mckibben.recording import REST_LENGTH, conversion, standard_unit
 
 ASSUMED = "no unit is given, so these are assumed: "
 """Beginning of a note on assumed units."""
@@ -74,11 +75,14 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
         left_out[clock.header], clock = "the rate is given", None
     times = None if clock is None else times_of(clock, source)
     signals: dict[str, Signal] = {}
+    derived = source.derived(columns)
     for name, column in columns.items():
         try:
             signals[name] = _signal(name, column, source)
         except DataError as error:
-            if request.needs(name) and (unit_of(name) is not None or request.asks_for(name)):
+            if name in derived.values() or (
+                request.needs(name) and (unit_of(name) is not None or request.asks_for(name))
+            ):
                 raise
             left_out[column.header] = error.problem
     if not signals:
@@ -106,7 +110,23 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     if left_out and not source.table.own:
         reasons = [f"{header} ({why})" for header, why in left_out.items()]
         source.warn(f"not read: {listed(reasons)}")
+    signals |= {name: _derived(name, of, signals[of], source) for name, of in derived.items()}
     return signals, times, {name: found for name, found in meta.items() if found}
+
+
+def _derived(channel: str, of: str, signal: Signal, source: Source) -> Signal:
+    """Return a channel that another and the rest length give."""
+    line = conversion(channel, of, source.rest_length)
+    assert line is not None
+    samples = line[0] * signal.samples + line[1]
+    largest = np.nanmax(np.abs(samples), initial=0.0)
+    if channel.startswith("contraction") and largest >= 1.0:
+        raise source.error(
+            f"{of} and a rest length of {source.rest_length:g} mm make it {largest:g}",
+            "give the rest length in millimetres: a contraction is below 1",
+            channel,
+        )
+    return replace(signal, samples=samples, unit=standard_unit(channel) or "", calibration={})
 
 
 def _with_clocks(source: Source) -> Source:
@@ -226,6 +246,8 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
         return unit, False
     if unit.target in ("V", "A") or text.casefold() in COUNTS:
         remedy = f"calibrate it, as in {_option(channel, column, expected)}, or in {NAME}"
+    elif expected == "" and unit.target == "mm":
+        remedy = _in_mm(column)
     elif weight(text) != text:
         remedy = f"where it is the weight of that mass, use --unit {channel}={weight(text)}"
     else:
@@ -236,6 +258,12 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
     problem = f"in {text!r}, which does not convert to" if text else "without a unit: it is in"
     problem = f"it cannot be {problem} {expected or 'a pure number'}"
     raise source.error(problem, remedy, channel)
+
+
+def _in_mm(column: Column) -> str:
+    """Return the remedy for a contraction in millimetres."""
+    named = shlex.quote(f"displacement={column.header}")
+    return f"read it by --column {named} --unit displacement=mm, and state {REST_LENGTH}"
 
 
 def _option(channel: str, column: Column, unit: str) -> str:
@@ -284,9 +312,13 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> Uni
     if 0 < largest < plausible.least or largest > plausible.most:
         units = quality.fitting_units(largest, expected, expected)
         options = " or ".join(f"--unit {channel}={unit}" for unit in units)
+        as_it_is = f"--unit {channel}={expected or 1} where that is right"
+        remedy = f"name its unit, as in {options}, or {as_it_is}"
+        if expected == "":
+            remedy += f"; where it is in mm, {_in_mm(column)}"
         raise source.error(
             f"it has no unit, and reaches {largest:.3g}: is it in {' or '.join(units)}?",
-            f"name its unit, as in {options}, or --unit {channel}={expected or 1} where that is right",
+            remedy,
             channel,
         )
     return Unit(expected, expected)

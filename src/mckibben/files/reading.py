@@ -39,6 +39,7 @@ def read(
     constants: Mapping[str, tuple[float, str]] | None = None,
     most: float = MOST_BYTES,
     raw: bool = False,
+    rest_length: float | None = None,
 ) -> list[Recording]:
     """Read the recordings in a file, by its ending, or in a folder.
 
@@ -81,6 +82,9 @@ def read(
         Largest file that is read [bytes].
     raw : bool
         Whether codes for missing samples, and counters that seem to wrap, are read as measured.
+    rest_length : float, optional
+        Length of the muscle where its displacement is 0 [mm], kept in ``meta``: where ``channels``, or
+        models, ask for a contraction, displacement or length, another of these gives it.
 
     Returns
     -------
@@ -114,6 +118,7 @@ def read(
         constants or {},
         most,
         raw,
+        rest_length,
     )
     request.check(Path(path))
     return [each for one in sources.inside(Path(path)) for each in _read(one, request)[0]]
@@ -202,6 +207,8 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
     for key in ("calibration", "pressure_reference"):  # of channels that are not calibrated now
         if isinstance(before := table.meta.get(key), Mapping):
             meta[key] = {c: v for c, v in before.items() if c not in now} | meta.get(key, {})
+    if source.rest_length is not None:
+        meta["rest_length"] = source.rest_length
     meta = {**table.meta, **meta, "file": str(path), "sha256": digest}
     if table.name is not None:
         meta["name"] = f"{path.stem}[{table.name}]"

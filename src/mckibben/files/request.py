@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from mckibben.files.formats import MOST_BYTES
 from mckibben.files.headers import parse, snake_case
 from mckibben.files.notices import warn
 from mckibben.files.table import Table
+from mckibben.recording import conversion
 
 FEWEST = 10
 """Fewest samples of a recording, or of a stretch of one, that can show a loop."""
@@ -36,6 +37,7 @@ class Request:
     constants: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     most: float = MOST_BYTES
     raw: bool = False
+    rest_length: float | None = None
     described: Described = field(default_factory=Described)
 
     @property
@@ -96,6 +98,9 @@ class Request:
         if self.rate is not None and not 0 < self.rate < math.inf:
             problem = f"a rate of {self.rate:g} samples per second is impossible"
             raise error(problem, remedy="give a positive number with --rate")
+        if self.rest_length is not None and not 0 < self.rest_length < math.inf:
+            problem = f"a rest length of {self.rest_length:g} mm is impossible"
+            raise error(problem, remedy="give a positive number of millimetres with --rest-length")
         for channel, (value, _) in self.constants.items():
             if not math.isfinite(value) or channel in ("", "time", *self.columns):
                 remedy = "give a finite number, to a channel that is no column and not time"
@@ -113,6 +118,21 @@ class Source:
     table: Table
     request: Request
     path: Path
+
+    @property
+    def rest_length(self) -> float | None:
+        """Rest length asked for, or else that in the file [mm]."""
+        given = self.request.rest_length or self.table.meta.get("rest_length")
+        return float(given) if isinstance(given, int | float) and given > 0 else None
+
+    def derived(self, named: Iterable[str]) -> dict[str, str]:
+        """Return the channels asked for that others and the rest length give, each with the other."""
+        found: dict[str, str] = {}
+        for wanted in self.request.channels or ():
+            others = [n for n in named if conversion(wanted, n, self.rest_length) is not None]
+            if others and wanted not in others:
+                found[wanted] = others[0]
+        return found
 
     def error(
         self, problem: str, remedy: str, channel: str | None = None, sample: int | None = None

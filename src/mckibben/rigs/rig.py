@@ -102,6 +102,11 @@ class Rig(DrawsItself, Section, ABC):
         """Channels that it measures: what there are sensors for."""
         return tuple(name for name in self.measurable if name in self.sensor)
 
+    @property
+    def rest_length(self) -> float | None:
+        """Length of its muscles at rest [mm]."""
+        return self.known().get("rest_length")
+
     @abstractmethod
     def build(self) -> System:
         """Return the muscles, regulator and mechanism."""

@@ -72,7 +72,8 @@ def closed_loops(
     reference = _followed(tests, board.outputs, held)
     step = reference.sample_time or 0.05
     scheduled = {name: float(reference[name][0]) for name in held}
-    pid = tune_pid(rig, sample_time=step, scheduled=scheduled, seed=seed)
+    asked = inverses[chosen].inputs
+    pid = tune_pid(rig, sample_time=step, scheduled=scheduled, references=asked, seed=seed)
     laws = [(f"{model} inverse", "feedforward", model) for model in inverses]
     laws += [("PID", "pid", chosen), (f"{chosen} inverse + PID", "feedforward-pid", chosen)]
     found: dict[str, Tracked] = {}

@@ -331,10 +331,10 @@ def training_data(
         On no recordings, absent channels, too few samples, a constant input or output, or sample
         times that differ.
     """
-    every = listed(recordings)
     driven, given = (
         (names,) if isinstance(names, str) else tuple(names) for names in (inputs, outputs)
     )
+    every = [one.with_derived([*driven, *given, *scheduling]) for one in listed(recordings)]
     if not every:
         raise DataError("there are no recordings to fit", remedy="give at least one")
     if same := set(driven) & set(given):

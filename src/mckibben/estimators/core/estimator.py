@@ -28,7 +28,7 @@ from mckibben.estimators.core.uncertainty import (
     vanishing,
 )
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
-from mckibben.recording import Recording, listed
+from mckibben.recording import REST_LENGTH, Recording, conversion, listed
 from mckibben.signals.checking import LARGEST_SEED
 from mckibben.system.progress import telling
 from mckibben.system.threads import one_blas_thread
@@ -55,14 +55,6 @@ Start = Literal["first_sample", "virgin"]
 
 Initial = Literal[Start, "fitted"]
 """The same, or fitted with the rest."""
-
-MADE_OF_DISPLACEMENT = {
-    "length": ", and a length is the rest length less the displacement: read that column as length, "
-    "with gain -1 and the rest length as offset",
-    "contraction": ", and a contraction is the displacement over the rest length: read that column as "
-    "contraction, with a gain of 1 over the rest length",
-}
-"""How to get a channel from a displacement."""
 
 
 @dataclass(frozen=True)
@@ -247,9 +239,11 @@ class Estimator(ABC):
         (given,), (wanted,) = inputs, outputs
         kinds = (given.partition("_")[0], wanted.partition("_")[0])
         if cls.made_for is not None and kinds != cls.made_for:
-            nearly = kinds == ("displacement", cls.made_for[1])
-            made = MADE_OF_DISPLACEMENT.get(cls.made_for[0], "") if nearly else ""
-            return f"it maps {cls.made_for[0]} to {cls.made_for[1]}{made}"
+            nearly = kinds[1] == cls.made_for[1] and conversion(cls.made_for[0], kinds[0], 1.0)
+            made = (
+                f": name that as the input, and state {REST_LENGTH}, which makes it of {kinds[0]}"
+            )
+            return f"it maps {cls.made_for[0]} to {cls.made_for[1]}{made if nearly else ''}"
         needed = cls(input=given, output=wanted)._told_channels()
         absent = [name for name in needed if any(name not in r for r in recordings)]
         if absent:

@@ -54,7 +54,7 @@ def run(experiment: Experiment) -> None:
     stages: dict[str, dict[Condition, Recording]] = {"static": {}, "hysteresis": {}, "random": {}}
     for name, recording in runs.items():
         condition = (float(runs.of(name, "force")), float(runs.of(name, "frequency")))
-        stages[runs.of(name, "stage")][condition] = with_contraction(recording)
+        stages[runs.of(name, "stage")][condition] = recording.with_derived(["contraction"])
     slow, sines, waves = (dict(sorted(stage.items())) for stage in stages.values())
     train = [*slow.values(), *sines.values()]
     experiment.tell(0.82, "the paper's model")
@@ -101,29 +101,13 @@ KINDS = (
 """Runs of the protocol at a force: how their names begin and end."""
 
 
-def with_contraction(recording: Recording) -> Recording:
-    """Return a recording with the contraction, if it has the displacement and the length at rest."""
-    if "contraction" in recording:
-        return recording
-    rest = recording.meta.get("rest_length")
-    if rest is None or "displacement" not in recording:
-        raise DataError(
-            "the contraction is not known",
-            file=recording.source,
-            channel="contraction",
-            remedy="give --rest-length with a displacement, or a column contraction",
-        )
-    contraction = recording["displacement"] / float(rest)
-    return recording.with_channels({"contraction": ""}, contraction=contraction)
-
-
 REPEATS = 0.1
 """Share of the range by which peaks of a sine differ at most: those of a random wave differ by more."""
 
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     """Tell slow cycles, sines and random waves apart, by the pressure, and under which force each is."""
-    whole = [with_contraction(one) for one in recordings]
+    whole = [one.with_derived(["contraction"]) for one in recordings]
     runs = training_data(whole, "contraction", "pressure", None, ("force",)).runs
     forces = {i: force for force, own in by_force(runs).items() for i in own}
     swings = training_data(whole, "pressure", "contraction", None, ("force",)).runs

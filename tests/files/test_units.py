@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import mckibben
 from tests.files.made import one, place, put, refused
 
 FACTORS = {
@@ -106,3 +107,47 @@ def test_impossible_values_are_refused_and_the_proposed_unit_is_read(
 def test_nothing_rounding_and_small_values_are_read(tmp_path: Path, header: str, cell: str) -> None:
     path = put(tmp_path / "a.csv", f"t_s;{header}", range(20), [cell] * 20, separator=";")
     assert len(one(path)) == 20
+
+
+@pytest.mark.parametrize(
+    ("header", "factor", "offset"),
+    [
+        ("displacement_2 (cm)", 10.0, 0.0),
+        ("contraction_2 (%)", 5.0, 0.0),
+        ("length_2 (mm)", -1.0, 500.0),
+    ],
+)
+def test_the_rest_length_makes_each_measure_of_a_motion_of_another(
+    tmp_path: Path, header: str, factor: float, offset: float
+) -> None:
+    displacement = 1.0 + np.arange(20.0)
+    cells = (displacement - offset) / factor
+    path = put(tmp_path / "a.csv", f"t_s,{header}", range(20), cells)
+    measures = {
+        "displacement_2": displacement,
+        "contraction_2": displacement / 500,
+        "length_2": 500 - displacement,
+    }
+    for channel, expected in measures.items():
+        found = one(path, channels=[channel], rest_length=500.0)
+        assert found[channel] == pytest.approx(expected)
+        assert found.rest_length == 500.0
+        assert found.matrix(measures) == pytest.approx(np.column_stack([*measures.values()]))
+        mckibben.write(found, tmp_path / "own.csv")
+        assert one(tmp_path / "own.csv", channels=[*measures])[channel] == pytest.approx(expected)
+        if channel not in one(path):
+            assert "--rest-length" in refused(path, channels=[channel]).remedy
+
+
+def test_millimetres_called_a_contraction_are_refused_with_what_reads_them(tmp_path: Path) -> None:
+    displacement = 6.0 + np.arange(20.0)
+    path = put(tmp_path / "a.csv", "t_s,contraction", range(20), displacement)
+    for options in ({}, {"units": {"contraction": "mm"}}):
+        remedy = refused(path, **options).remedy
+        assert "--column displacement=contraction --unit displacement=mm" in remedy
+        assert "--rest-length" in remedy
+    named = {"columns": {"displacement": "contraction"}, "units": {"displacement": "mm"}}
+    found = one(path, channels=["contraction"], rest_length=500.0, **named)
+    assert found["contraction"] == pytest.approx(displacement / 500)
+    assert "millimetres" in refused(path, channels=["contraction"], rest_length=0.5, **named).remedy
+    assert refused(path, rest_length=-1.0).remedy

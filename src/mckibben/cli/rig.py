@@ -94,16 +94,28 @@ def _setting(name: str, kind: str, default: Any) -> str:
 @app.command()
 def show(
     name: Name,
+    changes: Changes = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="File to write it to (.toml), as your own rig."),
+    ] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Show every parameter of a rig with its unit, meaning and range, as the text of its file.
 
-    Save it under a name of your own, change it, and give that file wherever a rig is asked for.
+    With -o it becomes a rig of your own, which is given by its file wherever a rig is asked for.
     """
-    from mckibben.rigs import describe, load_rig
+    from mckibben.outputs import claim, never
+    from mckibben.rigs import describe, save_rig
 
-    rig = load_rig(name)
-    if as_json:
+    if out is not None:
+        claim(out, never, inputs=[Path(name)], force=force)
+    rig = _changed(name, changes)
+    if out is not None:
+        save_rig(rig.changed({"name": out.stem}), out)
+        say(f"Written: {out}")
+    elif as_json:
         print_json(rig.model_dump(mode="json"))
     else:
         say(describe(rig), end="")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.recording import Recording
+from mckibben.rigs import Rig
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
 from mckibben.signals.protocol import Protocol, Role, Run
@@ -29,17 +30,27 @@ STATIC_PERIOD = 60.0
 STATIC_HIGH = 4.0
 """Of the slow cycle: its time [s], and its highest pressure [bar]."""
 
+RANGE = 5.0
+"""Highest pressure of the rig [bar]."""
+
 CYCLES = 8
 RANDOM_TIME = 20.0
 
 
-def activation_pressure() -> Protocol:
-    """Return slow cycles, sines and random waves at every force."""
+def activation_pressure(rig: Rig | None = None) -> Protocol:
+    """Return slow cycles, sines and random waves at every force, in shares of the ranges of a rig."""
+    stronger, wider = 1.0, 1.0
+    if rig is not None:
+        stronger = rig.limits("force").high / FORCES[-1]
+        wider = rig.limits("pressure").high / RANGE
     runs = []
-    for force in FORCES:
-        low, high = (10 * float(np.polyval(cubic, force)) for cubic in (LOWEST, HIGHEST))
+    for paper_force in FORCES:
+        force = stronger * paper_force
+        low, high = (
+            10 * wider * float(np.polyval(cubic, paper_force)) for cubic in (LOWEST, HIGHEST)
+        )
         time = np.arange(round(STATIC_PERIOD / SAMPLE_TIME) + 1) * SAMPLE_TIME
-        wave = sine(time, STATIC_PERIOD, STATIC_HIGH)
+        wave = sine(time, STATIC_PERIOD, wider * STATIC_HIGH)
         runs.append(_run(f"static-{force:.0f}N", "train", wave, force, 0.0, "static"))
         for frequency in FREQUENCIES:
             time = np.arange(round(CYCLES / frequency / SAMPLE_TIME) + 1) * SAMPLE_TIME

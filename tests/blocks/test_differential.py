@@ -20,7 +20,7 @@ from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EIGHTEEN, MultistateFriction
 from mckibben.blocks.hysteresis.differential import BoucWen, GeneralizedBoucWen
 from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator, DuhemOscillator
-from mckibben.papers.multistate_friction.published import multistate_friction, static_force
+from mckibben.papers.multistate_friction.printed import multistate_friction, static_force
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.blocks.memoryless import Affine, Negative
 from mckibben.papers.field_models.published import process_model
-from mckibben.papers.multistate_friction.published import static_force
+from mckibben.papers.multistate_friction.printed import static_force
 from mckibben.registry import load
 
 STEP = 0.01

@@ -10,7 +10,7 @@ from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.control import Twin, track
-from mckibben.papers.multistate_friction.published import static_force
+from mckibben.papers.multistate_friction.printed import static_force
 from tests.cli.conftest import cli as cli  # a fixture
 
 LAW = static_force()

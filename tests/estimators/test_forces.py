@@ -20,7 +20,7 @@ from mckibben.estimators.force.laws import (
 )
 from mckibben.estimators.force.multistate import MultistateEstimator, extract_hysteresis
 from mckibben.papers.activation_pressure.printed import activation_pressure
-from mckibben.papers.multistate_friction.published import static_force
+from mckibben.papers.multistate_friction.printed import static_force
 from tests.estimators.test_balance import recording
 
 TRUTH = MultistateFriction(

@@ -9,9 +9,6 @@ from __future__ import annotations
 from mckibben.blocks.force.laws import PolynomialForce
 from mckibben.blocks.force.multistate_friction import ELEVEN, MultistateFriction
 
-REFERENCE = 4.0
-"""Pressure at which the friction was identified [bar], Section 4."""
-
 
 def static_force() -> PolynomialForce:
     """Return the bilinear-quadratic law, Eq. (3) and Table 1: a_1 + a_3 l, and a_0 + a_2 l + a_4 l^2."""
@@ -19,7 +16,7 @@ def static_force() -> PolynomialForce:
 
 
 def multistate_friction() -> MultistateFriction:
-    """Return the friction of eleven parameters, Eqs. (4) to (6) and Table 2, in mm instead of m."""
+    """Return the friction at 4 bar, Eqs. (4) to (6) and Table 2, in mm instead of m."""
     return MultistateFriction(
         elements=ELEVEN,
         values=(
@@ -27,5 +24,5 @@ def multistate_friction() -> MultistateFriction:
             *(34.738, 1.006e-3, 13.431),
             *(0.100e-3, 0.988e-3, 1.256),
         ),
-        reference_pressure=REFERENCE,
+        reference_pressure=4.0,
     )

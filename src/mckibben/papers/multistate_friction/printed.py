@@ -21,8 +21,7 @@ def multistate_friction() -> MultistateFriction:
         elements=ELEVEN,
         values=(
             *(18.214, 4.987e-3, 128.795, 3.982e-3, 103.096),
-            *(34.738, 1.006e-3, 13.431),
-            *(0.100e-3, 0.988e-3, 1.256),
+            *(34.738, 1.006e-3, 13.431, 0.100e-3, 0.988e-3, 1.256),
         ),
         reference_pressure=4.0,
     )

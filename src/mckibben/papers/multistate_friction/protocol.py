@@ -16,7 +16,9 @@ from mckibben.rigs import Rig
 from mckibben.signals.excitations import irregular_triangle, triangle
 from mckibben.signals.protocol import Protocol, Role, Run
 
-SAMPLE_TIME = 0.02
+SAMPLE_TIME, LONGEST, HIGHEST = 0.02, 200.0, 6.0
+"""Time between samples [s]; length at rest [mm] and highest pressure [bar] of the paper's muscle."""
+
 FIRST = (0.0, 0.8, 1.2, 1.6, 1.9, 2.2, 2.4, 2.7, 3.0)
 LENGTHS = dict(zip(np.arange(200.0, 183.0, -2.0).tolist(), FIRST, strict=True))
 """Held in the isometric tests [mm], and the pressure from which each starts, where the muscle is just
@@ -25,48 +27,27 @@ taut [bar]: below, it would move. Shorter ones go slack while their friction is 
 SHORTEST = {1.0: 198.2, 2.0: 194.2, 3.0: 189.7, 4.0: 185.0, 5.0: 180.5, 6.0: 176.5}
 """Where each isobaric cycle turns [mm], by pressure [bar]: just before the muscle goes slack."""
 
-LONGEST, HIGHEST = 200.0, 6.0
-"""Length at rest [mm] and highest pressure [bar] of the paper's muscle."""
-
-IDENTIFIED_AT = 4.0
-"""Pressure whose loop identifies the friction [bar]."""
-
-SPEED = 2.0
-"""Of the screw [mm/s]."""
-
-CYCLES = 3
-RISE = 60.0
-"""Time in which the pressure rises to the highest [s]."""
+IDENTIFIED_AT, SPEED, CYCLES = 4.0, 2.0, 3
+"""Pressure whose loop identifies the friction [bar]; speed of the screw [mm/s], and cycles of a run."""
 
 SWINGS, SWING, SWING_PERIOD = 12, 12.0, 10.0
 """Before an isometric run the length swings at the highest pressure, ever less, so that friction is left
 near zero: number of swings, the first one's amplitude [mm], and their time [s]."""
 
-VENTING = 10.0
-"""Time in which the pressure then falls to the first one [s]."""
+VENTING, RISE = 10.0, 60.0
+"""Times in which the pressure then falls to the first one, and rises again [s]."""
 
 
 def multistate_friction(rig: Rig | None = None) -> Protocol:
     """Return the isometric runs, the isobaric cycles, and one with minor loops.
 
-    Parameters
-    ----------
-    rig : Rig, optional
-        A test stand: lengths are in proportion to its length at the start, pressures to its highest.
-        Default the paper's.
-
-    Raises
-    ------
-    DataError
-        If no length can be imposed on the rig.
+    On another test stand lengths are in proportion to its length at the start, pressures to its highest.
     """
     wide, strong = 1.0, 1.0
     if rig is not None:
         if "length" not in rig.inputs:
-            raise DataError(
-                f"no length can be imposed on the rig {rig.name!r}",
-                remedy="change a test stand: mckibben rig show mas10-test-stand",
-            )
+            remedy = "change a test stand, as mckibben rig show mas10-test-stand prints it"
+            raise DataError(f"the rig {rig.name!r} imposes no length", remedy=remedy)
         wide = rig.start.get("length", rig.limits("length").high) / LONGEST
         strong = rig.limits("pressure").high / HIGHEST
     runs = list[Run]()

@@ -21,26 +21,21 @@ from mckibben.estimators.core.ranges import parameter_ranges
 from mckibben.estimators.force.multistate import extract_hysteresis
 from mckibben.metrics import score
 from mckibben.papers.experiment import Cell, Curves, Experiment, Fitted, Labels, Rerun, Runs, rms
-from mckibben.papers.multistate_friction.printed import multistate_friction as printed_friction
-from mckibben.papers.multistate_friction.printed import static_force as printed_law
+from mckibben.papers.multistate_friction import printed
 from mckibben.papers.multistate_friction.protocol import SAMPLE_TIME
 from mckibben.recording import Recording
 from mckibben.signals import cycles
 from mckibben.signals.excitations import irregular_triangle
 from mckibben.signals.protocol import Role
 
-LAW = "force-bilinear"
-LAWS = (LAW, "force-chou", "force-tondu", "force-petrovic", "force-minh", "force-schindele")
-"""Estimators of static laws, the paper's first."""
-
-STATIC = "static law alone"
+STATIC, LAW = "static law alone", "force-bilinear"
 PAPERS, OURS, EIGHTEEN = "11 parameters, the paper's", "11 parameters, ours", "18 parameters"
 HYSTERESIS, ELONGATION = "force_hysteresis", "elongation"
 """What a static law leaves of the force [N], and the length beyond that at rest [mm], where models start
 that are at rest at 0."""
 
-REST = {"input": ELONGATION}
-LINE = {"input": ELONGATION, "degree": 1}
+REST: dict[str, Any] = {"input": ELONGATION}
+LINE = REST | {"degree": 1}
 """A straight line as the reversible part: a polynomial is wild at lengths that were not in the data."""
 
 MODELS: Mapping[str, tuple[str, dict[str, Any]]] = {
@@ -85,8 +80,8 @@ def run(experiment: Experiment) -> None:
         fewer = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
         closed = _estimator(model, experiment.seed, **fewer)
         found.fitted[name] = experiment.fit(name, closed, found.loop)
-        rested = replace(closed, initial="virgin")
-        found.fitted[model] = experiment.fit(model, rested, found.runs[found.chosen])
+        whole, rested = found.runs[found.chosen], replace(closed, initial="virgin")
+        found.fitted[model] = experiment.fit(model, rested, whole)
     _errors(experiment, found)
     experiment.tell(0.65, "how far parameters are determined")
     for key, model in (("friction", PAPERS), ("friction_ours", OURS))[: 2 - experiment.quick]:
@@ -97,15 +92,16 @@ def run(experiment: Experiment) -> None:
 
 def _estimator(model: str, seed: int, **how: Any) -> Any:
     name, settings = MODELS[model]
-    given = {"output": HYSTERESIS, "seed": seed, "initial": "first_sample"}
-    return registry.load("estimators", name)(**given, **settings, **how)
+    how |= {"output": HYSTERESIS, "seed": seed, "initial": "first_sample"}
+    return registry.load("estimators", name)(**settings, **how)
 
 
 def _static_laws(experiment: Experiment, isometric: Sequence[Recording]) -> PolynomialForce:
     """Add errors of force laws on the isometric runs, and coefficients and forces of the paper's."""
     rows: dict[str, list[Cell]] = {}
     measured = np.concatenate([one["force"] for one in isometric])
-    for name in LAWS[: 1 if experiment.quick else None]:
+    others = ("force-chou", "force-tondu", "force-petrovic", "force-minh", "force-schindele")
+    for name in (LAW, *others)[: 1 if experiment.quick else None]:
         estimator = registry.load("estimators", name)(seed=experiment.seed)
         fit = experiment.fit(name, estimator, isometric)
         modelled = np.concatenate([experiment.simulate(name, one)["force"] for one in isometric])
@@ -115,16 +111,14 @@ def _static_laws(experiment: Experiment, isometric: Sequence[Recording]) -> Poly
     assert isinstance(law, PolynomialForce)
     top = max(float(one["pressure"].max()) for one in isometric)
     held = [round(float(one["length"].mean())) for one in isometric]
-    lengths = np.array([min(held), max(held)], dtype=float)
     names = ("a_1 [N/bar]", "a_3 [N/(bar mm)]", "a_0 [N]", "a_2 [N/mm]", "a_4 [N/mm^2]")
-    both: list[dict[str, float]] = []
-    for each in (printed_law(), law.unscaled()):
-        both.append(dict(sorted(zip(names, each.pack().tolist(), strict=True))))
-        per_bar, rest = each.terms(lengths)
-        for bar in sorted({float(round(share * top)) for share in (1 / 6, 2 / 3, 1.0)}):
-            for length, force in zip(lengths, bar * per_bar + rest, strict=True):
-                both[-1][f"force at {length:g} mm, {bar:g} bar [N]"] = float(force)
-    cells = {name: [one[name] for one in both] for name in both[0]}
+    both = [printed.static_force(), law.unscaled()]
+    cells = sorted(zip(names, *(one.pack().tolist() for one in both), strict=True))
+    for bar in sorted({round(share * top) for share in (1 / 6, 2 / 3, 1.0)}):
+        for length in (min(held), max(held)):
+            forces = [float(np.dot((bar, 1.0), one.terms(np.array(length)))) for one in both]
+            given = forces[0] if 160 <= length <= 202 else None  # its muscle's lengths
+            cells.append((f"force at {length} mm, {bar} bar [N]", given, forces[1]))
     experiment.table("static", ["printed", "here"], cells)
     return law
 
@@ -140,8 +134,7 @@ def _hysteresis(runs: Runs, law: PolynomialForce) -> Hysteresis:
         bar, elongation = f"{runs.of(name, 'pressure'):g} bar", left["length"] - rest
         title = name if bar in found else bar
         found[title] = left.with_channels({ELONGATION: "mm"}, **{ELONGATION: elongation})
-    level = float(runs.of(chosen, "pressure"))
-    title = f"{level:g} bar"
+    title = f"{(level := float(runs.of(chosen, 'pressure'))):g} bar"
     # the first cycle begins at rest; from its end on the loop is closed
     whole, begun = found[title], cycles(-found[title]["length"])
     loop = whole.slice(begun[0].stop - 1, len(whole)) if len(begun) > 1 else whole
@@ -156,71 +149,47 @@ def _errors(experiment: Experiment, found: Hysteresis) -> None:
         modelled = experiment.simulate(name, found.loop)[HYSTERESIS]
         r2, fit = score(found.loop[HYSTERESIS], modelled).r2, found.fitted[name]
         rows[model] = [fit.block.n_parameters, fit.rmse, r2]
-        errors[model] = {
-            title: rms(experiment.simulate(model, one)[HYSTERESIS] - one[HYSTERESIS])
-            for title, one in found.runs.items()
+        free = {title: experiment.simulate(model, one) for title, one in found.runs.items()}
+        lost = {
+            title: one[HYSTERESIS] - found.runs[title][HYSTERESIS] for title, one in free.items()
         }
+        errors[model] = {title: rms(values) for title, values in lost.items()}
     experiment.table("closed", ["parameters", "RMSE [N]", "r²"], rows, at=found.chosen)
-    few, ours, many = (found.fitted[CLOSED[model]] for model in FRICTIONS)
-    best = min(few.rmse, ours.rmse)
-    experiment.says(
-        r2=rows[PAPERS][-1],
-        r2_ours=rows[OURS][-1],
-        eleven=few.rmse,
-        ours=ours.rmse,
-        eighteen=many.rmse,
-        near_eleven=_near(few),
-        near_eighteen=_near(many),
-        closer=", ".join(m for m, n in CLOSED.items() if found.fitted[n].rmse < best) or "none",
-    )
+    left = {model: found.fitted[name].rmse for model, name in CLOSED.items()}
+    closer = sum(own < min(left[PAPERS], left[OURS]) for own in left.values())
+    r2s = {model: cells[-1] for model, cells in rows.items()}
+    experiment.says(left=left, r2=r2s, closer=closer, n=len(left))
     worst: dict[str, float] = {
         model: max((own[t] / errors[STATIC][t] for t in found.unused), default=math.nan)
         for model, own in errors.items()
     }
-    every: dict[str, list[Cell]] = {}
-    for model in (STATIC, *sorted(MODELS, key=lambda name: worst[name])):
-        last = worst[model] if found.unused else None
-        every[model] = [rows.get(model, [None])[0], *errors[model].values(), last]
+    every = {
+        n: [rows.get(n, [None])[0], *errors[n].values(), worst[n] if found.unused else None]
+        for n in (STATIC, *sorted(MODELS, key=lambda model: worst[model]))
+    }
     columns = ["parameters", *found.runs, "at most, of the static law's"]
     experiment.table("loops", columns, every, at=found.chosen)
     if found.unused:
-        better = [n for n in every if worst[n] < min(worst[PAPERS], worst[OURS])]
-        experiment.says(
-            worst=worst[PAPERS],
-            worst_ours=worst[OURS],
-            unused=len(found.unused),
-            better=", ".join(f"{name} {worst[name]:.2f}" for name in better) or "none",
-            won=sum(errors[EIGHTEEN][t] < errors[PAPERS][t] for t in found.unused),
-        )
+        better = sum(own < min(worst[PAPERS], worst[OURS]) for own in worst.values())
+        won = sum(errors[EIGHTEEN][title] < errors[PAPERS][title] for title in found.unused)
+        experiment.says(worst=worst, better=better, won=won, unused=len(found.unused))
 
 
-EVERY, NEAR = 16, 1.05
-"""Evaluations from one report of a search to the next, and how near to its least error is near."""
-
-
-def _near(fit: Fitted) -> int:
-    """Return after how many evaluations a search was near its least error."""
-    return EVERY * (1 + int(np.argmax(np.array(fit.search) < NEAR * min(fit.search))))
-
-
-WIDE = 10.0
-"""Ratio of the ends of a range beyond which a parameter is called not determined."""
+WIDE, EVERY, NEAR = 10.0, 16.0, 1.05
+"""Ratio of a range's ends beyond which a parameter is called not determined; evaluations from one
+report of a search to the next, and how near to its least error is near."""
 
 
 def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis) -> None:
     """Add the parameters of a friction, and how far the closed loop determines them."""
-    fits = [found.fitted[CLOSED[model]]]
+    fits = [first := found.fitted[CLOSED[model]]]
     for seed in range(experiment.seed + 1, experiment.seed + (2 if experiment.quick else 5)):
         fits.append(experiment.fit(f"{model}, seed {seed}", _estimator(model, seed), found.loop))
-    blocks = [fit.block for fit in fits if isinstance(fit.block, MultistateFriction)]
-    orders = [block.by_strength() for block in blocks]
-    friction, *others = (
-        replace(block, values=tuple(block.values[place] for place in order))
-        for block, order in zip(blocks, orders, strict=True)
-    )
-    ranges = parameter_ranges(friction, found.loop, others=others)
-    errors = np.array(fits[0].standard_errors)[orders[0]]
-    theirs = printed_friction().values if model == PAPERS else [None] * len(friction.values)
+    ranked = [one.block.by_strength() for one in fits if isinstance(one.block, MultistateFriction)]
+    friction, order = ranked[0]
+    ranges = parameter_ranges(friction, found.loop, others=[other for other, _ in ranked[1:]])
+    errors = np.array(first.standard_errors)[order]
+    theirs = {PAPERS: printed.multistate_friction().values}.get(model, (None,) * len(order))
     rows: dict[str, list[Cell]] = {}
     for name, *three, (low, high) in zip(
         friction.parameter_names, theirs, friction.values, errors, ranges.tolist(), strict=True
@@ -245,27 +214,24 @@ def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hyst
     for title in [*held][:: max(1, (len(held) - 1) // 2)]:
         law = held[title]["pressure"], experiment.simulate(LAW, held[title])["force"]
         laws[title] = {held[title].origin: forces[title], "static law": law}
-    costs = {name: np.array(found.fitted[CLOSED[name]].search) for name in FRICTIONS}
-    of_loop = {"extracted": extracted} | modelled
+    costs = {name: np.array(found.fitted[CLOSED[name]].search) for name in (PAPERS, EIGHTEEN)}
+    steps = {name: np.cumsum(np.full(cost.size, EVERY)) for name, cost in costs.items()}
+    experiment.says(near={n: steps[n][np.argmax(c < NEAR * c.min())] for n, c in costs.items()})
     total: dict[str, Curves] = {}
-    for title in found.unused:
-        one = found.runs[title]
-        static = one["force"] - one[HYSTERESIS]
-        sums = {n: static + experiment.simulate(n, one)[HYSTERESIS] for n in (PAPERS, OURS)}
-        curves = {one.origin: one["force"], STATIC: static} | sums
-        total[title] = {name: (one["length"], force) for name, force in curves.items()}
-    figures: dict[str, Mapping[str, Curves]] = {
-        "isobaric": {"": {n: (one["length"], one["force"]) for n, one in found.runs.items()}},
-        "isometric": {"": forces},
-        "law": laws,
-        "loop": {"": {name: (length, force) for name, force in of_loop.items()}},
-        "search": {"": {n: (EVERY * np.arange(1.0, c.size + 1), c) for n, c in costs.items()}},
-        "left": {"": {name: (length, force - extracted) for name, force in modelled.items()}},
-        "unused": total,
-    }
-    for key, panels in figures.items():
-        if panels:
-            experiment.figure(key, panels)
+    for title, one in ((title, found.runs[title]) for title in found.unused):
+        x, static = one["length"], one["force"] - one[HYSTERESIS]
+        total[title] = {one.origin: (x, one["force"]), STATIC: (x, static)} | {
+            n: (x, static + experiment.simulate(n, one)[HYSTERESIS]) for n in (PAPERS, OURS)
+        }
+    loops = {title: (one["length"], one["force"]) for title, one in found.runs.items()}
+    experiment.figure("isobaric", {"": loops})
+    experiment.figure("isometric", {"": forces})
+    experiment.figure("law", laws)
+    of_loop = {n: (length, force) for n, force in ({"extracted": extracted} | modelled).items()}
+    experiment.figure("loop", {"": of_loop})
+    experiment.figure("search", {"": {name: (steps[name], cost) for name, cost in costs.items()}})
+    experiment.figure("left", {"": {n: (length, f - extracted) for n, f in modelled.items()}})
+    experiment.figure("unused", total)
 
 
 STROKE, APPROACH, SWINGING = 0.8, 10.0, 7.0
@@ -276,50 +242,41 @@ def _feedforward(experiment: Experiment, found: Hysteresis) -> None:
     """Add forces tracked on the rig without feedback; references are ours, as the paper tries none."""
     if experiment.rig is None:
         return
-    law, quick = found.law, experiment.quick
-    duration = 40.0 if quick else 80.0
-    time = np.arange(round(duration / SAMPLE_TIME) + 1) * SAMPLE_TIME
-    stroke, turns = STROKE * float(np.ptp(found.loop["length"])), 2 * round(duration / 20.0) + 1
-    longest = float(found.loop["length"].max())
-    length = longest - irregular_triangle(time, turns, stroke, seed=7)
-    (strongest,) = np.dot(
-        (experiment.rig.limits("pressure").high, 1.0), law.terms(np.array([longest]))
-    )
-    held = float(f"{strongest / 4:.2g}")
+    law, (n, turns) = found.law, (1, 5) if experiment.quick else (3, 9)
+    time = np.arange(round(10.0 * (turns - 1) / SAMPLE_TIME) + 1) * SAMPLE_TIME
+    stroke = STROKE * float(np.ptp(found.loop["length"]))
+    length = found.loop["length"].max() - irregular_triangle(time, turns, stroke, seed=7)
+    static = [float((one["force"] - one[HYSTERESIS]).max()) for one in found.runs.values()]
+    held = float(f"{max(static) / 4:.2g}")
     references = {
         f"static law at {found.chosen}": np.dot((found.bar, 1.0), law.terms(length)),
         f"{held:.0f} N": np.full(time.size, held),
         f"{held:.0f} N ± {held / 3:.0f} N": held * (1 + np.sin(2 * np.pi * time / SWINGING) / 3),
     }
     ways = {STATIC: ForceFeedforward(law)}
-    for name in FRICTIONS[: 2 if quick else 3]:
+    for name in FRICTIONS[: max(n, 2)]:
         friction: Any = experiment.models[name]
         ways[name] = ForceFeedforward(law, replace(friction, output=law.outputs[0]))
     rows: list[list[Cell]] = []
     panels: dict[str, dict[str, tuple[Array, Array]]] = {}
-    for title, force in [*references.items()][: 1 if quick else 3]:
+    for title, force in [*references.items()][:n]:
         reference = Recording({"force": force, "length": length}, SAMPLE_TIME)
         panels[title] = {"reference": (length, force)}
         for name, way in ways.items():
             experiment.tell(0.75 + len(rows) / 48, f"feedforward of {title}")
             done = track(way, experiment.rig, reference, approach=APPROACH, seed=experiment.seed)
-            errors = [done.rmse["force"], done.largest["force"], float(done.clipped)]
-            rows.append([title, name, *errors])
+            missed = done.rmse["force"], done.largest["force"], float(done.clipped)
+            rows.append([title, name, *missed])
             last = done.recording.slice(len(done.recording) - time.size, len(done.recording))
             panels[title][name] = last["length"], last["force"]
     columns = ["compensated by", "RMSE [N]", "largest [N]", "steps at a limit"]
     experiment.table("feedforward", columns, rows, stroke=stroke, at=found.chosen)
     experiment.figure("feedforward", panels)
-    keys = ("track_static", "track_eleven", "track_ours")
-    experiment.says(**{key: row[2] for key, row in zip(keys, rows, strict=False)})
+    experiment.says(tracked={str(row[1]): row[2] for row in rows[: len(ways)]})
 
 
 HELD, STROKES = 0.2, 0.1
-"""What is held moves less than this share of what is driven, where a tenth of the length is as much as
-the highest pressure."""
-
-NEEDED = {"length": 3, "pressure": 1}
-"""Values that each must be held at."""
+"""Of what is driven, what is held moves less; a stroke of this share is as much as the top pressure."""
 
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
@@ -327,38 +284,30 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
 
     That is the largest loop at the pressure nearest to two thirds of the highest, as 4 of 6 bar.
     """
-    at: dict[str, dict[int, float]] = {held: {} for held in NEEDED}
-    strokes = []
-    for place, one in enumerate(recordings):
-        for channel in ("length", "pressure", "force"):
-            if channel not in one:
-                remedy = f"record it, or name its column with --column {channel}=COLUMN"
-                raise DataError("it is missing", file=one.source, channel=channel, remedy=remedy)
-        length, bar = one["length"], one["pressure"]
-        stroke, swing = (float(np.ptp(np.percentile(x, [1, 99]))) for x in (length, bar))
-        strokes.append(stroke)
-        moved, driven = stroke / (STROKES * length.max()), swing / bar.max()
-        if min(moved, driven) < HELD * max(moved, driven):
-            held = "length" if moved < driven else "pressure"
-            at[held][place] = round(float(np.median(one[held])), 1)
-    for (held, values), driven in zip(at.items(), ("pressure", "length"), strict=True):
-        if len({*values.values()}) < NEEDED[held]:
-            raise DataError(
-                f"{len(values)} of {len(recordings)} recordings hold the {held} while the {driven} "
-                f"moves, at {len({*values.values()})} values",
-                channel=held,
-                remedy=f"record such runs at {NEEDED[held]} values of the {held} or more",
-            )
-    bars = at["pressure"]
-    wanted = 2 / 3 * max(bars.values())
-    chosen = min(bars, key=lambda place: (abs(bars[place] - wanted), -strokes[place]))
-    found: list[Labels | None] = [None] * len(recordings)
-    for place, held_at in at["length"].items():
-        found[place] = Labels("train", {"stage": "static", "length": held_at})
-    for place, held_at in bars.items():
-        role: Role = "train" if place == chosen else "test"
-        found[place] = Labels(role, {"stage": "friction", "pressure": held_at})
-    return found
+    kinds: list[tuple[str, float, float]] = []
+    top = max(float(one["pressure"].max()) for one in recordings)
+    for length, bar, _ in ([one[c] for c in ("length", "pressure", "force")] for one in recordings):
+        stroke, swing = (np.ptp(np.percentile(x, [1, 99])) for x in (length, bar))
+        moved, driven = stroke / (STROKES * length.max()), swing / top
+        held = "length" if moved < HELD * driven else "pressure" if driven < HELD * moved else ""
+        size = np.median([np.ptp(length[cycle]) for cycle in cycles(-length)] or [stroke])
+        level = round(float(np.median(bar if held == "pressure" else length)), 1)
+        kinds.append((held, level, float(size)))
+    for held, other, least in (("length", "pressure", 3), ("pressure", "length", 1)):
+        if (n := len({level for kind, level, _ in kinds if kind == held})) < least:
+            remedy = f"record such runs at {least} values of the {held} or more"
+            told = f"the {held} is held while the {other} moves at {n} values"
+            raise DataError(told, channel=held, remedy=remedy)
+    loops = {place: kind for place, kind in enumerate(kinds) if kind[0] == "pressure"}
+    chosen = min(loops, key=lambda place: (abs(loops[place][1] - top / 1.5), -loops[place][2]))
+    stages = {"length": "static", "pressure": "friction"}
+    roles: list[Role] = [
+        "test" if i in loops and i != chosen else "train" for i in range(len(kinds))
+    ]
+    return [
+        Labels(role, {"stage": stages[held], held: level}) if held else None
+        for role, (held, level, _) in zip(roles, kinds, strict=True)
+    ]
 
 
 RERUN = Rerun(run, sort)

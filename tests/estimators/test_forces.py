@@ -151,3 +151,25 @@ class TestBalanceForce:
             for name in ("length", "displacement")
         ]
         np.testing.assert_allclose(np.concatenate(forces[0]), np.concatenate(forces[1]), atol=1e-6)
+
+
+def test_elements_of_one_kind_are_ordered_by_strength() -> None:
+    friction = MultistateFriction(
+        ("shortening", "shared", "shortening"),
+        (1.0, 0.1, 5.0, 2.0, 0.2, 6.0, 0.3, 7.0, 3.0, 0.4, 8.0),
+    )
+    ordered, order = friction.by_strength()
+    assert ordered.values == (3.0, 0.4, 8.0, 2.0, 0.2, 6.0, 0.3, 7.0, 1.0, 0.1, 5.0)
+    assert [friction.values[place] for place in order] == list(ordered.values)
+    run = isobaric()
+    forces = (each.simulate(run)["force"] for each in (friction, ordered))
+    np.testing.assert_allclose(*forces, atol=1e-9)
+
+
+def test_a_scaled_law_is_printed_by_the_length_itself() -> None:
+    law: Any = PolynomialForceEstimator(law="bilinear").fit(isometric(static_force())).model_
+    plain = law.unscaled()
+    assert plain.scale == 1.0 != law.scale
+    lengths = np.linspace(184.0, 200.0, 9)
+    for ours, theirs in zip(plain.terms(lengths), law.terms(lengths), strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-8)

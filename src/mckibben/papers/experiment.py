@@ -424,7 +424,12 @@ class Experiment:
         )
 
     def figure(self, key: str, panels: Mapping[str, Curves]) -> None:
-        """Add a figure: title of a panel -> name of a curve -> its x and y, of which some are drawn."""
+        """Add a figure: title of a panel -> name of a curve -> its x and y, of which some are drawn.
+
+        Without any panel there is no figure.
+        """
+        if not panels:
+            return
         text = self.paper.figures[key]
         drawn = {
             title: {name: (thinned(x), thinned(y)) for name, (x, y) in curves.items()}

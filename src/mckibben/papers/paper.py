@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from mckibben import registry
 
 Words = Annotated[str, Field(min_length=1)]
-Printed = dict[str, dict[str, float]]
+Printed = dict[str, dict[str, int | float]]
 """Heading of a column -> name of a row -> the figure that the paper prints."""
 
 

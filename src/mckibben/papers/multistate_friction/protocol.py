@@ -66,12 +66,12 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
     for length, first in LENGTHS.items():
         rising = np.interp(time, (lead - VENTING, lead, lead + RISE), (HIGHEST, first, HIGHEST))
         lengths = np.minimum(length + swinging, LONGEST)
-        add(f"isometric-{wide * length:g}mm", "train", rising, lengths, lead)
+        add(f"isometric-{wide * length:.4g}mm", "train", rising, lengths, lead)
     for bar, shortest in SHORTEST.items():
         period = 2 * (LONGEST - shortest) / SPEED
         gone = triangle(_time(CYCLES * period), period, LONGEST - shortest)
         role: Role = "train" if bar == IDENTIFIED_AT else "test"
-        add(f"isobaric-{strong * bar:g}bar", role, np.full(gone.size, bar), LONGEST - gone)
+        add(f"isobaric-{strong * bar:.3g}bar", role, np.full(gone.size, bar), LONGEST - gone)
     gone = irregular_triangle(_time(120.0), 13, LONGEST - SHORTEST[IDENTIFIED_AT], seed=4)
     held = np.full(gone.size, IDENTIFIED_AT)
     add("isobaric-minor-loops", "test", held, LONGEST - gone)

@@ -34,17 +34,17 @@ HYSTERESIS, ELONGATION = "force_hysteresis", "elongation"
 """What a static law leaves of the force [N], and the length beyond that at rest [mm], where models start
 that are at rest at 0."""
 
-REST: dict[str, Any] = {"input": ELONGATION}
-LINE = REST | {"degree": 1}
+LINE: dict[str, Any] = {"input": ELONGATION, "degree": 1}
 """A straight line as the reversible part: a polynomial is wild at lengths that were not in the data."""
 
+SIGNED: dict[str, Any] = {"input": ELONGATION, "n_operators": 39, "nonnegative": False}
 MODELS: Mapping[str, tuple[str, dict[str, Any]]] = {
     PAPERS: ("multistate-11", {"static": None}),
     OURS: ("multistate", {"static": None}),
     EIGHTEEN: ("multistate-18", {"static": None}),
     "modified Maxwell-slip": ("mms", LINE | {"n_operators": 38}),
-    "modified PI": ("mpi", REST | {"n_operators": 33}),
-    "PI with weights of either sign": ("pi", REST | {"n_operators": 39, "nonnegative": False}),
+    "modified PI": ("mpi", {"input": ELONGATION, "n_operators": 33}),
+    "PI with weights of either sign": ("pi", SIGNED),
     "generalised Bouc-Wen": ("gbw", LINE),
     "Maxwell-slip": ("maxwell-slip", LINE),
     "Bouc-Wen": ("bouc-wen", LINE),
@@ -131,10 +131,10 @@ def _hysteresis(runs: Runs, law: PolynomialForce) -> Hysteresis:
     rest = float(runs[chosen]["length"][0])
     found: dict[str, Recording] = {}
     for name, left in zip(names, extract_hysteresis([runs[n] for n in names], law), strict=True):
-        bar, elongation = f"{runs.of(name, 'pressure'):g} bar", left["length"] - rest
+        bar, elongation = f"{runs.of(name, 'pressure'):.3g} bar", left["length"] - rest
         title = name if bar in found else bar
         found[title] = left.with_channels({ELONGATION: "mm"}, **{ELONGATION: elongation})
-    title = f"{(level := float(runs.of(chosen, 'pressure'))):g} bar"
+    title = f"{(level := float(runs.of(chosen, 'pressure'))):.3g} bar"
     # the first cycle begins at rest; from its end on the loop is closed
     whole, begun = found[title], cycles(-found[title]["length"])
     loop = whole.slice(begun[0].stop - 1, len(whole)) if len(begun) > 1 else whole
@@ -223,9 +223,10 @@ def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hyst
         total[title] = {one.origin: (x, one["force"]), STATIC: (x, static)} | {
             n: (x, static + experiment.simulate(n, one)[HYSTERESIS]) for n in (PAPERS, OURS)
         }
-    loops = {title: (one["length"], one["force"]) for title, one in found.runs.items()}
+    cycled = {title: one for title, one in found.runs.items() if title.endswith(" bar")}
+    loops = {title: (one["length"], one["force"]) for title, one in cycled.items()}
     experiment.figure("isobaric", {"": loops})
-    experiment.figure("isometric", {"": forces})
+    experiment.figure("isometric", {"": dict([*forces.items()][:: -(-len(forces) // 6)])})
     experiment.figure("law", laws)
     of_loop = {n: (length, force) for n, force in ({"extracted": extracted} | modelled).items()}
     experiment.figure("loop", {"": of_loop})
@@ -235,7 +236,7 @@ def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hyst
 
 
 STROKE, APPROACH, SWINGING = 0.8, 10.0, 7.0
-"""Imposed motion, by that of the fitted loop; time to the first force, and period of the sine [s]."""
+"""Imposed motion, by that of the loop; time to the first force, and period of the sine [s]."""
 
 
 def _feedforward(experiment: Experiment, found: Hysteresis) -> None:
@@ -271,7 +272,7 @@ def _feedforward(experiment: Experiment, found: Hysteresis) -> None:
             panels[title][name] = last["length"], last["force"]
     columns = ["compensated by", "RMSE [N]", "largest [N]", "steps at a limit"]
     experiment.table("feedforward", columns, rows, stroke=stroke, at=found.chosen)
-    experiment.figure("feedforward", panels)
+    experiment.figure("feedforward", dict([*panels.items()][:2]))
     experiment.says(tracked={str(row[1]): row[2] for row in rows[: len(ways)]})
 
 
@@ -295,9 +296,10 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
         kinds.append((held, level, float(size)))
     for held, other, least in (("length", "pressure", 3), ("pressure", "length", 1)):
         if (n := len({level for kind, level, _ in kinds if kind == held})) < least:
-            remedy = f"record such runs at {least} values of the {held} or more"
-            told = f"the {held} is held while the {other} moves at {n} values"
-            raise DataError(told, channel=held, remedy=remedy)
+            message = (
+                f"it is held, while the {other} moves, at {n} values; {least} or more are needed"
+            )
+            raise DataError(message, channel=held, remedy=f"record runs that hold the {held}")
     loops = {place: kind for place, kind in enumerate(kinds) if kind[0] == "pressure"}
     chosen = min(loops, key=lambda place: (abs(loops[place][1] - top / 1.5), -loops[place][2]))
     stages = {"length": "static", "pressure": "friction"}

@@ -223,8 +223,7 @@ def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hyst
         total[title] = {one.origin: (x, one["force"]), STATIC: (x, static)} | {
             n: (x, static + experiment.simulate(n, one)[HYSTERESIS]) for n in (PAPERS, OURS)
         }
-    cycled = {title: one for title, one in found.runs.items() if title.endswith(" bar")}
-    loops = {title: (one["length"], one["force"]) for title, one in cycled.items()}
+    loops = {n: (r["length"], r["force"]) for n, r in found.runs.items() if n.endswith(" bar")}
     experiment.figure("isobaric", {"": loops})
     experiment.figure("isometric", {"": dict([*forces.items()][:: -(-len(forces) // 6)])})
     experiment.figure("law", laws)
@@ -296,9 +295,7 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
         kinds.append((held, level, float(size)))
     for held, other, least in (("length", "pressure", 3), ("pressure", "length", 1)):
         if (n := len({level for kind, level, _ in kinds if kind == held})) < least:
-            message = (
-                f"it is held, while the {other} moves, at {n} values; {least} or more are needed"
-            )
+            message = f"it is held at {n} values while the {other} moves, of at least {least}"
             raise DataError(message, channel=held, remedy=f"record runs that hold the {held}")
     loops = {place: kind for place, kind in enumerate(kinds) if kind[0] == "pressure"}
     chosen = min(loops, key=lambda place: (abs(loops[place][1] - top / 1.5), -loops[place][2]))

@@ -150,7 +150,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "activation-pressure": "mckibben.papers.activation_pressure.run:RERUN",
         "field-models": "mckibben.papers.field_models.run:RERUN",
         "mpi-narmax": "mckibben.papers.mpi_narmax.rerun:mpi_narmax",
-        "multistate-friction": "mckibben.papers.multistate_friction.rerun:multistate_friction",
+        "multistate-friction": "mckibben.papers.multistate_friction.run:RERUN",
         "sdchm": "mckibben.papers.sdchm.rerun:sdchm",
     },
     "protocols": {
@@ -162,8 +162,6 @@ PLUGINS: dict[str, dict[str, str]] = {
     },
     "published": {
         "mpi-narmax-mpi": "mckibben.papers.mpi_narmax.published:modified_prandtl_ishlinskii",
-        "multistate-friction": "mckibben.papers.multistate_friction.published:multistate_friction",
-        "multistate-static-force": "mckibben.papers.multistate_friction.published:static_force",
         "sdchm-coupling": "mckibben.papers.sdchm.published:coupling",
     },
     "setups": {

@@ -20,7 +20,7 @@ from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EIGHTEEN, MultistateFriction
 from mckibben.blocks.hysteresis.differential import BoucWen, GeneralizedBoucWen
 from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator, DuhemOscillator
-from mckibben.papers.multistate_friction.published import multistate_friction, static_force
+from mckibben.papers.paper import printed
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def force(model: MultistateFriction, length: Array) -> Array:
 def test_friction_takes_energy_and_never_gives_more_than_it_stored(
     turns: list[float], which: int
 ) -> None:
-    model = (STIFF, multistate_friction())[which]
+    model = (STIFF, printed("multistate-friction"))[which]
     way = np.concatenate([np.linspace(a, b, 40)[:-1] for a, b in pairwise(turns)])
     # the work done on the friction, each step at the force that it ends with, less what that misses
     f = force(model, way)
@@ -110,18 +110,20 @@ def test_friction_takes_energy_and_never_gives_more_than_it_stored(
 
 def test_printed_limits_are_reached_both_ways() -> None:
     slow = np.concatenate([np.linspace(180, 200, 4001), np.linspace(200, 180, 4001)])
-    f = force(multistate_friction(), slow)
+    f = force(printed("multistate-friction"), slow)
     assert f.max() == pytest.approx(128.795, rel=1e-6)
     assert f.min() == pytest.approx(-103.096 - 13.431 - 1.256, abs=1.3)
 
 
 @pytest.mark.parametrize("gain", [0.0, 0.2])
 def test_feedforward_is_exact(gain: float) -> None:
-    friction = replace(multistate_friction(), pressure_gain=gain, initial="virgin")
+    friction = replace(printed("multistate-friction"), pressure_gain=gain, initial="virgin")
     length = np.interp(np.arange(264), np.arange(0, 288, 24), 192.5 + 3.5 * (-0.9) ** np.arange(12))
     wanted = 300.0 + 60.0 * np.sin(np.linspace(0, 20, length.size))
     recording = Recording({"force": wanted, "length": length}, 0.01)
-    pressure = ForceFeedforward(static_force(), friction).simulate(recording)["pressure"]
+    pressure = ForceFeedforward(printed("multistate-static-force"), friction).simulate(recording)[
+        "pressure"
+    ]
     driven = Recording({"length": length, "pressure": pressure}, 0.01)
-    reached = Parallel((static_force(), friction)).simulate(driven)["force"]
+    reached = Parallel((law, friction)).simulate(driven)["force"]
     np.testing.assert_allclose(reached, wanted, atol=1e-9)

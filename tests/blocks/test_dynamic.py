@@ -18,9 +18,7 @@ from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.blocks.memoryless import Affine, Negative
-from mckibben.papers.multistate_friction.published import static_force
-from mckibben.papers.paper import paper
-from mckibben.registry import load
+from mckibben.papers.paper import printed
 
 STEP = 0.01
 INPUT = np.cumsum(np.random.default_rng(0).standard_normal(1500)) * 0.05
@@ -115,10 +113,10 @@ def test_a_continuous_model_comes_as_it_is_written() -> None:
 
 
 def test_printed_numbers() -> None:
-    poles = np.sort(np.roots(paper("field-models").printed("field-models-p2uz").denominator()))
+    poles = np.sort(np.roots(printed("field-models-p2uz").denominator()))
     np.testing.assert_allclose(poles, [-3.185, -0.00966], rtol=2e-3)
-    assert load("published", "sdchm-coupling")().radius == pytest.approx(0.456, abs=5e-4)
-    per_bar, rest = static_force().terms(np.array([190.0]))
+    assert printed("sdchm-coupling").radius == pytest.approx(0.456, abs=5e-4)
+    per_bar, rest = printed("multistate-static-force").terms(np.array([190.0]))
     assert float(rest[0] + 4.0 * per_bar[0]) == pytest.approx(
         7596 - 136.6 * 4 - 93.14 * 190 + 1.176 * 190 * 4 + 0.2758 * 190**2
     )

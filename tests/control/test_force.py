@@ -10,10 +10,10 @@ from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.control import Twin, track
-from mckibben.papers.multistate_friction.published import static_force
+from mckibben.papers.paper import printed
 from tests.cli.conftest import cli as cli  # a fixture
 
-LAW = static_force()
+LAW = printed("multistate-static-force")
 FRICTION = MultistateFriction(
     EACH_WAY,
     (*(7.0, 5e-3, 52.0, 5e-3, 60.0), *(5.0, 5e-3, 30.0), *(12.0, 5e-3, 50.0)),

@@ -20,8 +20,7 @@ from mckibben.estimators.force.laws import (
     TonduLopezEstimator,
 )
 from mckibben.estimators.force.multistate import MultistateEstimator, extract_hysteresis
-from mckibben.papers.multistate_friction.published import static_force
-from mckibben.papers.paper import paper
+from mckibben.papers.paper import printed
 from tests.estimators.test_balance import recording
 
 TRUTH = MultistateFriction(
@@ -48,17 +47,17 @@ def isobaric(pressure: float = 4.0, noise: float = 0.5) -> Recording:
     rng = np.random.default_rng(1)
     given = Recording({"length": length, "pressure": np.full(2500, pressure)}, 0.02)
     friction = TRUTH.simulate(given)["force"]
-    static = static_force().simulate(given)["force"]
+    static = printed("multistate-static-force").simulate(given)["force"]
     force = static + friction + noise * rng.standard_normal(2500)
     return given.with_channels(force=force)
 
 
 def test_static_laws_recover_their_own_forces() -> None:
-    printed = static_force()
-    fit: Any = PolynomialForceEstimator(law="bilinear").fit(isometric(printed))
+    law = printed("multistate-static-force")
+    fit: Any = PolynomialForceEstimator(law="bilinear").fit(isometric(law))
     assert fit.diagnostics_.rmse < 0.55
     lengths = np.array([185.0, 199.0])
-    for ours, theirs in zip(fit.model_.terms(lengths), printed.terms(lengths), strict=True):
+    for ours, theirs in zip(fit.model_.terms(lengths), law.terms(lengths), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1.0)
     chou = ChouHannaford(260.0, 1.6, -3.0)
     fit = ChouHannafordEstimator().fit(isometric(chou))
@@ -77,7 +76,7 @@ def test_chou_hannaford_recovers_thread_and_turns() -> None:
 
 
 def test_friction_is_recovered_to_the_noise() -> None:
-    (left,) = extract_hysteresis(isobaric(), static_force())
+    (left,) = extract_hysteresis(isobaric(), printed("multistate-static-force"))
     fit: Any = MultistateEstimator(output="force_hysteresis", static=None, elements="each-way").fit(
         left
     )
@@ -103,7 +102,7 @@ def sines(frequency: float, force: float) -> Recording:
     time = np.arange(1200) * 0.005
     contraction = 0.1 - 0.03 * np.cos(2 * np.pi * frequency * time)
     given = Recording({"contraction": contraction, "force": np.full(1200, force)}, 0.005)
-    model = paper("activation-pressure").printed("activation-pressure-profile")
+    model = printed("activation-pressure-profile")
     assert isinstance(model, ActivationPressure)
     model = replace(model, frequency=frequency)
     return given.with_channels(pressure=model.simulate(given)["pressure"])
@@ -145,7 +144,7 @@ class TestBalanceForce:
         assert [c.name for c in fit.fitted.inputs] == ["length", "pressure"]
 
     def test_length_and_displacement_tell_the_same(self) -> None:
-        runs = isometric(static_force())
+        runs = isometric(printed("multistate-static-force"))
         runs = [
             r.with_channels({"displacement": "mm"}, displacement=200.0 - r["length"]) for r in runs
         ]
@@ -154,3 +153,29 @@ class TestBalanceForce:
             for name in ("length", "displacement")
         ]
         np.testing.assert_allclose(np.concatenate(forces[0]), np.concatenate(forces[1]), atol=1e-6)
+
+
+def test_elements_of_one_kind_are_ordered_by_strength() -> None:
+    friction = MultistateFriction(
+        ("shortening", "shared", "shortening"),
+        (1.0, 0.1, 5.0, 2.0, 0.2, 6.0, 0.3, 7.0, 3.0, 0.4, 8.0),
+    )
+    ordered, order = friction.by_strength()
+    assert ordered.values == (3.0, 0.4, 8.0, 2.0, 0.2, 6.0, 0.3, 7.0, 1.0, 0.1, 5.0)
+    assert [friction.values[place] for place in order] == list(ordered.values)
+    run = isobaric()
+    force, again = (each.simulate(run)["force"] for each in (friction, ordered))
+    np.testing.assert_allclose(force, again, atol=1e-9)
+
+
+def test_a_scaled_law_is_printed_by_the_length_itself() -> None:
+    law: Any = (
+        PolynomialForceEstimator(law="bilinear")
+        .fit(isometric(printed("multistate-static-force")))
+        .model_
+    )
+    plain = law.unscaled()
+    assert plain.scale == 1.0 != law.scale
+    lengths = np.linspace(184.0, 200.0, 9)
+    for ours, theirs in zip(plain.terms(lengths), law.terms(lengths), strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-8)

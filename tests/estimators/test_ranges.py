@@ -9,7 +9,7 @@ import numpy as np
 from mckibben import Recording
 from mckibben.blocks.force.laws import PolynomialForce
 from mckibben.blocks.force.multistate_friction import ELEVEN, MultistateFriction
-from mckibben.papers.multistate_friction.ranges import parameter_ranges
+from mckibben.estimators.core.ranges import parameter_ranges
 from mckibben.registry import load
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -54,6 +54,14 @@ def fit(
             help="What is likely before: a muscle (muscles list), or a data sheet (.toml).",
         ),
     ] = None,
+    residual_of: Annotated[
+        Path | None,
+        typer.Option(
+            "--residual-of",
+            metavar="MODEL",
+            help="Saved model (JSON) whose output is subtracted first; both are written, as their sum.",
+        ),
+    ] = None,
     settings: Settings = None,
     validation: Annotated[
         list[Path] | None,
@@ -69,7 +77,9 @@ def fit(
     channels by name: pressure_1 ..., displacement_1 ..., and pressure_extensor where there is one.
     """
     from mckibben import registry
+    from mckibben.blocks.compose import Parallel
     from mckibben.blocks.equations import quantities
+    from mckibben.blocks.saving import load
     from mckibben.comparison.shared_rows import check_shared
     from mckibben.estimators.catalogue import settings_of
     from mckibben.outputs import claim_model
@@ -78,7 +88,8 @@ def fit(
     given = settings_of(model, settings or [])
     before = prior or given.get("prior")
     sheets = [Path(before)] if isinstance(before, str) else []
-    claim_model(out, inputs=[*files, *(validation or []), *sheets], force=force)
+    first = [] if residual_of is None else [residual_of]
+    claim_model(out, inputs=[*files, *(validation or []), *sheets, *first], force=force)
     named = {"input": _one(input), "output": _one(output), "prior": prior}
     given = {key: value for key, value in named.items() if value is not None} | given
     known = {field.name for field in fields(estimator_class)}
@@ -99,6 +110,11 @@ def fit(
         informative = not several and len(files) == 1
         recordings = reading.read(files, asked_for or None, informative=informative)
     held_back = reading.read(validation or [], None, informative=False)
+    base = None if residual_of is None else load(residual_of)
+    if base is not None:
+        recordings, held_back = (
+            _residuals(base, estimator, some) for some in (recordings, held_back)
+        )
     data = estimator.data(recordings)
     names = [[channel.name for channel in some] for some in (data.inputs, data.outputs)]
     check_shared({"fit": recordings}, *names)
@@ -110,7 +126,7 @@ def fit(
                 share, f"best {numeral(best)}" if math.isfinite(best) else ""
             ),
         )
-    estimator.model_.save(out)
+    (estimator.model_ if base is None else Parallel((base, estimator.model_))).save(out)
     found = estimator.diagnostics_
     outputs = estimator.model_.outputs
     unit_name = outputs[0].unit
@@ -174,7 +190,20 @@ def fit(
         say(f"Not determined by these recordings: {'; '.join(undetermined)}.")
     for note in notes:
         say(f"Note: {note}")
-    say(f"Written: {out}")
+    say(f"Written: {out}{'' if base is None else f', the sum of {residual_of} and this model'}")
+
+
+def _residuals(base: Block, estimator: Any, recordings: list[Recording]) -> list[Recording]:
+    """Return recordings with the output less what a model gives."""
+    from mckibben.estimators.force.multistate import extract_hysteresis
+
+    names = [channel.name for channel in base.outputs]
+    if names != [estimator.output]:
+        raise ModelError(
+            f"the model of --residual-of gives {', '.join(names)}, and {estimator.output} is fitted. "
+            "Remedy: name a model of the same output, or the output with --output."
+        )
+    return extract_hysteresis(recordings, base, output=estimator.output)
 
 
 def _unasked(given: list[str] | None, model: Block, recording: Recording) -> list[str]:

@@ -116,6 +116,12 @@ Resample = Annotated[
         "--resample", metavar="SECONDS", help="Sample time to resample to, without aliasing."
     ),
 ]
+Between = Annotated[
+    str | None,
+    typer.Option(
+        "--between", metavar="START:END", help="Part of every recording [s]; END may be left out."
+    ),
+]
 Zero = Annotated[
     list[str] | None,
     typer.Option(
@@ -198,6 +204,7 @@ class Reading:
     gaps: GapPolicy = Gaps.ERROR
     raw: Raw = False
     rest_length: RestLength = None
+    between: Between = None
     resample: Resample = None
     zero: Zero = None
 
@@ -250,7 +257,12 @@ class Reading:
         return self._prepared(recordings), columns
 
     def _prepared(self, recordings: list[Recording]) -> list[Recording]:
-        """Return recordings resampled and zeroed as asked for."""
+        """Return recordings cut, resampled and zeroed as asked for."""
+        if self.between is not None:
+            from mckibben.signals import cut
+
+            start, end = _times(self.between)
+            recordings = [cut(recording, start, end) for recording in recordings]
         if self.resample is not None:
             from mckibben.signals import resample
 
@@ -394,6 +406,20 @@ def _calibrations(given: list[str] | None) -> dict[str, tuple[str, float, float,
                 remedy="write for instance --calibrate pressure=A0:2.5:-0.5:bar",
             )
     return found
+
+
+def _times(given: str) -> tuple[float, float]:
+    """Return start and end [s] from ``START:END``."""
+    start, colon, end = given.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return float(start or "-inf"), float(end or "inf")
+    except ValueError:
+        raise DataError(
+            f"--between {given!r} is not of the form START:END",
+            remedy="write for instance --between 15: to leave out the first 15 s",
+        ) from None
 
 
 def _bytes(size: str) -> float:

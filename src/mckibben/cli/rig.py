@@ -220,8 +220,8 @@ def record(
         raise DataError(
             f"there is no format {file_format!r}", remedy="give csv, tsv or parquet with --format"
         )
-    plan = protocol_named(protocol)
-    plant = _changed(rig or plan.rig, changes)
+    plant = _changed(rig or protocol_named(protocol).rig, changes)
+    plan = protocol_named(protocol, plant)
     runs = [run for run in plan.runs if only is None or only in run.name]
     if not runs:
         raise DataError(

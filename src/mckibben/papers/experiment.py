@@ -125,6 +125,8 @@ class Fitted:
         That the fit took [s].
     standard_errors : tuple of float
         Of ``block.pack()``, NaN where not known; of several outputs none.
+    search : tuple of float
+        Least error so far, whenever the search reported it.
     """
 
     __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
@@ -133,6 +135,7 @@ class Fitted:
     rmse: float
     seconds: float
     standard_errors: tuple[float, ...] = field(default=(), compare=False)
+    search: tuple[float, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True)
@@ -264,20 +267,22 @@ class Experiment:
         Parameters
         ----------
         what : Protocol, optional
-            Default the one registered under the paper's name.
+            Default the one registered under the paper's name, for the rig.
         names : sequence of str, optional
             Of the runs that are needed; default all.
         until : float
             Share of the whole work that is done then.
         """
         if self.data is not None:
-            every = zip(self.data, self._sorted(self.data), strict=True)
+            every = list(zip(self.data, self._sorted(self.data), strict=True))
             used = {one.name: (one, labels) for one, labels in every if labels is not None}
+            unused = ", ".join(one.name for one, labels in every if labels is None)
+            self.warned |= {f"Recordings that are not used: {unused}.": None} if unused else {}
             return Runs(
                 {name: one for name, (one, _) in used.items()},
                 {name: labels for name, (_, labels) in used.items()},
             )
-        plan = protocol(self.name) if what is None else what
+        plan = protocol(self.name, self.rig) if what is None else what
         names = [run.name for run in plan.runs] if names is None else names
         found = dict(self._recorded(plan, names, self.within(0.0, until)))
         return Runs(found, {name: Labels(plan[name].role, plan[name].labels) for name in found})
@@ -316,14 +321,17 @@ class Experiment:
         The model is one of ``models`` from then on, under its name. ``how`` is what else its ``fit``
         takes. Errors are those of its ``fit``.
         """
+        search: list[float] = []
 
         def fit() -> Fitted:
             with whole_searches(), warnings.catch_warnings():
                 warnings.simplefilter("ignore", ModelWarning)
-                estimator.fit(recordings, **how)
+                heard = {"progress": lambda share, best: search.append(float(best))}
+                estimator.fit(recordings, **heard | how)
             found = estimator.diagnostics_
             errors = tuple(getattr(found, "standard_errors", ()))
-            return Fitted(estimator.model_, float(np.max(found.rmse)), found.seconds, errors)
+            best = tuple(cost for cost in search if np.isfinite(cost))
+            return Fitted(estimator.model_, float(np.max(found.rmse)), found.seconds, errors, best)
 
         settings = (type(estimator).__name__, estimator.get_params())
         fitted = self.kept.once(name, Fitted, fit, settings, recordings, how)
@@ -381,7 +389,12 @@ class Experiment:
         self.tables.append(Table(key, filled, tuple(compress(headings, kept)), shown))
 
     def figure(self, key: str, panels: Mapping[str, Curves]) -> None:
-        """Add a figure: title of a panel -> name of a curve -> its x and y, of which some are drawn."""
+        """Add a figure: title of a panel -> name of a curve -> its x and y, of which some are drawn.
+
+        Without any panel there is no figure.
+        """
+        if not panels:
+            return
         drawn = {
             title: {name: (thinned(x), thinned(y)) for name, (x, y) in curves.items()}
             for title, curves in panels.items()

@@ -18,7 +18,7 @@ from mckibben.blocks.saving import part_from_dict
 from mckibben.errors import ModelError
 
 Words = Annotated[str, Field(min_length=1)]
-Printed = dict[str, dict[str, float]]
+Printed = dict[str, dict[str, int | float]]
 """Heading of a column -> name of a row -> the figure that the paper prints."""
 
 

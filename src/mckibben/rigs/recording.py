@@ -50,7 +50,7 @@ def record(
     DataError
         On an unknown run, or a rig that lacks the protocol's channels or parameters.
     """
-    plan = protocol(what) if isinstance(what, str) else what
+    plan = protocol(what, rig) if isinstance(what, str) else what
     plant = load_rig(plan.rig) if rig is None else rig
     wanted = plan.runs if runs is None else tuple(plan[name] for name in runs)
     generator(seed)  # refuses what is none

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from inspect import signature
 from typing import Any, Literal
 
 from mckibben import registry
@@ -90,13 +91,21 @@ class Protocol:
         )
 
 
-def protocol(name: str) -> Protocol:
+def protocol(name: str, rig: object = None) -> Protocol:
     """Return a protocol by name.
+
+    Parameters
+    ----------
+    name : str
+    rig : Rig, optional
+        That is to be driven; protocols that can adapt their levels to a rig do.
 
     Raises
     ------
     ModelError
         If there is none of that name; the text lists those there are.
     """
-    made: Protocol = registry.load("protocols", name)()
+    maker = registry.load("protocols", name)
+    adapts = rig is not None and signature(maker).parameters
+    made: Protocol = maker(rig) if adapts else maker()
     return made

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, ClassVar
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Interval
+from numpy.polynomial import Polynomial
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
@@ -128,6 +130,12 @@ class PolynomialForce(ForceLaw):
     input: fields.ChannelField = fields.LENGTH
     pressure: fields.ChannelField = fields.PRESSURE
     output: fields.ChannelField = fields.FORCE
+
+    def unscaled(self) -> Self:
+        """Return the same law by polynomials of the length itself, as papers print it."""
+        x = Polynomial([-self.centre / self.scale, 1.0 / self.scale])
+        g, h = (tuple(Polynomial(each)(x).coef.tolist()) for each in (self.per_bar, self.elastic))
+        return replace(self, per_bar=g, elastic=h, centre=0.0, scale=1.0)
 
     def coefficients(self, sample_time: float | None) -> Array:
         return np.array([self.centre, self.scale, len(self.per_bar), *self.per_bar, *self.elastic])

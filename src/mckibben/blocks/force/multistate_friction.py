@@ -22,7 +22,8 @@ pressure_gain 0 is the paper's model.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from dataclasses import replace
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, FiniteFloat
@@ -231,6 +232,18 @@ class MultistateFriction(Block):
         other = np.roll(table, 3, axis=1)
         other[:, [2, 5]] = 0.0
         return np.where(np.isnan(table), other, table)
+
+    def by_strength(self) -> tuple[Self, list[int]]:
+        """Return the same friction with elements of one kind by falling F_c, and where its values were.
+
+        The order of such elements has no effect; so two fits can be compared value by value.
+        """
+        ends = np.cumsum([SIZES[element] for element in self.elements]).tolist()
+        own = [[*range(end - SIZES[e], end)] for e, end in zip(self.elements, ends, strict=True)]
+        ranked = sorted(range(len(own)), key=lambda place: -self.values[own[place][-1]])
+        given = {kind: iter([p for p in ranked if self.elements[p] == kind]) for kind in SIZES}
+        order = [value for kind in self.elements for value in own[next(given[kind])]]
+        return replace(self, values=tuple(self.values[place] for place in order)), order
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [sample time, pressure gain, reference pressure, table]."""

@@ -13,7 +13,6 @@ from annotated_types import Ge, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.force.laws import ForceLaw
 from mckibben.blocks.force.multistate_friction import (
     EACH_WAY,
     EIGHTEEN,
@@ -47,11 +46,11 @@ GAINS = (-0.5, 1.0)
 
 def extract_hysteresis(
     recordings: Recording | Sequence[Recording],
-    law: ForceLaw,
+    law: Block,
     *,
     output: str = "force_hysteresis",
 ) -> list[Recording]:
-    """Return recordings with what a static law leaves of the force: f_h = f - f_st.
+    """Return recordings with what a model leaves of its output, as a static law: f_h = f - f_st.
 
     Source: "A Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the
     Mechanical Response of Pneumatic Artificial Muscles", Eq. (2).
@@ -60,23 +59,21 @@ def extract_hysteresis(
     ----------
     recordings : Recording or sequence of Recording
         Isobaric runs with length, pressure and force.
-    law : ForceLaw
-        Static force, identified from isometric runs.
+    law : Block
+        Of one output, as a static force law identified from isometric runs.
     output : str
-        Name of the new channel [N].
+        Name of the new channel, in the unit of the output.
 
     Raises
     ------
     DataError
         Where a channel that the law needs is absent.
     """
-    every = listed(recordings)
-    force = law.outputs[0].name
+    (force,) = law.outputs
     found = []
-    for recording in every:
-        static = law.simulate(recording)[force]
-        left = recording[force] - static
-        found.append(recording.with_channels({output: "N"}, **{output: left}))
+    for recording in listed(recordings):
+        left = recording[force.name] - law.simulate(recording)[force.name]
+        found.append(recording.with_channels({output: force.unit}, **{output: left}))
     return found
 
 

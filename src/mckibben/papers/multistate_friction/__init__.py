@@ -1,1 +1,1 @@
-"""Paper C: multistate friction."""
+"""Multistate friction: static force, friction by direction, and feedforward with both."""

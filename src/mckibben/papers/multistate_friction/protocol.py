@@ -9,75 +9,72 @@ from __future__ import annotations
 
 import numpy as np
 
+from mckibben.arrays import Array
+from mckibben.errors import DataError
 from mckibben.recording import Recording
+from mckibben.rigs import Rig
 from mckibben.signals.excitations import irregular_triangle, triangle
-from mckibben.signals.protocol import Protocol, Run
+from mckibben.signals.protocol import Protocol, Role, Run
 
-SAMPLE_TIME = 0.02
-LENGTHS = {
-    200.0: 0.0,
-    198.0: 0.8,
-    196.0: 1.2,
-    194.0: 1.6,
-    192.0: 1.9,
-    190.0: 2.2,
-    188.0: 2.4,
-    186.0: 2.7,
-    184.0: 3.0,
-}
+SAMPLE_TIME, LONGEST, HIGHEST = 0.02, 200.0, 6.0
+"""Time between samples [s]; length at rest [mm] and highest pressure [bar] of the paper's muscle."""
+
+FIRST = (0.0, 0.8, 1.2, 1.6, 1.9, 2.2, 2.4, 2.7, 3.0)
+LENGTHS = dict(zip(np.arange(200.0, 183.0, -2.0).tolist(), FIRST, strict=True))
 """Held in the isometric tests [mm], and the pressure from which each starts, where the muscle is just
 taut [bar]: below, it would move. Shorter ones go slack while their friction is being released."""
 
 SHORTEST = {1.0: 198.2, 2.0: 194.2, 3.0: 189.7, 4.0: 185.0, 5.0: 180.5, 6.0: 176.5}
 """Where each isobaric cycle turns [mm], by pressure [bar]: just before the muscle goes slack."""
 
-LONGEST = 200.0
-SPEED = 2.0
-"""Of the screw [mm/s]."""
-
-CYCLES = 3
-RISE = 60.0
-"""Time in which the pressure rises to 6 bar [s]."""
+IDENTIFIED_AT, SPEED, CYCLES = 4.0, 2.0, 3
+"""Pressure whose loop identifies the friction [bar]; speed of the screw [mm/s], and cycles of a run."""
 
 SWINGS, SWING, SWING_PERIOD = 12, 12.0, 10.0
-"""Before an isometric run the length swings at 6 bar, ever less, so that friction is left near zero:
-number of swings, the first one's amplitude [mm], and their time [s]."""
+"""Before an isometric run the length swings at the highest pressure, ever less, so that friction is left
+near zero: number of swings, the first one's amplitude [mm], and their time [s]."""
 
-VENTING = 10.0
-"""Time in which the pressure then falls to the first one [s]."""
-
-IDENTIFIED_AT = 4.0
-"""Pressure whose loop identifies the friction [bar]."""
+VENTING, RISE = 10.0, 60.0
+"""Times in which the pressure then falls to the first one, and rises again [s]."""
 
 
-def multistate_friction() -> Protocol:
-    """Return the isometric runs, the isobaric cycles, and one with minor loops."""
-    runs = []
+def multistate_friction(rig: Rig | None = None) -> Protocol:
+    """Return the isometric runs, the isobaric cycles, and one with minor loops.
+
+    On another test stand lengths are in proportion to its length at the start, pressures to its highest.
+    """
+    wide, strong = 1.0, 1.0
+    if rig is not None:
+        if "length" not in rig.inputs:
+            remedy = "change a test stand, as mckibben rig show mas10-test-stand prints it"
+            raise DataError(f"the rig {rig.name!r} imposes no length", remedy=remedy)
+        wide = rig.start.get("length", rig.limits("length").high) / LONGEST
+        strong = rig.limits("pressure").high / HIGHEST
+    runs = list[Run]()
+
+    def add(name: str, role: Role, bars: Array, lengths: Array, lead: float = 0.0) -> None:
+        inputs = {"pressure": strong * bars, "length": wide * lengths}
+        start = {f"start.{channel}": float(values[0]) for channel, values in inputs.items()}
+        stage, held = ("static", "length") if lead else ("friction", "pressure")
+        labels = {"stage": stage, held: start[f"start.{held}"]}
+        runs.append(Run(name, role, Recording(inputs, SAMPLE_TIME), start, labels, lead))
+
     lead = SWINGS * SWING_PERIOD + VENTING
-    time = np.arange(round((lead + RISE) / SAMPLE_TIME) + 1) * SAMPLE_TIME
-    swung = np.clip(1.0 - time / (SWINGS * SWING_PERIOD), 0.0, 1.0)
-    swinging = SWING * swung * np.sin(2 * np.pi * time / SWING_PERIOD)
+    time = _time(lead + RISE)
+    swung = SWING * np.clip(1.0 - time / (SWINGS * SWING_PERIOD), 0.0, 1.0)
+    swinging = swung * np.sin(2 * np.pi * time / SWING_PERIOD)
     for length, first in LENGTHS.items():
-        rising = np.interp(time, (lead - VENTING, lead, lead + RISE), (6.0, first, 6.0))
-        runs.append(
-            Run(
-                name=f"isometric-{length:.0f}mm",
-                role="train",
-                inputs=_inputs(rising, np.minimum(length + swinging, LONGEST)),
-                settings={"start.length": length, "start.pressure": 6.0},
-                labels={"stage": "static", "length": length},
-                lead=lead,
-            )
-        )
-    for pressure, shortest in SHORTEST.items():
+        rising = np.interp(time, (lead - VENTING, lead, lead + RISE), (HIGHEST, first, HIGHEST))
+        lengths = np.minimum(length + swinging, LONGEST)
+        add(f"isometric-{wide * length:.4g}mm", "train", rising, lengths, lead)
+    for bar, shortest in SHORTEST.items():
         period = 2 * (LONGEST - shortest) / SPEED
-        time = np.arange(round(CYCLES * period / SAMPLE_TIME) + 1) * SAMPLE_TIME
-        gone = triangle(time, period, LONGEST - shortest)
-        runs.append(_isobaric(f"isobaric-{pressure:.0f}bar", pressure, LONGEST - gone))
-    shortest = SHORTEST[IDENTIFIED_AT]
-    time = np.arange(round(120.0 / SAMPLE_TIME) + 1) * SAMPLE_TIME
-    gone = irregular_triangle(time, 13, LONGEST - shortest, seed=4)
-    runs.append(_isobaric("isobaric-minor-loops", IDENTIFIED_AT, LONGEST - gone, minor=True))
+        gone = triangle(_time(CYCLES * period), period, LONGEST - shortest)
+        role: Role = "train" if bar == IDENTIFIED_AT else "test"
+        add(f"isobaric-{strong * bar:.3g}bar", role, np.full(gone.size, bar), LONGEST - gone)
+    gone = irregular_triangle(_time(120.0), 13, LONGEST - SHORTEST[IDENTIFIED_AT], seed=4)
+    held = np.full(gone.size, IDENTIFIED_AT)
+    add("isobaric-minor-loops", "test", held, LONGEST - gone)
     return Protocol(
         name="multistate-friction",
         rig="mas10-test-stand",
@@ -88,16 +85,5 @@ def multistate_friction() -> Protocol:
     )
 
 
-def _isobaric(name: str, pressure: float, length: np.ndarray, minor: bool = False) -> Run:
-    identifies = pressure == IDENTIFIED_AT and not minor
-    return Run(
-        name=name,
-        role="train" if identifies else "test",
-        inputs=_inputs(np.full(length.size, pressure), length),
-        settings={"start.pressure": pressure, "start.length": LONGEST},
-        labels={"stage": "friction", "pressure": pressure},
-    )
-
-
-def _inputs(pressure: np.ndarray, length: np.ndarray) -> Recording:
-    return Recording({"pressure": pressure, "length": length}, SAMPLE_TIME)
+def _time(duration: float) -> Array:
+    return np.asarray(np.arange(round(duration / SAMPLE_TIME) + 1) * SAMPLE_TIME, dtype=float)

@@ -1,0 +1,313 @@
+"""Static force from isometric runs, friction from an isobaric loop, and feedforward with both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mckibben import registry
+from mckibben.arrays import Array
+from mckibben.blocks.force.feedforward import ForceFeedforward
+from mckibben.blocks.force.laws import PolynomialForce
+from mckibben.blocks.force.multistate_friction import MultistateFriction
+from mckibben.control import track
+from mckibben.errors import DataError
+from mckibben.estimators.catalogue import full_name
+from mckibben.estimators.core.ranges import parameter_ranges
+from mckibben.estimators.force.multistate import extract_hysteresis
+from mckibben.metrics import score
+from mckibben.papers.experiment import Cell, Curves, Experiment, Fitted, Labels, Rerun, Runs, rms
+from mckibben.papers.multistate_friction.protocol import SAMPLE_TIME
+from mckibben.recording import Recording
+from mckibben.signals import cycles
+from mckibben.signals.excitations import irregular_triangle
+from mckibben.signals.protocol import Role
+
+STATIC, LAW = "static law alone", "force-bilinear"
+PAPERS, OURS, EIGHTEEN = "11 parameters, the paper's", "11 parameters, ours", "18 parameters"
+HYSTERESIS, ELONGATION = "force_hysteresis", "elongation"
+"""What a static law leaves of the force [N], and the length beyond that at rest [mm], where models start
+that are at rest at 0."""
+
+LINE: dict[str, Any] = {"input": ELONGATION, "degree": 1}
+"""A straight line as the reversible part: a polynomial is wild at lengths that were not in the data."""
+
+SIGNED: dict[str, Any] = {"input": ELONGATION, "n_operators": 39, "nonnegative": False}
+MODELS: Mapping[str, tuple[str, dict[str, Any]]] = {
+    PAPERS: ("multistate-11", {"static": None}),
+    OURS: ("multistate", {"static": None}),
+    EIGHTEEN: ("multistate-18", {"static": None}),
+    "modified Maxwell-slip": ("mms", LINE | {"n_operators": 38}),
+    "modified PI": ("mpi", {"input": ELONGATION, "n_operators": 33}),
+    "PI with weights of either sign": ("pi", SIGNED),
+    "generalised Bouc-Wen": ("gbw", LINE),
+    "Maxwell-slip": ("maxwell-slip", LINE),
+    "Bouc-Wen": ("bouc-wen", LINE),
+    "Duhem": ("duhem", LINE),
+}
+"""Estimators of the hysteresis and their settings: the paper's sizes, where it gives one."""
+
+FRICTIONS = (PAPERS, OURS, EIGHTEEN)
+CLOSED = {model: f"{model}, closed loop" for model in MODELS}
+"""Names of the models that are fitted to the closed loop."""
+
+
+class Hysteresis(NamedTuple):
+    """Isobaric runs by title with what the law leaves, and the fits to one of them and to its loop."""
+
+    law: PolynomialForce
+    runs: dict[str, Recording]
+    chosen: str
+    bar: float
+    loop: Recording
+    unused: list[str]
+    fitted: dict[str, Fitted]
+
+
+def run(experiment: Experiment) -> None:
+    """Record isometric and isobaric runs, and identify force laws and friction."""
+    runs = experiment.record(until=0.4)
+    isometric = runs.select(stage="static")
+    experiment.tell(0.42, "static laws")
+    found = _hysteresis(runs, _static_laws(experiment, isometric))
+    experiment.tell(0.45, "friction")
+    for model, name in CLOSED.items():
+        fewer = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
+        closed = _estimator(model, experiment.seed, **fewer)
+        found.fitted[name] = experiment.fit(name, closed, found.loop)
+        whole, rested = found.runs[found.chosen], replace(closed, initial="virgin")
+        found.fitted[model] = experiment.fit(model, rested, whole)
+    _errors(experiment, found)
+    experiment.tell(0.65, "how far parameters are determined")
+    for key, model in (("friction", PAPERS), ("friction_ours", OURS))[: 2 - experiment.quick]:
+        _parameters(experiment, key, model, found)
+    _figures(experiment, isometric, found)
+    _feedforward(experiment, found)
+
+
+def _estimator(model: str, seed: int, **how: Any) -> Any:
+    name, settings = MODELS[model]
+    how |= {"output": HYSTERESIS, "seed": seed, "initial": "first_sample"}
+    return registry.load("estimators", name)(**settings, **how)
+
+
+def _static_laws(experiment: Experiment, isometric: Sequence[Recording]) -> PolynomialForce:
+    """Add errors of force laws on the isometric runs, and coefficients and forces of the paper's."""
+    rows: dict[str, list[Cell]] = {}
+    measured = np.concatenate([one["force"] for one in isometric])
+    others = ("force-chou", "force-tondu", "force-petrovic", "force-minh", "force-schindele")
+    for name in (LAW, *others)[: 1 if experiment.quick else None]:
+        estimator = registry.load("estimators", name)(seed=experiment.seed)
+        fit = experiment.fit(name, estimator, isometric)
+        modelled = np.concatenate([experiment.simulate(name, one)["force"] for one in isometric])
+        rows[full_name(name)] = [fit.rmse, score(measured, modelled).r2, fit.block.n_parameters]
+    experiment.table("laws", ["RMSE [N]", "r²", "parameters"], rows)
+    law = experiment.models[LAW]
+    assert isinstance(law, PolynomialForce)
+    top = max(float(one["pressure"].max()) for one in isometric)
+    held = [round(float(one["length"].mean())) for one in isometric]
+    names = ("a_1 [N/bar]", "a_3 [N/(bar mm)]", "a_0 [N]", "a_2 [N/mm]", "a_4 [N/mm^2]")
+    both = [experiment.paper.printed("multistate-static-force"), law.unscaled()]
+    cells = sorted(zip(names, *(one.pack().tolist() for one in both), strict=True))
+    for bar in sorted({round(share * top) for share in (1 / 6, 2 / 3, 1.0)}):
+        for length in (min(held), max(held)):
+            forces = [float(np.dot((bar, 1.0), one.terms(np.array(length)))) for one in both]
+            given = forces[0] if 160 <= length <= 202 else None  # its muscle's lengths
+            cells.append((f"force at {length} mm, {bar} bar [N]", given, forces[1]))
+    experiment.table("static", ["printed", "here"], cells)
+    return law
+
+
+def _hysteresis(runs: Runs, law: PolynomialForce) -> Hysteresis:
+    """Return what the law leaves of the isobaric runs, in the order of their pressures."""
+    (chosen,) = runs.names("train", stage="friction")
+    names = runs.names(stage="friction")
+    names.sort(key=lambda name: (runs.of(name, "pressure"), name != chosen))
+    rest = float(runs[chosen]["length"][0])
+    found: dict[str, Recording] = {}
+    for name, left in zip(names, extract_hysteresis([runs[n] for n in names], law), strict=True):
+        bar, elongation = f"{runs.of(name, 'pressure'):.3g} bar", left["length"] - rest
+        title = name if bar in found else bar
+        found[title] = left.with_channels({ELONGATION: "mm"}, **{ELONGATION: elongation})
+    title = f"{(level := float(runs.of(chosen, 'pressure'))):.3g} bar"
+    # the first cycle begins at rest; from its end on the loop is closed
+    whole, begun = found[title], cycles(-found[title]["length"])
+    loop = whole.slice(begun[0].stop - 1, len(whole)) if len(begun) > 1 else whole
+    return Hysteresis(law, found, title, level, loop, [one for one in found if one != title], {})
+
+
+def _errors(experiment: Experiment, found: Hysteresis) -> None:
+    """Add the errors of all models on the loop they are fitted to, and on all loops, best first."""
+    rows: dict[str, list[Cell]] = {}
+    errors = {STATIC: {title: rms(one[HYSTERESIS]) for title, one in found.runs.items()}}
+    for model, name in CLOSED.items():
+        modelled = experiment.simulate(name, found.loop)[HYSTERESIS]
+        r2, fit = score(found.loop[HYSTERESIS], modelled).r2, found.fitted[name]
+        rows[model] = [fit.block.n_parameters, fit.rmse, r2]
+        free = {title: experiment.simulate(model, one) for title, one in found.runs.items()}
+        lost = {
+            title: one[HYSTERESIS] - found.runs[title][HYSTERESIS] for title, one in free.items()
+        }
+        errors[model] = {title: rms(values) for title, values in lost.items()}
+    experiment.table("closed", ["parameters", "RMSE [N]", "r²"], rows, at=found.chosen)
+    left = {model: found.fitted[name].rmse for model, name in CLOSED.items()}
+    closer = sum(own < min(left[PAPERS], left[OURS]) for own in left.values())
+    r2s = {model: cells[-1] for model, cells in rows.items()}
+    experiment.says(left=left, r2=r2s, closer=closer, n=len(left))
+    worst: dict[str, float] = {
+        model: max((own[t] / errors[STATIC][t] for t in found.unused), default=math.nan)
+        for model, own in errors.items()
+    }
+    every = {
+        n: [rows.get(n, [None])[0], *errors[n].values(), worst[n] if found.unused else None]
+        for n in (STATIC, *sorted(MODELS, key=lambda model: worst[model]))
+    }
+    columns = ["parameters", *found.runs, "at most, of the static law's"]
+    experiment.table("loops", columns, every, at=found.chosen)
+    if found.unused:
+        better = sum(own < min(worst[PAPERS], worst[OURS]) for own in worst.values())
+        won = sum(errors[EIGHTEEN][title] < errors[PAPERS][title] for title in found.unused)
+        experiment.says(worst=worst, better=better, won=won, unused=len(found.unused))
+
+
+WIDE, EVERY, NEAR = 10.0, 16.0, 1.05
+"""Ratio of a range's ends beyond which a parameter is called not determined; evaluations from one
+report of a search to the next, and how near to its least error is near."""
+
+
+def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis) -> None:
+    """Add the parameters of a friction, and how far the closed loop determines them."""
+    fits = [first := found.fitted[CLOSED[model]]]
+    for seed in range(experiment.seed + 1, experiment.seed + (2 if experiment.quick else 5)):
+        fits.append(experiment.fit(f"{model}, seed {seed}", _estimator(model, seed), found.loop))
+    ranked = [one.block.by_strength() for one in fits if isinstance(one.block, MultistateFriction)]
+    friction, order = ranked[0]
+    ranges = parameter_ranges(friction, found.loop, others=[other for other, _ in ranked[1:]])
+    errors = np.array(first.standard_errors)[order]
+    theirs = {PAPERS: experiment.paper.printed("multistate-friction").values}.get(
+        model, (None,) * len(order)
+    )
+    rows: dict[str, list[Cell]] = {}
+    for name, *three, (low, high) in zip(
+        friction.parameter_names, theirs, friction.values, errors, ranges.tolist(), strict=True
+    ):
+        cells = [None if x is None or math.isnan(x) else float(x) for x in three]
+        ends: list[Cell] = [low, high if math.isfinite(high) else "any larger"]
+        rows[name] = [*cells, *ends, "" if high < WIDE * low else "not determined"]
+    columns = ["printed", "here", "standard error", "from", "to", "determined?"]
+    experiment.table(key, columns, rows, wide=WIDE, at=found.chosen)
+    if model == PAPERS:
+        vague = [name for name, cells in rows.items() if cells[-1]]
+        experiment.says(n_vague=len(vague), vague="; ".join(vague) or "none")
+
+
+def _figures(experiment: Experiment, isometric: Sequence[Recording], found: Hysteresis) -> None:
+    """Add the runs, what is extracted of them, and what models leave of it."""
+    length, extracted = found.loop["length"], found.loop[HYSTERESIS]
+    modelled = {n: experiment.simulate(CLOSED[n], found.loop)[HYSTERESIS] for n in FRICTIONS}
+    held = {f"{one['length'].mean():.0f} mm": one for one in isometric}
+    forces = {title: (one["pressure"], one["force"]) for title, one in held.items()}
+    laws: dict[str, Curves] = {}
+    for title in [*held][:: max(1, (len(held) - 1) // 2)]:
+        law = held[title]["pressure"], experiment.simulate(LAW, held[title])["force"]
+        laws[title] = {held[title].origin: forces[title], "static law": law}
+    costs = {name: np.array(found.fitted[CLOSED[name]].search) for name in (PAPERS, EIGHTEEN)}
+    steps = {name: np.cumsum(np.full(cost.size, EVERY)) for name, cost in costs.items()}
+    experiment.says(near={n: steps[n][np.argmax(c < NEAR * c.min())] for n, c in costs.items()})
+    total: dict[str, Curves] = {}
+    for title, one in ((title, found.runs[title]) for title in found.unused):
+        x, static = one["length"], one["force"] - one[HYSTERESIS]
+        total[title] = {one.origin: (x, one["force"]), STATIC: (x, static)} | {
+            n: (x, static + experiment.simulate(n, one)[HYSTERESIS]) for n in (PAPERS, OURS)
+        }
+    loops = {n: (r["length"], r["force"]) for n, r in found.runs.items() if n.endswith(" bar")}
+    experiment.figure("isobaric", {"": loops})
+    experiment.figure("isometric", {"": dict([*forces.items()][:: -(-len(forces) // 6)])})
+    experiment.figure("law", laws)
+    of_loop = {n: (length, force) for n, force in ({"extracted": extracted} | modelled).items()}
+    experiment.figure("loop", {"": of_loop})
+    experiment.figure("search", {"": {name: (steps[name], cost) for name, cost in costs.items()}})
+    experiment.figure("left", {"": {n: (length, f - extracted) for n, f in modelled.items()}})
+    experiment.figure("unused", total)
+
+
+STROKE, APPROACH, SWINGING = 0.8, 10.0, 7.0
+"""Imposed motion, by that of the loop; time to the first force, and period of the sine [s]."""
+
+
+def _feedforward(experiment: Experiment, found: Hysteresis) -> None:
+    """Add forces tracked on the rig without feedback; references are ours, as the paper tries none."""
+    if experiment.rig is None:
+        return
+    law, (n, turns) = found.law, (1, 5) if experiment.quick else (3, 9)
+    time = np.arange(round(10.0 * (turns - 1) / SAMPLE_TIME) + 1) * SAMPLE_TIME
+    stroke = STROKE * float(np.ptp(found.loop["length"]))
+    length = found.loop["length"].max() - irregular_triangle(time, turns, stroke, seed=7)
+    static = [float((one["force"] - one[HYSTERESIS]).max()) for one in found.runs.values()]
+    held = float(f"{max(static) / 4:.2g}")
+    references = {
+        f"static law at {found.chosen}": np.dot((found.bar, 1.0), law.terms(length)),
+        f"{held:.0f} N": np.full(time.size, held),
+        f"{held:.0f} N ± {held / 3:.0f} N": held * (1 + np.sin(2 * np.pi * time / SWINGING) / 3),
+    }
+    ways = {STATIC: ForceFeedforward(law)}
+    for name in FRICTIONS[: max(n, 2)]:
+        friction: Any = experiment.models[name]
+        ways[name] = ForceFeedforward(law, replace(friction, output=law.outputs[0]))
+    rows: list[list[Cell]] = []
+    panels: dict[str, dict[str, tuple[Array, Array]]] = {}
+    for title, force in [*references.items()][:n]:
+        reference = Recording({"force": force, "length": length}, SAMPLE_TIME)
+        panels[title] = {"reference": (length, force)}
+        for name, way in ways.items():
+            experiment.tell(0.75 + len(rows) / 48, f"feedforward of {title}")
+            done = track(way, experiment.rig, reference, approach=APPROACH, seed=experiment.seed)
+            missed = done.rmse["force"], done.largest["force"], float(done.clipped)
+            rows.append([title, name, *missed])
+            last = done.recording.slice(len(done.recording) - time.size, len(done.recording))
+            panels[title][name] = last["length"], last["force"]
+    columns = ["compensated by", "RMSE [N]", "largest [N]", "steps at a limit"]
+    experiment.table("feedforward", columns, rows, stroke=stroke, at=found.chosen)
+    experiment.figure("feedforward", dict([*panels.items()][:2]))
+    experiment.says(tracked={str(row[1]): row[2] for row in rows[: len(ways)]})
+
+
+HELD, STROKES = 0.2, 0.1
+"""Of what is driven, what is held moves less; a stroke of this share is as much as the top pressure."""
+
+
+def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
+    """Return which runs are isometric and isobaric, and which one identifies friction.
+
+    That is the largest loop at the pressure nearest to two thirds of the highest, as 4 of 6 bar.
+    """
+    kinds: list[tuple[str, float, float]] = []
+    top = max(float(one["pressure"].max()) for one in recordings)
+    for length, bar, _ in ([one[c] for c in ("length", "pressure", "force")] for one in recordings):
+        stroke, swing = (np.ptp(np.percentile(x, [1, 99])) for x in (length, bar))
+        moved, driven = stroke / (STROKES * length.max()), swing / top
+        held = "length" if moved < HELD * driven else "pressure" if driven < HELD * moved else ""
+        size = np.median([np.ptp(length[cycle]) for cycle in cycles(-length)] or [stroke])
+        level = round(float(np.median(bar if held == "pressure" else length)), 1)
+        kinds.append((held, level, float(size)))
+    for held, other, least in (("length", "pressure", 3), ("pressure", "length", 1)):
+        if (n := len({level for kind, level, _ in kinds if kind == held})) < least:
+            message = f"it is held at {n} values while the {other} moves, of at least {least}"
+            raise DataError(message, channel=held, remedy=f"record runs that hold the {held}")
+    loops = {place: kind for place, kind in enumerate(kinds) if kind[0] == "pressure"}
+    chosen = min(loops, key=lambda place: (abs(loops[place][1] - top / 1.5), -loops[place][2]))
+    stages = {"length": "static", "pressure": "friction"}
+    roles: list[Role] = [
+        "test" if i in loops and i != chosen else "train" for i in range(len(kinds))
+    ]
+    return [
+        Labels(role, {"stage": stages[held], held: level}) if held else None
+        for role, (held, level, _) in zip(roles, kinds, strict=True)
+    ]
+
+
+RERUN = Rerun(run, sort)

@@ -121,9 +121,8 @@ def test_feedforward_is_exact(gain: float) -> None:
     length = np.interp(np.arange(264), np.arange(0, 288, 24), 192.5 + 3.5 * (-0.9) ** np.arange(12))
     wanted = 300.0 + 60.0 * np.sin(np.linspace(0, 20, length.size))
     recording = Recording({"force": wanted, "length": length}, 0.01)
-    pressure = ForceFeedforward(printed("multistate-static-force"), friction).simulate(recording)[
-        "pressure"
-    ]
+    law = printed("multistate-static-force")
+    pressure = ForceFeedforward(law, friction).simulate(recording)["pressure"]
     driven = Recording({"length": length, "pressure": pressure}, 0.01)
     reached = Parallel((law, friction)).simulate(driven)["force"]
     np.testing.assert_allclose(reached, wanted, atol=1e-9)

@@ -121,7 +121,7 @@ def test_a_trust_region_falls_at_every_step_and_arrives(bounds: tuple[float, flo
     )
     np.testing.assert_array_equal(path[0][0], start)
     costs = [float(np.sum(valley(point) ** 2)) for point, _ in path]
-    assert costs == [cost for _, cost in path]
+    np.testing.assert_allclose(costs, [cost for _, cost in path], rtol=1e-13)
     assert np.all(np.diff(costs) < 0)
     np.testing.assert_allclose(path[-1][0], [1, 1], atol=1e-6)
 

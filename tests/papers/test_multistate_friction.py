@@ -96,6 +96,10 @@ def test_one_loop_of_another_stand_is_enough(other: tuple[list[Recording], list[
     keys = {table.key for table in found.tables}
     assert keys == {"laws", "static", "closed", "loops", "friction"}
     assert "Recordings that are not used: odd." in found.notes
+    search = next(one for one in found.figures if one.key == "search").panels[""]
+    for steps, costs in search.values():
+        assert np.all(np.diff(steps) > 0)
+        assert costs[-1] < 0.8 * costs[0]
     (closed,) = (table for table in found.tables if table.key == "closed")
     rmse, r2 = (closed.columns.index(name) for name in ("RMSE [N]", "r²"))
     assert closed.rows[0][r2] > 0.99

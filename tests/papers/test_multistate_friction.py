@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,9 +35,9 @@ OTHER = {
 NAMES = ("isometric-300mm", "isometric-288mm", "isometric-276mm", "isobaric-3bar", "isobaric-6bar")
 
 
-def stripped(rig: Rig, names: tuple[str, ...]) -> tuple[list[Recording], list[object]]:
+def stripped(rig: Rig, names: tuple[str, ...]) -> tuple[list[Recording], list[Any]]:
     """Return runs of the protocol on a rig without what they are for, and that."""
-    recordings, labels = [], []
+    recordings, labels = list[Recording](), list[Any]()
     for run, one in record("multistate-friction", rig, runs=names):
         labels.append((run.role, dict(run.labels)))
         meta = {key: value for key, value in one.meta.items() if key not in ("protocol", "role")}
@@ -45,7 +46,7 @@ def stripped(rig: Rig, names: tuple[str, ...]) -> tuple[list[Recording], list[ob
 
 
 @pytest.fixture(scope="module")
-def other() -> tuple[list[Recording], list[object]]:
+def other() -> tuple[list[Recording], list[Any]]:
     """Runs of another stand, with minor loops at the pressure that identifies."""
     rig = load_rig("mas10-test-stand").changed(OTHER)
     return stripped(rig, (*NAMES, "isobaric-minor-loops"))
@@ -64,7 +65,7 @@ def test_the_protocol_is_in_proportion_to_the_stand() -> None:
 
 
 def test_own_runs_are_sorted_by_what_was_driven(
-    other: tuple[list[Recording], list[object]],
+    other: tuple[list[Recording], list[Any]],
 ) -> None:
     recordings, labels = other
     noisy = [
@@ -88,7 +89,7 @@ def test_own_runs_are_sorted_by_what_was_driven(
 
 
 @pytest.mark.long
-def test_one_loop_of_another_stand_is_enough(other: tuple[list[Recording], list[object]]) -> None:
+def test_one_loop_of_another_stand_is_enough(other: tuple[list[Recording], list[Any]]) -> None:
     recordings = [*other[0][:3], other[0][4]]
     given = [one.with_meta(name=str(place)) for place, one in enumerate(recordings)]
     both = given[0].with_channels(length=200.0 + 20.0 * np.sin(given[0].time))
@@ -100,10 +101,9 @@ def test_one_loop_of_another_stand_is_enough(other: tuple[list[Recording], list[
     for steps, costs in search.values():
         assert np.all(np.diff(steps) > 0)
         assert costs[-1] < 0.8 * costs[0]
-    (closed,) = (table for table in found.tables if table.key == "closed")
-    rmse, r2 = (closed.columns.index(name) for name in ("RMSE [N]", "r²"))
-    assert closed.rows[0][r2] > 0.99
-    assert closed.rows[0][rmse] < 10.0
+    (closed,) = (table for table in found.to_dict()["tables"] if table["key"] == "closed")
+    assert closed["rows"][0]["r²"] > 0.99
+    assert closed["rows"][0]["RMSE [N]"] < 10.0
 
 
 @pytest.mark.long

@@ -164,8 +164,8 @@ def test_elements_of_one_kind_are_ordered_by_strength() -> None:
     assert ordered.values == (3.0, 0.4, 8.0, 2.0, 0.2, 6.0, 0.3, 7.0, 1.0, 0.1, 5.0)
     assert [friction.values[place] for place in order] == list(ordered.values)
     run = isobaric()
-    force, again = (each.simulate(run)["force"] for each in (friction, ordered))
-    np.testing.assert_allclose(force, again, atol=1e-9)
+    ours, theirs = (each.simulate(run)["force"] for each in (friction, ordered))
+    np.testing.assert_allclose(ours, theirs, atol=1e-9)
 
 
 def test_a_scaled_law_is_printed_by_the_length_itself() -> None:

@@ -37,7 +37,7 @@ NAMES = ("isometric-300mm", "isometric-288mm", "isometric-276mm", "isobaric-3bar
 
 def stripped(rig: Rig, names: tuple[str, ...]) -> tuple[list[Recording], list[Any]]:
     """Return runs of the protocol on a rig without what they are for, and that."""
-    recordings, labels = [], []
+    recordings, labels = list[Recording](), list[Any]()
     for run, one in record("multistate-friction", rig, runs=names):
         labels.append((run.role, dict(run.labels)))
         meta = {key: value for key, value in one.meta.items() if key not in ("protocol", "role")}
@@ -65,7 +65,7 @@ def test_the_protocol_is_in_proportion_to_the_stand() -> None:
 
 
 def test_own_runs_are_sorted_by_what_was_driven(
-    other: tuple[list[Recording], list[object]],
+    other: tuple[list[Recording], list[Any]],
 ) -> None:
     recordings, labels = other
     noisy = [
@@ -89,7 +89,7 @@ def test_own_runs_are_sorted_by_what_was_driven(
 
 
 @pytest.mark.long
-def test_one_loop_of_another_stand_is_enough(other: tuple[list[Recording], list[object]]) -> None:
+def test_one_loop_of_another_stand_is_enough(other: tuple[list[Recording], list[Any]]) -> None:
     recordings = [*other[0][:3], other[0][4]]
     given = [one.with_meta(name=str(place)) for place, one in enumerate(recordings)]
     both = given[0].with_channels(length=200.0 + 20.0 * np.sin(given[0].time))
@@ -97,11 +97,13 @@ def test_one_loop_of_another_stand_is_enough(other: tuple[list[Recording], list[
     keys = {table.key for table in found.tables}
     assert keys == {"laws", "static", "closed", "loops", "friction"}
     assert "Recordings that are not used: odd." in found.notes
-    (closed,) = (table for table in found.tables if table.key == "closed")
-    rmse, r2 = (closed.columns.index(name) for name in ("RMSE [N]", "r²"))
-    row: tuple[Any, ...] = closed.rows[0]
-    assert row[r2] > 0.99
-    assert row[rmse] < 10.0
+    search = next(one for one in found.figures if one.key == "search").panels[""]
+    for steps, costs in search.values():
+        assert np.all(np.diff(steps) > 0)
+        assert costs[-1] < 0.8 * costs[0]
+    (closed,) = (table for table in found.to_dict()["tables"] if table["key"] == "closed")
+    assert closed["rows"][0]["r²"] > 0.99
+    assert closed["rows"][0]["RMSE [N]"] < 10.0
 
 
 @pytest.mark.long

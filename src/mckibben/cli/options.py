@@ -119,7 +119,9 @@ Resample = Annotated[
 Between = Annotated[
     str | None,
     typer.Option(
-        "--between", metavar="START:END", help="Part of every recording [s]; END may be left out."
+        "--between",
+        metavar="START:END",
+        help="Part of every recording [s]; either may be left out.",
     ),
 ]
 Zero = Annotated[

@@ -149,7 +149,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     "papers": {
         "activation-pressure": "mckibben.papers.activation_pressure.run:RERUN",
         "field-models": "mckibben.papers.field_models.rerun:field_models",
-        "mpi-narmax": "mckibben.papers.mpi_narmax.rerun:mpi_narmax",
+        "mpi-narmax": "mckibben.papers.mpi_narmax.run:RERUN",
         "multistate-friction": "mckibben.papers.multistate_friction.rerun:multistate_friction",
         "sdchm": "mckibben.papers.sdchm.rerun:sdchm",
     },
@@ -166,7 +166,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         ),
         "field-models-p2uz": "mckibben.papers.field_models.published:process_model",
         "field-models-pi": "mckibben.papers.field_models.published:prandtl_ishlinskii",
-        "mpi-narmax-mpi": "mckibben.papers.mpi_narmax.published:modified_prandtl_ishlinskii",
+        "mpi-narmax-mpi": "mckibben.papers.mpi_narmax.printed:modified_prandtl_ishlinskii",
         "multistate-friction": "mckibben.papers.multistate_friction.published:multistate_friction",
         "multistate-static-force": "mckibben.papers.multistate_friction.published:static_force",
         "sdchm-coupling": "mckibben.papers.sdchm.published:coupling",

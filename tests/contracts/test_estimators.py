@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from sklearn.model_selection import GridSearchCV, cross_val_score
 
 from mckibben import DataError, ModelError, Recording, registry
 from mckibben import load as load_model
+from mckibben.estimators.core.uncertainty import relative_sizes, sensitivities
 from mckibben.estimators.optimisers.tracker import whole_searches
 from tests.estimators.examples import CASES, KINDS, quick, recorded
 from tests.estimators.examples import few_steps as few_steps  # a fixture
@@ -22,6 +24,13 @@ pytestmark = [
     pytest.mark.parametrize(("name", "kind"), CASES),
     pytest.mark.filterwarnings("ignore::mckibben.errors.ModelWarning"),
 ]
+
+
+STILL = {
+    "activation-pressure": {"contractions 4", "contractions 8"},  # read off the input's extremes
+    "p3": {"time constants 2", "time constants 3"},  # at their least, the sample time
+}
+"""Free numbers that do not move with the outputs of the example."""
 
 
 @cache
@@ -107,6 +116,50 @@ def test_diagnostics_say_how_good_the_fit_is(name: str, kind: str) -> None:
     assert found.covariance.shape == (n, n)
     np.testing.assert_array_equal(found.standard_errors, np.sqrt(np.diag(found.covariance)))
     assert set(estimator.undetermined()) <= set(range(n))
+
+
+def test_what_is_fixed_is_no_parameter_and_all_else_follows_the_data(name: str, kind: str) -> None:
+    """Of fits to other outputs of the same inputs, every number that is free differs, or is at a bound.
+
+    What is fixed does not, or moves the output in no way that the free numbers do not.
+    """
+    runs, outputs = recorded(kind), KINDS[kind].outputs
+    fits = [fitted(name, kind)]
+    for share in (0.02, 0.05):
+        with suppress(ModelError):  # a linear model may be unstable
+            fits.append(
+                quick(name, kind).fit([moved(r, outputs, share) for r in runs], rows=counts(kind))
+            )
+    packs = [fit.model_.pack() for fit in fits]
+    first, same = packs[0], [pack for pack in packs if pack.size == packs[0].size]
+    still = np.all([pack == first for pack in same], axis=0)
+    fixed = list(fits[0].fixed(fits[0].model_))
+    at_bounds = list(fits[0].diagnostics_.at_bounds)
+    assert fits[0].diagnostics_.n_free == first.size - len(fixed)
+    if len(same) > 1:
+        free = np.delete(np.arange(first.size), fixed + at_bounds)
+        names = {fits[0].model_.parameter_names[k] for k in free[still[free]]}
+        assert names <= STILL.get(name, set())
+    if not still[fixed].all():
+        model, size = fits[0].model_, relative_sizes(first)
+
+        def run(blocks: list[Any]) -> np.ndarray:
+            return np.array([b.simulate(runs[0]).matrix(outputs).ravel() for b in blocks])
+
+        slopes = sensitivities(model, range(first.size), size, run)
+        free = np.delete(slopes, fixed, axis=1)
+        left = slopes - free @ np.linalg.lstsq(free, slopes, rcond=1e-9)[0]
+        assert np.abs(left).max() < 1e-3 * np.abs(slopes).max()
+
+
+def moved(run: Recording, outputs: tuple[str, ...], share: float) -> Recording:
+    """Return a recording with other outputs: bent, shifted and shaken by a share of their range."""
+    bent = {}
+    for output in outputs:
+        y, wave = run[output], np.sin(0.07 * np.arange(len(run)))
+        size = np.ptp(y)
+        bent[output] = y + share * (size + (y - y.min()) ** 2 / size + 0.3 * size * wave)
+    return run.with_channels({output: run.units[output] for output in outputs}, **bent)
 
 
 def test_scikit_learn_validates_and_searches(name: str, kind: str) -> None:

@@ -127,6 +127,15 @@ class Parametrised(metaclass=Checked):
                 names += leaf.parameter_names if part else [self.name_of(field, index)]
         return tuple(names or (f"{self.kind} {place + 1}" for place in range(self.n_parameters)))
 
+    def numbers(self) -> Iterator[tuple[Parametrised, str, tuple[int, ...]]]:
+        """Give the part, the field and the places in it of every number of `pack`, in its order."""
+        for field in self.parameters:
+            for index, leaf in leaves(getattr(self, field)):
+                if isinstance(leaf, Parametrised):
+                    yield from leaf.numbers()
+                else:
+                    yield self, field, index
+
     def pack(self) -> Array:
         """Return the parameters as a vector, shape (n_parameters,); structure stays outside."""
         return gathered(self, self.parameters)

@@ -123,7 +123,7 @@ def fit(
             {
                 "model": model,
                 "file": str(out),
-                "n_parameters": estimator.model_.n_parameters,
+                "n_parameters": found.n_free,
                 "rmse": found.rmse,
                 "rmse_by_output": by_output,
                 "rmse_from_rest": found.rmse_from_rest,
@@ -145,7 +145,7 @@ def fit(
     stopped = " (interrupted: the best until then)" if found.interrupted else ""
     say(
         f"{model}: free-running RMSE {numeral(found.rmse, 4)} {unit_name} on {found.n_samples} samples, "
-        f"{estimator.model_.n_parameters} parameters, {found.seconds:.2f} s{stopped}"
+        f"{found.n_free} parameters, {found.seconds:.2f} s{stopped}"
     )
     if len(by_output) > 1:
         errors = [f"{name} {numeral(value, 4)} {unit_name}" for name, value in by_output.items()]

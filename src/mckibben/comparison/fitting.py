@@ -304,7 +304,7 @@ def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed
             invalid = "its outputs ran away on a part of the data that it was not fitted to"
     return Row(
         model=name,
-        n_parameters=len(names) if block is None else block.n_parameters,
+        n_parameters=found.diagnostics.get("n_free", len(names)),
         fit_seconds=found.seconds,
         step_ns=found.step_ns,
         train=mean_scores(list(on_train.values())),

@@ -119,7 +119,7 @@ def fit(model: str, settings: Mapping[str, Any], plant: str, moved: float = 0.0)
         "rmse_from_rest": known.rmse_from_rest,
         "r2": estimator.score(recordings),
         "n_samples": known.n_samples,
-        "n_parameters": estimator.model_.n_parameters,
+        "n_parameters": known.n_free,
         "response": _response(estimator.model_, recordings[0]),
         "model": {
             key: value

@@ -176,7 +176,7 @@ def constants(folder: Path) -> Tree:
             constants=free,
             method="ls",
         )
-        counted.append(estimator.fit(runs("lifted")).model_.n_parameters)
+        counted.append(estimator.fit(runs("lifted")).diagnostics_.n_free)
     return {"constants counted": counted[0] - counted[1]}
 
 
@@ -340,7 +340,7 @@ CASES: Mapping[str, tuple[str, Callable[[Path], Tree], Mapping[str, Any]]] = {
     "damper": ("mckibben characterize damper.csv", damper, {}),
     "seal": ("mckibben study seal.csv", seal, {"needs": ("foreign_friction",)}),
     "contraction": ("track(compensator of contraction, rig, mm)", contraction, {}),
-    "constants": ("n_parameters of mpi-narmax", constants, {}),
+    "constants": ("n_free of mpi-narmax", constants, {}),
     "module": ("python -m mckibben --version", module, {}),
     "damaged-cache": (f"mckibben {CACHED}", damaged, {}),
     "studied-again": ("mckibben study, stopped the second time", studied_again, {}),

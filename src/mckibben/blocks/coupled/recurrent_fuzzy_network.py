@@ -44,17 +44,17 @@ def recurrent_fuzzy_network_step(
 ) -> None:
     """Run free.
 
-    Coefficients are [n_a, n_b, n_c, sets, centres, widths, feedbacks (each inputs by sets),
-    consequents (rule by rule, each a coefficient for every x and a constant)]; the state is
-    [past outputs, past driven inputs, past scheduling inputs (one after another), memberships].
+    Coefficients are [n_a, n_b, n_c, sets, constants, centres, widths, feedbacks (each inputs by sets),
+    consequents (rule by rule, each a coefficient for every x, then a constant if there is one)]; the
+    state is [past outputs, past driven inputs, past scheduling inputs (one after another), memberships].
     """
     n_a, n_b, n_c = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
-    sets, n_scheduled = int(coefficients[3]), inputs.size - 1
+    sets, constant, n_scheduled = int(coefficients[3]), int(coefficients[4]), inputs.size - 1
     n = n_a + 1 + n_b + n_scheduled * (1 + n_c)
-    centres = coefficients[4 : 4 + n * sets]
-    widths = coefficients[4 + n * sets : 4 + 2 * n * sets]
-    feedbacks = coefficients[4 + 2 * n * sets : 4 + 3 * n * sets]
-    consequents = coefficients[4 + 3 * n * sets :]
+    centres = coefficients[5 : 5 + n * sets]
+    widths = coefficients[5 + n * sets : 5 + 2 * n * sets]
+    feedbacks = coefficients[5 + 2 * n * sets : 5 + 3 * n * sets]
+    consequents = coefficients[5 + 3 * n * sets :]
     x = scratch
     n_past = n_a + n_b + n_scheduled * n_c
     n_rules = 1
@@ -81,9 +81,10 @@ def recurrent_fuzzy_network_step(
         for i in range(n - 1, -1, -1):
             firing *= memberships[i * sets + rest % sets]
             rest //= sets
-        answer = consequents[rule * (n + 1) + n]
+        at = rule * (n + constant)
+        answer = consequents[at + n] if constant else 0.0
         for i in range(n):
-            answer += consequents[rule * (n + 1) + i] * x[i]
+            answer += consequents[at + i] * x[i]
         total += firing
         y += firing * answer
     y = y / total if total > LEAST_FIRING else (state[0] if n_a > 0 else 0.0)
@@ -118,13 +119,16 @@ class RecurrentFuzzyNetwork(Block):
     centres, widths, feedbacks : sequence of sequence of float
         m, sigma (positive) and theta of the sets of every x; as many sets for each.
     consequents : sequence of float
-        Rule after rule (the last x's set running fastest): a coefficient for every x, and a constant.
+        Rule after rule (the last x's set running fastest): a coefficient for every x, then the constant
+        if there is one.
     own_time : float
         Sample time that the network holds for [s], positive.
     output_lags, input_lags, scheduling_lags : int
         n_a (at least 1), n_b and n_c.
     driven, scheduled, given : sequence of Channel
         One driven input, those that schedule, one output.
+    constants : bool
+        Whether consequents have a constant term.
     """
 
     kind = "recurrent-fuzzy-network"
@@ -181,6 +185,7 @@ class RecurrentFuzzyNetwork(Block):
     output_lags: Annotated[int, Interval(ge=1, le=10)] = 1
     input_lags: Lag = 0
     scheduling_lags: Lag = 0
+    constants: bool = True
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -196,7 +201,7 @@ class RecurrentFuzzyNetwork(Block):
                 f"{self.kind!r} wants centres, widths and feedbacks of {self.n_regressors} inputs, as "
                 "many sets for each. Remedy: give them."
             )
-        wanted = self.n_sets**self.n_regressors * (self.n_regressors + 1)
+        wanted = self.n_sets**self.n_regressors * (self.n_regressors + self.constants)
         if len(self.consequents) != wanted:
             raise ModelError(
                 f"{self.kind!r} of this structure has {wanted} consequents, got "
@@ -227,10 +232,10 @@ class RecurrentFuzzyNetwork(Block):
         return state
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return lags, sets and `pack`."""
+        """Return lags, sets, whether there are constants, and `pack`."""
         own_sample_time(self.kind, self.own_time, sample_time)
-        head = [self.output_lags, self.input_lags, self.scheduling_lags, self.n_sets]
-        return np.concatenate([head, self.pack()])
+        lags = [self.output_lags, self.input_lags, self.scheduling_lags]
+        return np.concatenate([lags, [self.n_sets, self.constants], self.pack()])
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return what memberships and all rules cost."""
@@ -254,6 +259,6 @@ class RecurrentFuzzyNetwork(Block):
         if field != "consequents":
             return super().unit_of(field, index)
         per = self._regressor_units
-        place = index[-1] % (len(per) + 1)
+        place = index[-1] % (len(per) + self.constants)
         given = self.outputs[0].unit
         return f"{given or '1'}/{per[place]}" if place < len(per) and per[place] else given

@@ -79,6 +79,9 @@ class Diagnostics:
     """Each run started as a stream or generated code starts: without knowing an output."""
 
     n_samples: int
+    n_free: int
+    """Numbers of the model that the fit was free to choose: its parameters, as tables count them."""
+
     n_evaluations: int
     """Times the model was evaluated in the search."""
 
@@ -189,9 +192,6 @@ class Estimator(ABC):
     """Whether a fitted `initial` is a state solved for. Where such states alone explain the recordings,
     the model from rest being further off than the output ever moves, it is found from rest instead."""
 
-    set_apart: ClassVar[tuple[str, ...]] = ()
-    """Names of parameters that are chosen, not found."""
-
     errors_known: ClassVar[bool] = True
     """Whether standard errors of the parameters are computed."""
 
@@ -283,6 +283,23 @@ class Estimator(ABC):
 
     def _told_channels(self) -> tuple[str, ...]:
         return tuple(getattr(self, name) for name in self.told)
+
+    @property
+    def fixed_fields(self) -> tuple[str, ...]:
+        """Fields of the model that a rule or the structure fixes, each as kind and field, by a dot."""
+        return ()
+
+    def fixed(self, block: Block) -> tuple[int, ...]:
+        """Return the places in ``block.pack()`` that the fit is not free to choose.
+
+        They are no parameters of the model fitted. By default those of `fixed_fields`.
+        """
+        fields = self.fixed_fields
+        return tuple(
+            place
+            for place, (part, field, _) in enumerate(block.numbers() if fields else ())
+            if f"{part.kind}.{field}" in fields
+        )
 
     @property
     def stops_early(self) -> bool:
@@ -446,6 +463,7 @@ class Estimator(ABC):
             rmse_by_output=tuple(by_output.tolist()),
             rmse_from_rest=float(_rms(from_rest.reshape(-1, len(data.outputs))).mean()),
             n_samples=residual.size // len(data.outputs),
+            n_free=block.n_parameters - len(self.fixed(block)),
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
             interrupted=tracker.interrupted,
@@ -463,9 +481,9 @@ class Estimator(ABC):
         """
         if not self.errors_known:
             return ()
-        found, names = self.diagnostics_, self.fitted.parameter_names
+        found = self.diagnostics_
         unknown = np.flatnonzero(np.isnan(found.standard_errors)).tolist()
-        told = {*found.at_bounds, *(k for k, name in enumerate(names) if name in self.set_apart)}
+        told = {*found.at_bounds, *self.fixed(self.fitted)}
         return tuple(place for place in unknown if place not in told)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:

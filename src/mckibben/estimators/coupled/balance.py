@@ -467,15 +467,19 @@ class BalanceEstimator(CoupledEstimator):
         found = started.descend(found, STEPS_BETWEEN, Tracker())
         return (started, found) if started.cost(found) < whole.cost(z) else (search, z)
 
-    def undetermined(self) -> tuple[int, ...]:
-        given = _given(self.fitted)
-        return tuple(place for place in super().undetermined() if place not in given)
+    def fixed(self, block: Block) -> tuple[int, ...]:
+        """Return the places of sides, of a front's gain, and of what sets the unit of force."""
+        names = block.parameter_names
+        shares = [name for name in names if name.startswith("share of ")]
+        unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
+        given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
+        return tuple(place for place, name in enumerate(names) if given.fullmatch(name))
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
         """Return condition and covariance of what is free, in the unit of forces that was set."""
-        fixed = sorted({*at_bounds, *_given(block)})
+        fixed = sorted({*at_bounds, *self.fixed(block)})
         return covariance_of(block, data, residual, fixed, self.free_runs)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
@@ -495,15 +499,6 @@ OWN_HELPS = 0.1
 
 EXPLAINED = 1.5
 """Times the error of all but first parts up to which that of all explains how runs begin."""
-
-
-def _given(block: Block) -> set[int]:
-    """Return the places of what is not found: sides, a front's gain, and what sets the unit of force."""
-    names = block.parameter_names
-    shares = [name for name in names if name.startswith("share of ")]
-    unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
-    given = re.compile(rf"gain|offset|hysteresis|dead time|side of obstacle .*|{unit}")
-    return {place for place, name in enumerate(names) if given.fullmatch(name)}
 
 
 def _within(given_range: tuple[float, float] | None, block: Block) -> Block:

@@ -94,6 +94,15 @@ class MPINarmaxEstimator(CoupledEstimator):
     method: Literal["pso", "ls"] = "pso"
     ridge: Annotated[float, Gt(0)] = 1e-4
 
+    def fixed(self, block: Block) -> tuple[int, ...]:
+        """Return the places of what the hysteresis's fit fixes, and of sets that are even."""
+        hysteresis, network = block.parts  # type: ignore[attr-defined]
+        places = registry.load("estimators", self.memory)().fixed(hysteresis)
+        if self.method == "pso":
+            return places
+        first, sets = hysteresis.n_parameters, 3 * network.n_regressors * network.n_sets
+        return (*places, *range(first, first + sets))
+
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the series of hysteresis and network."""
         if len(data.inputs) != 1 or not data.scheduled:
@@ -220,8 +229,6 @@ class RecurrentProblem:
             right = right + columns.T @ y[:, np.newaxis]
             n_terms = x.shape[1] + constants
         consequents = solver.solve(gram, right, n_terms)
-        if not constants:
-            consequents = np.pad(consequents.reshape(-1, n_terms), ((0, 0), (0, 1)))
         return RecurrentFuzzyNetwork(
             rows(sets.centres),
             rows(sets.widths),
@@ -234,6 +241,7 @@ class RecurrentProblem:
             e.output_lags,
             e.input_lags,
             e.scheduling_lags,
+            constants,
         )
 
     def free_run(self, network: RecurrentFuzzyNetwork, inputs: Array) -> Array:

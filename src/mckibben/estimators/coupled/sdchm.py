@@ -133,6 +133,20 @@ class SDCHMEstimator(CoupledEstimator):
         """Whether these settings need an output to every input: every muscle's hysteresis does."""
         return self.memory is not None
 
+    def fixed(self, block: Block) -> tuple[int, ...]:
+        """Return the places of a muscle's gain to itself, 1, and of what its hysteresis's fit fixes."""
+        places = [
+            place
+            for place, (part, _, index) in enumerate(block.numbers())
+            if isinstance(part, Coupling) and index[0] == index[1]
+        ]
+        if self.memory is not None:
+            own, first = registry.load("estimators", self.memory)(), 0
+            for muscle in block.parts[0].parts:  # type: ignore[attr-defined]
+                places += [first + place for place in own.fixed(muscle)]
+                first += muscle.n_parameters
+        return tuple(places)
+
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         tracker.reached(0.0)
         front: tuple[Block, ...] = ()

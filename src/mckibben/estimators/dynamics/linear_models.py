@@ -14,6 +14,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
+from mckibben.blocks.parameters import Parametrised
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.estimator import Estimator, Grid, Initial, resting
@@ -100,7 +101,6 @@ class PredictionErrorEstimator(Estimator):
     }
     needs_time: ClassVar[bool] = True
     solves_starts: ClassVar[bool] = True
-    set_apart: ClassVar[tuple[str, ...]] = ("input offset",)
 
     input: str | tuple[str, ...] = "pressure"
     output: str | tuple[str, ...] = "displacement"
@@ -283,6 +283,19 @@ class PredictionErrorEstimator(Estimator):
     def starting(self) -> Start:
         """The state before the first sample; of several inputs none is fitted."""
         return "first_sample" if self.initial == "fitted" and not self.single else self.initial
+
+    def fixed(self, block: Block) -> tuple[int, ...]:
+        """Return the places of input offsets, of lags left out, and of what inputs have in common."""
+        first: dict[str, Parametrised] = {}
+        fixed = []
+        for place, (part, name, index) in enumerate(block.numbers()):
+            assert isinstance(part, TransferFunction)
+            again = first.setdefault(part.output.name, part) is not part
+            common = name == "output_offset" or (self.shared_poles and name == "denominator")
+            left_out = name == "numerator" and index[0] not in self.orders.input_lags
+            if name == "input_offset" or left_out or (again and common):
+                fixed.append(place)
+        return tuple(fixed)
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]

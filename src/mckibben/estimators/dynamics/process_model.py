@@ -48,7 +48,6 @@ class ProcessModelEstimator(SeparableEstimator):
     cannot = "No hysteresis; no inverse."
     needs_time: ClassVar[bool] = True
     solves_starts: ClassVar[bool] = True
-    set_apart: ClassVar[tuple[str, ...]] = ("input offset",)
 
     effort: ClassVar[float] = 0.3
 
@@ -64,6 +63,11 @@ class ProcessModelEstimator(SeparableEstimator):
     searches_condensed: ClassVar[bool] = False
     fits_peaks: ClassVar[bool] = False
 
+    @property
+    def fixed_fields(self) -> tuple[str, ...]:
+        """The input's offset, which the output's makes up for."""
+        return ("process-model.input_offset",)
+
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         data.timed(instead=", or use gpi")
         return super().identify(data, tracker)
@@ -72,7 +76,7 @@ class ProcessModelEstimator(SeparableEstimator):
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
         """Return the condition and covariance from free-run errors; the input's offset is set."""
-        fixed = [*at_bounds, block.n_parameters - 2]
+        fixed = [*at_bounds, *self.fixed(block)]
         return covariance_of(block, data, residual, fixed, self.free_runs)
 
     def undetermined(self) -> tuple[int, ...]:

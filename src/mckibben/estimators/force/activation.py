@@ -170,6 +170,14 @@ class ActivationPressureEstimator(SearchEstimator):
     rate_time_constant: Annotated[float, Ge(0)] | None = None
     frequency: Annotated[float, Ge(0)] | None = None
 
+    def fixed(self, block: Block) -> tuple[int, ...]:
+        """Return the places of powers that forces or frequencies are too few for, and of gamma's factor.
+
+        Those powers are exactly 0; gamma is 1 at the mean frequency, as phi has the size of both.
+        """
+        absent = np.flatnonzero(block.pack() == 0).tolist()
+        return tuple(sorted({*absent, block.n_parameters - 1}))
+
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the model found, set to the first moving run's frequency, and the data."""
         step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency

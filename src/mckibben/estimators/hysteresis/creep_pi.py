@@ -104,6 +104,11 @@ class CreepPIEstimator(SeparableEstimator):
 
     search_evaluations: ClassVar[int] = 30  # the valleys are flat
 
+    @property
+    def fixed_fields(self) -> tuple[str, ...]:
+        """The offset of the operators' sum, which begins at 0."""
+        return ("pi.offset",)
+
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         if self.n_creep > 0:
             data.timed("creep depends on it", ", or use n_creep=0")

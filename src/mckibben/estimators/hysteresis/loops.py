@@ -217,6 +217,13 @@ class MaxwellSlipEstimator(SeparableEstimator):
     n_operators: Operators = 8
     asymmetric: bool = False
 
+    @property
+    def fixed_fields(self) -> tuple[str, ...]:
+        """Both ratios, where directions are alike."""
+        return (
+            () if self.asymmetric else ("maxwell-slip.stiffness_ratio", "maxwell-slip.limit_ratio")
+        )
+
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the logarithms of both ratios, if there are any."""
         most = np.full(2 * self.asymmetric, MOST_UNEQUAL)

@@ -82,6 +82,11 @@ class MPIEstimator(SeparableEstimator):
     # Operators are computed once a fit, so there is nothing to gain from fewer inputs.
     searches_condensed: ClassVar[bool] = False
 
+    @property
+    def fixed_fields(self) -> tuple[str, ...]:
+        """The offset of the operators' sum, which begins at the output's lowest."""
+        return ("pi.offset", "rate-dependent-pi.offset")
+
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         if not self.rate_dependent:
             return super().identify(data, tracker)

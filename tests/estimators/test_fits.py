@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from mckibben import (
     PI,
     PIEstimator,
     Recording,
+    load,
 )
 from mckibben.blocks.base import Block
+from mckibben.papers.mpi_narmax.published import modified_prandtl_ishlinskii
 from tests.estimators.examples import quick
 
 TIME = np.linspace(0, 1, 1500)
@@ -85,3 +88,53 @@ def test_fitted_start_finds_the_peak_before_the_recording() -> None:
     fitted = PIEstimator(thresholds=truth.thresholds, initial="fitted").fit(loop)
     assert fitted.diagnostics_.rmse < 0.2 * blind.diagnostics_.rmse
     assert fitted.diagnostics_.peaks[0] == pytest.approx(2.0, abs=0.01)
+
+
+PRINTED = {
+    "output_map": "free-polynomial",
+    "map_size": 9,
+    "nonnegative": False,
+    "initial": "virgin",
+}
+"""Settings of the model of Table 1, beside its thresholds."""
+
+
+def test_thresholds_are_identified_with_the_rest_as_table_1_has_them(tmp_path: Path) -> None:
+    phase = np.linspace(0, 6 * np.pi, 3000)
+    u = 5.05 - 4.95 * np.cos(phase)
+    y = modified_prandtl_ishlinskii().simulate(u, sample_time=0.01)
+    run = Recording({"voltage": u, "displacement": y}, 0.01, {"voltage": "V"})
+    search: dict[str, Any] = {"n_operators": 10, "n_starts": 8, "n_refined": 3, "input": "voltage"}
+    fits = [
+        quick("rdpi", "muscle", thresholds=thresholds, **PRINTED | search).fit(run)
+        for thresholds in ("identified", "spread")
+    ]
+    errors = [fit.diagnostics_.rmse / np.ptp(y) for fit in fits]
+    assert errors[0] < 1e-3 < errors[1]
+    assert [fit.diagnostics_.n_free for fit in fits] == [40, 30]
+    model = fits[0].model_
+    assert fits[0].fit(run).model_ == model
+    model.save(tmp_path / "model.json")
+    assert load(tmp_path / "model.json").simulate(run) == model.simulate(run)
+    found = np.array(model.parts[0].thresholds)
+    assert found.min() >= 0
+    assert found.max() < 4.951
+    assert (np.diff(found) > 0).all()
+    assert np.abs(found - np.linspace(0, 4.455, 10)).max() > 0.1
+
+
+def test_derivatives_by_thresholds_agree_with_differences() -> None:
+    run = recorded(GPI.example())
+    for settings in (PRINTED, {"nonnegative": True, "initial": "first_sample"}):
+        how = {"thresholds": "identified", "n_operators": 4, "rate_time_constant": 0.0}
+        estimator = quick("rdpi", "muscle", **settings | how)
+        data = estimator.data([run])
+        theta = np.array([0.9, 0.4, 0.3, 0.2, 0.1, -0.2, 0.05, 0.02, 0.05, 0.22, 0.41, 0.77])
+        matrix = estimator.matrix(theta, data)
+        linear, _ = estimator.solve(matrix, data)
+        slopes = estimator.moves(theta, linear, data)
+        for place in range(theta.size):
+            steps = 1e-6 * (np.arange(theta.size) == place)
+            apart = estimator.matrix(theta + steps, data) - estimator.matrix(theta - steps, data)
+            error = np.abs(apart @ linear / 2e-6 - slopes[:, place])
+            assert np.quantile(error, 0.98) < 1e-3 * np.abs(slopes).max()  # where no operator turns

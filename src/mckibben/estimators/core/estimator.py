@@ -302,6 +302,11 @@ class Estimator(ABC):
         )
 
     @property
+    def n_beside(self) -> int:
+        """How many numbers are found beside ``model_.pack()``, which has them as structure."""
+        return 0
+
+    @property
     def stops_early(self) -> bool:
         """Whether runs that nothing is fitted to can stop the search."""
         return False
@@ -463,7 +468,7 @@ class Estimator(ABC):
             rmse_by_output=tuple(by_output.tolist()),
             rmse_from_rest=float(_rms(from_rest.reshape(-1, len(data.outputs))).mean()),
             n_samples=residual.size // len(data.outputs),
-            n_free=block.n_parameters - len(self.fixed(block)),
+            n_free=block.n_parameters - len(self.fixed(block)) + self.n_beside,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
             interrupted=tracker.interrupted,

@@ -158,6 +158,10 @@ class SeparableEstimator(Estimator):
         linear, offset = self.solve(self.matrix(theta, data), data)
         return self.build(theta, linear, offset, data), data
 
+    def most_evaluations(self, size: int) -> int:
+        """Return the most evaluations of a refinement of so many non-linear parameters."""
+        return self.search_evaluations
+
     def _search(self, data: TrainingData, tracker: Tracker) -> Array:
         lower, upper = self.bounds(data)
         if lower.size == 0:
@@ -165,7 +169,8 @@ class SeparableEstimator(Estimator):
         thin = data.thinned(SEARCH_SAMPLES)
         if self.searches_condensed:
             thin = thin.condensed()
-        tracker.budget = self.n_starts + self.n_refined * self.search_evaluations
+        most = self.most_evaluations(lower.size)
+        tracker.budget = self.n_starts + self.n_refined * most
         residuals, jacobian = self._errors(thin)
         theta = multi_start(
             residuals,
@@ -174,7 +179,7 @@ class SeparableEstimator(Estimator):
             upper,
             tracker,
             n_refined=self.n_refined,
-            max_evaluations=self.search_evaluations,
+            max_evaluations=most,
             jacobian=jacobian,
             choices=self.choices(data),
         )

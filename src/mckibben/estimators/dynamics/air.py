@@ -101,6 +101,11 @@ class AirEstimator(SeparableEstimator):
         given, wanted = inputs[0].partition("_")[0], outputs[0].partition("_")[0]
         return "it maps a command to a pressure" if given in MOVED or wanted != "pressure" else None
 
+    @property
+    def n_beside(self) -> int:
+        """The dead time."""
+        return 1
+
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         step = data.timed()
         shortest = min(run.u.size for run in data.runs)

@@ -25,6 +25,18 @@ from mckibben.presets import preset
 LEAST_PIECE = 1e-6
 """Least share of the output's range that a piece of an increasing map gives."""
 
+CROWDED = (1, 2, 4)
+"""Powers of their shares of half the input's range by which thresholds begin that are identified."""
+
+MOST_BY_RATE = 5.0
+"""The same where thresholds are identified, as is printed."""
+
+MOST_STEPS = 150
+"""Evaluations of a refinement where thresholds are identified."""
+
+RAISED, APART = 1e-7, 1e-9
+"""By how much thresholds are raised for derivatives, and their least distance, of the input's range."""
+
 RATE_SHARE = 0.5
 """Largest change of a weight by rate, relative to the largest weight, at the fastest input seen."""
 
@@ -40,6 +52,14 @@ class MPIEstimator(SeparableEstimator):
     ----------
     n_operators : int
         Play operators, the one without dead zone included.
+    thresholds : {"spread", "identified"}
+        Spread evenly below half the input's range; or searched there with the weights, as that paper's
+        Section 4.1 does by least squares. The model printed in its Table 1, of 40 parameters, is
+        ``rdpi`` with thresholds identified, nonnegative=False, output_map="free-polynomial",
+        map_size=9 and rate_time_constant=0.
+    nonnegative : bool
+        Whether the map increases, where it can. Where thresholds are identified, also whether weights
+        at rest may not be negative.
     output_map : {"piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"}
         Map behind the operators. The first two increase, and so have an inverse, whatever the data;
         the last two are the papers' and may not.
@@ -70,6 +90,7 @@ class MPIEstimator(SeparableEstimator):
     effort: ClassVar[float] = 0.2
 
     n_operators: Operators = 10
+    thresholds: Literal["spread", "identified"] = "spread"
     output_map: Literal["piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"] = (
         "polynomial"
     )
@@ -120,46 +141,90 @@ class MPIEstimator(SeparableEstimator):
         """The family of maps."""
         return MAPS[self.output_map](self.map_size)
 
-    def radii(self, data: TrainingData) -> Array:
+    @property
+    def identified(self) -> bool:
+        """Whether thresholds are identified."""
+        return self.thresholds == "identified"
+
+    @property
+    def n_beside(self) -> int:
+        """Thresholds that are identified."""
+        return self.n_operators * self.identified
+
+    def most_evaluations(self, size: int) -> int:
+        """Return more where thresholds are searched, too."""
+        return MOST_STEPS if self.identified else super().most_evaluations(size)
+
+    def radii(self, theta: Array, data: TrainingData) -> Array:
         """Return the thresholds, shape (n_operators,)."""
-        return spread(self.n_operators, data.input_range)
+        if not self.identified:
+            return spread(self.n_operators, data.input_range)
+        low, high = data.input_range
+        return np.asarray(0.5 * (high - low) * theta[-self.n_operators :])
+
+    def weights(self, theta: Array) -> Array:
+        """Return the relative weights, then those by rate."""
+        return theta[: self.n_operators * (1 + self.rate_dependent)]
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the relative weights, then of those by rate relative to the fastest."""
+        """Return bounds of the relative weights, then of those by rate relative to the fastest.
+
+        Then of thresholds that are identified, relative to half the input's range.
+        """
         n = self.n_operators
-        share = np.full(n * self.rate_dependent, RATE_SHARE)
-        lower = np.zeros(n)
+        share = np.full(n * self.rate_dependent, MOST_BY_RATE if self.identified else RATE_SHARE)
+        lower, none = np.zeros(n), np.zeros(n * self.identified)
         lower[0] = LEAST_REVERSIBLE
-        return np.concatenate([lower, -share]), np.concatenate([np.ones(n), share])
+        if self.identified and not self.nonnegative:
+            lower[:] = -1.0
+        return np.concatenate([lower, -share, none]), np.concatenate([np.ones(n), share, none + 1])
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return the weights of the best PI model, and two even distributions, whatever the rate."""
         low, high = data.input_range
-        radii = self.radii(data)
-        matrix = counting(data, lambda run: play_operators(run.history, radii, self.starting_rule))
-        weights, _ = solve_linear(matrix, data.target, nonnegative=True)
-        top = weights.max() if weights.max() > 0 else 1.0
-        fading = np.exp(-3 * radii / (high - low))
-        reversible = np.where(radii == 0, 1.0, 0.1)
-        by_rate = (0, self.n_operators * self.rate_dependent)
-        return [np.pad(guess, by_rate) for guess in (weights / top, fading, reversible)]
+        by_rate = np.zeros(self.n_operators * self.rate_dependent)
+        even, guesses = spread(self.n_operators, data.input_range), []
+        for power in CROWDED if self.identified else (1,):
+            share = (2 * even / (high - low)) ** power
+            radii = even if power == 1 else 0.5 * (high - low) * share
+            matrix = self._plays(radii, data)
+            weights, _ = solve_linear(matrix, data.target, nonnegative=True)
+            top = weights.max() if weights.max() > 0 else 1.0
+            fading = np.exp(-3 * radii / (high - low))
+            reversible = np.where(radii == 0, 1.0, 0.1)
+            for guess in (weights / top, fading, reversible):
+                guesses.append(np.concatenate([guess, by_rate, share[: self.n_beside]]))
+        return guesses
 
-    def operators(self, run: Run, data: TrainingData) -> Array:
+    def _plays(self, radii: Array, data: TrainingData) -> Array:
+        """Return play operators at the samples that count."""
+        return counting(data, lambda run: play_operators(run.history, radii, self.starting_rule))
+
+    def operators(self, radii: Array, run: Run, data: TrainingData) -> Array:
         """Return play operators over the run's history, then these times the relative rate."""
-        play = play_operators(run.history, self.radii(data), self.starting_rule)
+        play = play_operators(run.history, radii, self.starting_rule)
         if not self.rate_dependent:
             return play
         relative = self.rate(run) / self.fastest(data)
         return np.column_stack([play, play * relative[:, np.newaxis]])
 
     def level(self, theta: Array, data: TrainingData) -> tuple[float, float]:
-        """Return the lowest and highest value that the weighted operators take when static."""
-        lowest, highest = self._ends(data)
-        return float(theta @ lowest), float(theta @ highest)
+        """Return the lowest and highest value that the weighted operators take; see `_ends`."""
+        lowest, highest = self._ends(theta, self._operators(theta, data), data)
+        weights = self.weights(theta)
+        return float(weights @ lowest), float(weights @ highest)
 
-    def _ends(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return the operators at rest when the input has only risen, at both ends of its range."""
-        radii, by_rate = self.radii(data), (0, self.n_operators * self.rate_dependent)
+    def _ends(self, theta: Array, columns: Array, data: TrainingData) -> tuple[Array, Array]:
+        """Return rows of columns, of which operators are the first, at the ends of the map's argument.
+
+        Where the input has only risen to the ends of its range, and rests there; of thresholds that are
+        identified, where the weighted sum of the data is least and most.
+        """
+        if self.identified:
+            weights = self.weights(theta)
+            total = columns[:, : weights.size] @ weights
+            return columns[np.argmin(total)], columns[np.argmax(total)]
+        radii, by_rate = self.radii(theta, data), (0, self.n_operators * self.rate_dependent)
         held = [end - radii for end in data.input_range]
         if self.starting_rule != "first_sample":
             held = [np.clip(0.0, end - radii, end + radii) for end in data.input_range]
@@ -168,28 +233,41 @@ class MPIEstimator(SeparableEstimator):
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the pieces of the map over the run's history."""
-        return self._pieces(theta, self.operators(run, data), data)
+        return self._pieces(theta, self.operators(self.radii(theta, data), run, data), data)
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
         """Return the basis at the samples that count; the operators are computed only once."""
-        return self._pieces(theta, self._operators(data), data)
+        return self._pieces(theta, self._operators(theta, data), data)
 
-    def _operators(self, data: TrainingData) -> Array:
+    def _operators(self, theta: Array, data: TrainingData) -> Array:
+        radii = self.radii(theta, data)
         rate = (self.rate_dependent, self.rate_time_constant)
         key = ("operators", self.n_operators, self.initial, *rate)
-        return data.once(key, lambda: counting(data, lambda run: self.operators(run, data)))
+
+        def computed() -> Array:
+            return counting(data, lambda run: self.operators(radii, run, data))
+
+        return data.latest(key, radii, computed)
 
     def _pieces(self, theta: Array, operators: Array, data: TrainingData) -> Array:
         low, high = self.level(theta, data)
-        return self.map.pieces((operators @ theta - low) / (high - low))
+        return self.map.pieces((operators @ self.weights(theta) - low) / (high - low))
 
     def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
         """Return the derivative of the map's argument times the slope of the map."""
-        operators = self._operators(data)
-        lowest, highest = self._ends(data)
+        operators, weights = self._operators(theta, data), self.weights(theta)
+        columns = operators
+        if self.identified:
+            low, high = data.input_range
+            half, radii = 0.5 * (high - low), self.radii(theta, data) + RAISED * (high - low)
+            there = counting(data, lambda run: self.operators(radii, run, data))
+            by_radii = weights * (there - operators) / (RAISED * (high - low)) * half
+            by_radii = by_radii.reshape(len(operators), -1, self.n_operators).sum(axis=1)
+            columns = np.column_stack([operators, by_radii])
+        lowest, highest = self._ends(theta, columns, data)
         low, high = self.level(theta, data)
-        x = (operators @ theta - low) / (high - low)
-        moved = (operators - lowest - np.outer(x, highest - lowest)) / (high - low)
+        x = (operators @ weights - low) / (high - low)
+        moved = (columns - lowest - np.outer(x, highest - lowest)) / (high - low)
         return np.asarray((self.map.slopes(x) @ linear)[:, np.newaxis] * moved)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
@@ -207,18 +285,25 @@ class MPIEstimator(SeparableEstimator):
         low, high = self.level(theta, data)
         bottom, top = data.output_range
         scale = (top - bottom) / (high - low)
-        first = self.first_part(theta * scale, bottom - low * scale, data)
+        first = self.first_part(theta, scale, bottom - low * scale, data)
         channel = data.outputs[0]
         return Series((first, self.map.build(linear, offset, bottom, top, channel)))
 
-    def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
-        """Return the hysteresis part."""
-        n, radii = self.n_operators, vector(self.radii(data))
+    def first_part(self, theta: Array, scale: float, offset: float, data: TrainingData) -> Block:
+        """Return the hysteresis part, thresholds in their order and none twice."""
+        n, radii = self.n_operators, self.radii(theta, data)
+        weights = (scale * self.weights(theta)).reshape(-1, n)
+        if self.identified:
+            order, (low, high) = np.argsort(radii, kind="stable"), data.input_range
+            least = APART * (high - low) * np.arange(n)
+            radii = np.maximum.accumulate(radii[order] - least) + least
+            weights = weights[:, order]
+        static, thresholds = vector(weights[0]), vector(radii)
         fields = self.common_fields(data)
         if not self.rate_dependent:
-            return PI(radii, vector(weights), offset, **fields)
-        by_rate, tau = vector(weights[n:] / self.fastest(data)), self.rate_time_constant or 0.0
-        return RateDependentPI(radii, by_rate, vector(weights[:n]), offset, tau, **fields)
+            return PI(thresholds, static, offset, **fields)
+        by_rate, tau = vector(weights[1] / self.fastest(data)), self.rate_time_constant or 0.0
+        return RateDependentPI(thresholds, by_rate, static, offset, tau, **fields)
 
 
 RDPI = preset(

@@ -51,10 +51,7 @@ def mpi_narmax() -> Protocol:
         wave = random_wave(time, 0.2, HIGH, LOW, seed=seed)
         inputs = _inputs(wave, random_wave(time, 0.2, 200.0, seed=100 + seed))
         runs.append(Run(f"random-{seed}", role, inputs, labels={"stage": "random"}))
-    source = (
-        "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle Using 3D "
-        "PI-NARMAX Model, Sections 2 and 4"
-    )
+    source = "Actuators 2022, 11(2), 51, doi:10.3390/act11020051, Sections 2 and 4"
     notes = "How the hand pulls three times is ours: the paper gives the peaks. So are random runs."
     return Protocol("mpi-narmax", "rail", source, tuple(runs), notes)
 

@@ -18,14 +18,10 @@ from mckibben.metrics import mae, rmse
 from mckibben.papers.experiment import Cell, Curves, Experiment, Labels, Rerun, Runs
 from mckibben.papers.mpi_narmax import printed, protocol
 from mckibben.recording import Recording
+from mckibben.rigs import Rig
 from mckibben.signals import cycles, resample, sine
 
-SAMPLE_TIME, QUICK_SAMPLE_TIME = 0.02, 0.05
-"""At which models are fitted and compared, unless recordings are slower [s]."""
-
-VARYING = 4
-"""Status in which the force varies."""
-
+VARYING = 4  # status in which the force varies
 AS_PRINTED, ALL_RATES, PLAIN = "MPI-NARMAX", "MPI-NARMAX, all rates", "MPI-NARMAX, ours"
 MORE, OURS, PRESSURE = "MPI-NARMAX, more records", "balance", "balance, on recorded pressure"
 HEADLINE = (AS_PRINTED, ALL_RATES, PLAIN, OURS)
@@ -69,23 +65,22 @@ class Study:
 def run(experiment: Experiment) -> None:
     """Identify models with and without the force, and compare them on motion that is not repeated."""
     recorded = experiment.record(until=0.1)
-    own = max(one.sample_time or 0.0 for one in recorded.values())
-    step = max(QUICK_SAMPLE_TIME if experiment.quick else SAMPLE_TIME, own)
+    slowest = max(one.sample_time or 0.0 for one in recorded.values())
+    step = max(0.05 if experiment.quick else 0.02, slowest)
     runs = Runs({name: resample(one, step) for name, one in recorded.items()}, recorded.labels)
-    given = {one.labels.get("status", 0): name for name, one in runs.labels.items()}
-    statuses = {k: given[k] for k in sorted(given) if k}
+    statuses = {k: n for k in range(1, len(runs) + VARYING) for n in runs.names(status=k)}
     study = Study(experiment, runs, driven([*runs.values()]), step, statuses)
     for part in (_fit, _errors, _constants, _loops, _force):
         part(study)
     if experiment.rig is not None and not experiment.quick:
-        _track(study)
+        _track(study, experiment.rig)
 
 
 def driven(recordings: Sequence[Recording]) -> str:
     """Return the input that all recordings have, beside displacement and force."""
-    for channel, what in (("displacement", "in mm"), ("force", "in N, 0 where nothing pulled")):
+    for channel in ("displacement", "force"):
         for name in (one.name for one in recordings if channel not in one):
-            remedy = f"add a column {channel} {what}"
+            remedy = f"add a column {channel}; a force is 0 N where nothing pulls"
             raise DataError(f"{name} is without it", channel=channel, remedy=remedy)
     shared = [x for x in ("voltage", "pressure") if all(x in one for one in recordings)]
     if not shared:
@@ -147,9 +142,13 @@ def _fit(study: Study) -> None:
     first = [name for name in free if runs.of(name, "frequency") == rate][:1]
     pulls = by["pulls"] or by["weight"] + by["random"]
     papers = {"method": "pso", "memory": "rdpi", "constants": False, "learns_from": "loaded"}
-    mpi = {"": {"input": study.drive, "rate_time_constant": 5 * step}}
-    learners = [
-        (f"MPI-{k}{suffix}", "rdpi", settings, [name])
+    mpi: dict[str, dict[str, Any]] = {
+        "": {"thresholds": "identified", "nonnegative": False, "rate_time_constant": 0.0}
+        | {"output_map": "free-polynomial", "map_size": 9},
+        ", ours": {"rate_time_constant": 5 * step},
+    }
+    learners: list[tuple[str, str, dict[str, Any], list[str]]] = [
+        (f"MPI-{k}{suffix}", "rdpi", {"input": study.drive, **settings}, [name])
         for k, name in study.statuses.items()
         for suffix, settings in mpi.items()
         if k != VARYING
@@ -174,7 +173,7 @@ def _fit(study: Study) -> None:
         fitted = experiment.fit(name, estimator, [runs[run] for run in names])
         study.learned[name] = names
         text = ", ".join(names) if names != train else "all training runs"
-        rows[name] = (text, fitted.seconds, fitted.block.n_parameters)
+        rows[name] = (text, fitted.seconds, fitted.n_free)
     experiment.table("models", ("learned from", "time [s]", "parameters"), rows)
 
 
@@ -198,7 +197,7 @@ def _errors(study: Study) -> None:
     columns = [f"{what}, {which}" for what in shown for which in ("MAE", "RMSE")]
     rows = {n: [error for what in shown for error in off[what][n]] for n in learned}
     experiment.table("errors", columns, rows)
-    blind = [n for n in learned if n[:4] == "MPI-" and n != AS_PRINTED and len(learned[n]) == 1]
+    blind = [name for name in learned if name[4].isdigit()]  # MPI-1, ...
     for what in off.keys() & order[2:]:
         found, key = off[what], what.replace(" ", "_")
         best = min(blind, key=lambda name: found[name])
@@ -214,9 +213,6 @@ def _errors(study: Study) -> None:
             for n, every in moved.items()
         }
         experiment.table("held", [f"swing at {runs.of(run, 'level'):g}" for run in held], rows)
-        shares = {n: np.divide(rows[n], rows["muscle"]) for n in HEADLINE}
-        text = "; ".join(f"{n} {s.min():.2f} to {s.max():.2f}" for n, s in shares.items())
-        experiment.says(swings=text)
 
 
 def _constants(study: Study) -> None:
@@ -248,28 +244,30 @@ def _constants(study: Study) -> None:
 def _loops(study: Study) -> None:
     """Add loops by rate and load, time plots, errors, and the displacement by force."""
     experiment, runs, statuses = study.experiment, study.runs, study.statuses
-    kinds = {"free": "no load", "weight": "constant load", "pulls": "varying load"}
-    panels: dict[str, dict[str, tuple[Array, Array]]] = {}
-    for name, one in runs.labels.items():
-        stage, rate = one.labels["stage"], one.labels.get("frequency")
-        if rate and stage in kinds:
-            loop = runs[name][study.drive], runs[name]["displacement"]
-            panels.setdefault(f"{rate:g} Hz", {})[kinds[stage]] = loop
-    free = {rate: loops["no load"] for rate, loops in panels.items() if "no load" in loops}
-    several = {rate: loops for rate, loops in panels.items() if len(loops) > 1}
-    experiment.figure("loads", {"no load": free} | several)
+    kinds = {"pulls": "varying load", "weight": "constant load", "free": "no load"}
+    panels: dict[str, dict[str, tuple[Array, Array]]] = {"no load": {}}
+    for stage, kind in kinds.items():
+        for name in runs.names(stage=stage):
+            u, y = runs[name][study.drive], runs[name]["displacement"]
+            if rate := runs.of(name, "frequency"):
+                part = slice(None) if stage == "pulls" else cycles(u)[-1]
+                panels.setdefault(f"{rate:g} Hz", {})[kind] = u[part], y[part]
+                if stage == "free":
+                    panels["no load"][f"{rate:g} Hz"] = u[part], y[part]
+    experiment.figure("loads", {n: c for n, c in sorted(panels.items()) if len(c) > 1} or panels)
     pulls = [*runs.names("train", stage="pulls")[:1], statuses[VARYING]]
-    shown, held = ("MPI-1", AS_PRINTED, ALL_RATES, OURS), runs.names(stage="held")
+    shown, held = ("MPI-1", AS_PRINTED, ALL_RATES), runs.names(stage="held")
     experiment.figure("time", study.curves((statuses[1], *pulls), "time", shown))
-    loops = dict.fromkeys((*statuses.values(), *pulls))
-    experiment.figure("statuses", study.curves([*loops], study.drive, shown))
-    experiment.figure("pulls", study.curves(pulls, "force", HEADLINE))
+    loops = [*statuses.values(), *pulls[:-1]]
+    experiment.figure("statuses", study.curves(loops, study.drive, shown))
+    experiment.figure("pulls", study.curves(pulls, "force", shown[1:]))
     off = study.counted(statuses[1], model="MPI-1") - study.counted(statuses[1])
     share, edges = np.histogram(off, 61, weights=np.full(off.size, 100 / off.size))
     experiment.figure("histogram", {"": {"MPI-1": (0.5 * (edges[1:] + edges[:-1]), share)}})
     if held:
         muscle = {name: (study.counted(name, "force"), study.counted(name)) for name in held}
-        experiment.figure("held", {"": muscle} | study.curves(held, "force", HEADLINE))
+        each = study.curves(held, "force", (*shown[1:], OURS))
+        experiment.figure("held", {"": muscle} | each)
 
 
 def _force(study: Study) -> None:
@@ -278,18 +276,18 @@ def _force(study: Study) -> None:
     known = experiment.models[PRESSURE if PRESSURE in study.learned else OURS]
     experiment.models["force"] = load_of(known)
     rows: dict[str, list[float]] = {}
-    for name, one in runs.items():
-        force, estimated = one["force"], experiment.simulate("force", one)["force"]
+    for name in runs:
+        force = study.counted(name, "force")
+        estimated = study.counted(name, "force", "force")
         rows[name] = [rmse(force, estimated), float(np.ptp(force))]
     experiment.table("force", ["RMSE [N]", "range [N]"], rows)
     experiment.says(force_percent=100 * rows[test][0] / rows[test][1])
 
 
-def _track(study: Study) -> None:
+def _track(study: Study, rig: Rig) -> None:
     """Add how a sine is followed under the pulls of status 4, with every controller."""
     experiment, step, pulls = study.experiment, study.step, study.runs[study.statuses[VARYING]]
-    rig, seed, models = experiment.rig, experiment.seed, experiment.models
-    assert rig is not None
+    seed, models = experiment.seed, experiment.models
     experiment.tell(0.9, "closed loops")
     low, high = np.percentile(pulls["displacement"], (1, 99))
     middle, amplitude = round(0.53 * low + 0.47 * high), round(0.3 * (high - low))
@@ -309,8 +307,8 @@ def _track(study: Study) -> None:
         found = track(law, rig, reference, approach=10.0, settle=5.0, seed=seed)
         rows[name] = found.rmse["displacement"], found.largest["displacement"]
         drawn[name] = found.recording.time, found.recording["displacement"]
-    columns = ("RMSE [mm]", "largest [mm]")
-    experiment.table("tracked", columns, rows, middle=middle, amplitude=amplitude)
+    facts = {"middle": middle, "amplitude": amplitude}
+    experiment.table("tracked", ["RMSE [mm]", "largest [mm]"], rows, **facts)
     experiment.figure("tracked", {"": drawn})
 
 

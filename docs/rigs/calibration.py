@@ -18,8 +18,8 @@ from mckibben.estimators.hysteresis.gpi import GPIEstimator
 from mckibben.estimators.hysteresis.mpi import MPIEstimator
 from mckibben.metrics import err
 from mckibben.papers.field_models.published import prandtl_ishlinskii
-from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
 from mckibben.papers.mpi_narmax.printed import modified_prandtl_ishlinskii
+from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
 from mckibben.papers.multistate_friction.protocol import SHORTEST
 from mckibben.papers.sdchm.printed import ORDERS, PREDICTION
 from mckibben.papers.sdchm.protocol import PATTERNS

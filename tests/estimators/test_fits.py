@@ -16,7 +16,7 @@ from mckibben import (
     load,
 )
 from mckibben.blocks.base import Block
-from mckibben.papers.mpi_narmax.published import modified_prandtl_ishlinskii
+from mckibben.papers.mpi_narmax.printed import modified_prandtl_ishlinskii
 from tests.estimators.examples import quick
 
 TIME = np.linspace(0, 1, 1500)

@@ -29,6 +29,5 @@ TURNING_POINT = 4.1343
 def modified_prandtl_ishlinskii() -> Series:
     """Return the paper's model from voltage (0 to 10 V) to displacement [mm]; it starts virgin, at 0."""
     u, b = Channel("voltage", "V"), Channel("hysteresis", "")
-    numbers = THRESHOLDS, BY_RATE, WEIGHTS
-    pi = RateDependentPI(*numbers, 0.0, 0.0, (0.0, 10.0), "virgin", u, b)
+    pi = RateDependentPI(THRESHOLDS, BY_RATE, WEIGHTS, 0.0, 0.0, (0.0, 10.0), "virgin", u, b)
     return Series((pi, Polynomial(POLYNOMIAL[::-1], input=b, output=DISPLACEMENT)))

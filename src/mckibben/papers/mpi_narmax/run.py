@@ -20,6 +20,7 @@ from mckibben.papers.mpi_narmax import printed, protocol
 from mckibben.recording import Recording
 from mckibben.rigs import Rig
 from mckibben.signals import cycles, resample, sine
+from mckibben.signals.holds import moves
 
 VARYING = 4  # status in which the force varies
 AS_PRINTED, ALL_RATES, PLAIN = "MPI-NARMAX", "MPI-NARMAX, all rates", "MPI-NARMAX, ours"
@@ -92,7 +93,8 @@ def driven(recordings: Sequence[Recording]) -> str:
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     """Tell runs without load, with a constant one, with a held input, pulls and random ones apart."""
     drive = driven(recordings)
-    largest = max(float(np.percentile(np.abs(one["force"]), 99)) for one in recordings)
+    forces = [np.abs(one["force"]) for one in recordings]
+    largest = max(float(np.percentile(f, 99)) for f in forces) if moves(forces) else np.inf
     span = float(np.ptp(np.concatenate([one[drive] for one in recordings])))
     labels = [_label(one, drive, largest, span) for one in recordings]
     kinds = ("free", "weight", "held", "pulls", "random")
@@ -135,8 +137,7 @@ def _label(one: Recording, drive: str, largest: float, span: float) -> dict[str,
 def _fit(study: Study) -> None:
     """Fit models of single statuses without the force, then those with it."""
     experiment, runs, step = study.experiment, study.runs, study.step
-    stages = ("free", "status", "weight", "pulls", "random")
-    by = {stage: runs.names("train", stage=stage) for stage in stages}
+    by = {s: runs.names("train", stage=s) for s in ("free", "status", "weight", "pulls", "random")}
     train, free = [*chain(*by.values())], by["free"]
     rate = runs.of(study.statuses[1], "frequency")
     first = [name for name in free if runs.of(name, "frequency") == rate][:1]
@@ -173,7 +174,7 @@ def _fit(study: Study) -> None:
         fitted = experiment.fit(name, estimator, [runs[run] for run in names])
         study.learned[name] = names
         text = ", ".join(names) if names != train else "all training runs"
-        rows[name] = (text, fitted.seconds, fitted.n_free)
+        rows[name] = text, fitted.seconds, fitted.n_free
     experiment.table("models", ("learned from", "time [s]", "parameters"), rows)
 
 

@@ -31,7 +31,6 @@ from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import track
 from mckibben.measured.sets import parted, sets_in
 from mckibben.papers.activation_pressure.protocol import FORCES
-from mckibben.papers.mpi_narmax.models import PLAIN, TOLD
 from mckibben.papers.sdchm.compensation import CONTROL_TIME, loop_width, references, settle
 from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS
 from mckibben.registry import load
@@ -128,7 +127,7 @@ def following(model: Block, pulls: Recording, seed: int) -> float:
 def rail(seeds: int) -> Iterator[Row]:
     """Yield the targets of a muscle on a rail that is pulled at."""
     rows: dict[str, Figures] = defaultdict(lambda: defaultdict(list))
-    narmax = TOLD[PLAIN].settings
+    narmax = {"method": "ls", "memory": "rdpi", "n_sets": 2}
     for seed in range(seeds):
         train, test = rail_runs(seed)
         runs, status = list(train.values()), test["status-4"]

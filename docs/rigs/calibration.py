@@ -18,7 +18,6 @@ from mckibben.estimators.hysteresis.gpi import GPIEstimator
 from mckibben.estimators.hysteresis.mpi import MPIEstimator
 from mckibben.metrics import err, loop_width
 from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
-from mckibben.papers.mpi_narmax.published import modified_prandtl_ishlinskii
 from mckibben.papers.multistate_friction.protocol import SHORTEST
 from mckibben.papers.paper import paper
 from mckibben.papers.sdchm.printed import ORDERS, PREDICTION
@@ -320,7 +319,7 @@ def rail() -> Iterator[Row]:
         time = np.arange(round(2 * period / 0.001) + 1) * 0.001
         wave = sine(time, period, HIGH, LOW)
         given = Recording({"voltage": wave}, 0.001)
-        model = modified_prandtl_ishlinskii().simulate(given)["displacement"]
+        model = paper("mpi-narmax").printed("mpi-narmax-mpi").simulate(given)["displacement"]
         half = time.size // 2
         cycle = last_cycle(runs[f"free-{frequency:g}Hz"], period)
         yield (

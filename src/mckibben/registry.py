@@ -149,7 +149,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     "papers": {
         "activation-pressure": "mckibben.papers.activation_pressure.run:RERUN",
         "field-models": "mckibben.papers.field_models.run:RERUN",
-        "mpi-narmax": "mckibben.papers.mpi_narmax.rerun:mpi_narmax",
+        "mpi-narmax": "mckibben.papers.mpi_narmax.run:RERUN",
         "multistate-friction": "mckibben.papers.multistate_friction.run:RERUN",
         "sdchm": "mckibben.papers.sdchm.rerun:sdchm",
     },
@@ -161,7 +161,6 @@ PLUGINS: dict[str, dict[str, str]] = {
         "sdchm": "mckibben.papers.sdchm.protocol:sdchm",
     },
     "published": {
-        "mpi-narmax-mpi": "mckibben.papers.mpi_narmax.published:modified_prandtl_ishlinskii",
         "sdchm-coupling": "mckibben.papers.sdchm.published:coupling",
     },
     "setups": {

@@ -16,7 +16,7 @@ from mckibben import (
     load,
 )
 from mckibben.blocks.base import Block
-from mckibben.papers.mpi_narmax.published import modified_prandtl_ishlinskii
+from mckibben.papers.paper import printed
 from tests.estimators.examples import quick
 
 TIME = np.linspace(0, 1, 1500)
@@ -102,7 +102,7 @@ PRINTED = {
 def test_thresholds_are_identified_with_the_rest_as_table_1_has_them(tmp_path: Path) -> None:
     phase = np.linspace(0, 6 * np.pi, 3000)
     u = 5.05 - 4.95 * np.cos(phase)
-    y = modified_prandtl_ishlinskii().simulate(u, sample_time=0.01)
+    y = printed("mpi-narmax-mpi").simulate(u, sample_time=0.01)
     run = Recording({"voltage": u, "displacement": y}, 0.01, {"voltage": "V"})
     search: dict[str, Any] = {"n_operators": 10, "n_starts": 8, "n_refined": 3, "input": "voltage"}
     fits = [

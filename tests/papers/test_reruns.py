@@ -11,9 +11,6 @@ import pytest
 
 from mckibben import example
 from mckibben.papers.field_models.run import BJ, LEAST_SQUARES, NARX, P2UZ, PAPERS, SLOPES
-from mckibben.papers.mpi_narmax.models import AS_PRINTED, PLAIN, THREE_RATES, UNLOADED
-from mckibben.papers.mpi_narmax.models import OURS as OURS_LOADED
-from mckibben.papers.mpi_narmax.tables import PRINTED_MAE
 from mckibben.papers.reproduction import reproduce
 from mckibben.papers.sdchm.compensation import OURS_INVERTED
 from mckibben.papers.sdchm.models import BALANCE, DAMPED, LINEAR, OURS, PUBLISHED
@@ -99,30 +96,6 @@ def test_field_models(cli: Cli, tmp_path: Path) -> None:
     assert np.sum(shares > 0.1) >= 3  # least squares leaves two
     errors = [row["test RMSE [mm]"] for row in keyed(found, "field")]
     assert errors == sorted(errors)
-
-
-def test_mpi_narmax() -> None:
-    """Told the force a model beats the best that is not, and three rates make the better front end."""
-    found = reproduce("mpi-narmax", quick=True).to_dict()
-    off = by_model(table(found, "does not repeat"))
-    for where in ("status 4", "random", "voltage held"):
-        assert off[THREE_RATES][f"{where}, RMSE"] < 0.8 * off[AS_PRINTED][f"{where}, RMSE"]
-    best = min(off[name]["status 4, MAE"] for name in UNLOADED)
-    assert best / off[THREE_RATES]["status 4, MAE"] > 3.0  # printed: 3.9 times
-    for name in (PLAIN, OURS_LOADED):
-        assert off[name]["status 4, MAE"] < 0.33 * best
-    held = by_model(table(found, "Figure 3"))
-    for name in UNLOADED:
-        assert not any(value for key, value in held[name].items() if key.startswith("swing at"))
-    maes = by_model(table(found, "MAE by status"))
-    for name, printed in PRINTED_MAE.items():
-        assert [maes[name][f"status {k}, printed"] for k in range(1, 5)] == list(printed)
-    assert maes["MPI-1"]["status 3, here"] == pytest.approx(10.0609, rel=0.1)
-    assert maes["MPI-2"]["status 3, here"] == pytest.approx(3.2333, rel=0.35)
-    past = {row["frequency [Hz]"]: row["past the fold [%]"] for row in table(found, "Table 1")}
-    assert past[0.05] == past[0.1] == 0.0 < past[0.2] < past[0.22]
-    (force,) = (row for row in table(found, "Force estimated") if row["run"] == "status-4")
-    assert force["RMSE [N]"] < 0.1 * force["range [N]"]
 
 
 def test_multistate_friction(cli: Cli) -> None:

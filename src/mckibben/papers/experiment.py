@@ -123,6 +123,8 @@ class Fitted:
         Its free-running error on the data fitted, in the unit of the output; of several the largest.
     seconds : float
         That the fit took [s].
+    n_free : int
+        Numbers that the fit was free to choose.
     standard_errors : tuple of float
         Of ``block.pack()``, NaN where not known; of several outputs none.
     search : tuple of float
@@ -134,6 +136,7 @@ class Fitted:
     block: Block
     rmse: float
     seconds: float
+    n_free: int
     standard_errors: tuple[float, ...] = field(default=(), compare=False)
     search: tuple[float, ...] = field(default=(), compare=False)
 
@@ -331,7 +334,8 @@ class Experiment:
             found = estimator.diagnostics_
             errors = tuple(getattr(found, "standard_errors", ()))
             best = tuple(cost for cost in search if np.isfinite(cost))
-            return Fitted(estimator.model_, float(np.max(found.rmse)), found.seconds, errors, best)
+            error = float(np.max(found.rmse))
+            return Fitted(estimator.model_, error, found.seconds, found.n_free, errors, best)
 
         settings = (type(estimator).__name__, estimator.get_params())
         fitted = self.kept.once(name, Fitted, fit, settings, recordings, how)

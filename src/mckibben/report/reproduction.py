@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 RECORDED = ("", "virtual", "measured", "sensor", "extracted", "reference", "of every loop")
 """Names of curves that are drawn in ink, as what a muscle did."""
 
+LONGEST = 40
+"""Letters of all names of curves for which a third of the page is wide enough."""
+
 FEWEST = 40
 """Points of a curve that is drawn as a line; fewer are dots."""
 
@@ -99,7 +102,8 @@ def drawing(figure: Figure) -> Drawing:
             curves.append(Curve(x, y, "" if name in seen else name, colour, style))
         seen |= {*given}
         panels.append(Panel(figure.text.x, figure.text.y, tuple(curves), title))
-    return Drawing(tuple(panels), columns=2 if len(panels) in (2, 4) else 3)
+    wide = sum(map(len, names)) > LONGEST
+    return Drawing(tuple(panels), columns=2 if wide or len(panels) in (2, 4) else 3)
 
 
 # -- Markdown ------------------------------------------------------------------------------------------

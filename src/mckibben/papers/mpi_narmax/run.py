@@ -1,0 +1,319 @@
+"""Displacement under a varying load: models with and without the force, and compensation with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain, count
+from typing import Any
+
+import numpy as np
+
+from mckibben import registry
+from mckibben.arrays import Array
+from mckibben.blocks.coupled.load_estimate import load_of
+from mckibben.control import BlockController, EstimatedLoad, track, tune_pid
+from mckibben.errors import DataError
+from mckibben.metrics import mae, rmse
+from mckibben.papers.experiment import Cell, Curves, Experiment, Labels, Rerun, Runs
+from mckibben.papers.mpi_narmax import protocol
+from mckibben.recording import Recording
+from mckibben.rigs import Rig
+from mckibben.signals import cycles, resample, sine
+from mckibben.signals.holds import moves
+
+VARYING = 4  # status in which the force varies
+AS_PRINTED, ALL_RATES, PLAIN = "MPI-NARMAX", "MPI-NARMAX, all rates", "MPI-NARMAX, ours"
+MORE, OURS, PRESSURE = "MPI-NARMAX, more records", "balance", "balance, on recorded pressure"
+HEADLINE = (AS_PRINTED, ALL_RATES, PLAIN, OURS)
+
+FREE, CONSTANT, STILL, REPEATS = 0.1, 0.25, 0.1, 0.1
+"""Shares: of the largest force, below which there is none, and by which loads differ; of a run's own,
+by which a constant one moves; of the input's range, by which a held one, and repeated peaks, differ."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Recordings on one grid, the run of each status, and what each model was fitted to."""
+
+    experiment: Experiment
+    runs: Runs
+    drive: str
+    step: float
+    statuses: Mapping[int, str]
+    learned: dict[str, list[str]] = field(default_factory=dict)
+
+    def counted(self, run: str, x: str = "displacement", model: str = "") -> Array:
+        """Return a channel, as a model gives it if one is named; of a held input, under the force."""
+        one = self.experiment.simulate(model, self.runs[run]) if model else self.runs[run]
+        start = self.runs.labels[run].labels.get("start", 0.0)
+        return (one.time if x == "time" else one[x])[round(start / self.step) :]
+
+    def errors(self, model: str, runs: Sequence[str]) -> tuple[float, float]:
+        """Return MAE and RMSE over runs [mm]."""
+        both = [np.concatenate([self.counted(n, model=one) for n in runs]) for one in ("", model)]
+        return mae(*both), rmse(*both)
+
+    def curves(self, runs: Sequence[str], x: str, models: Sequence[str]) -> dict[str, Curves]:
+        """Return panels of the displacement against a channel, or the time."""
+        names = {self.runs[run].origin: "" for run in runs} | {model: model for model in models}
+        return {
+            run: {n: (self.counted(run, x), self.counted(run, model=m)) for n, m in names.items()}
+            for run in runs
+        }
+
+
+def run(experiment: Experiment) -> None:
+    """Identify models with and without the force, and compare them on motion that is not repeated."""
+    recorded = experiment.record(until=0.1)
+    slowest = max(one.sample_time or 0.0 for one in recorded.values())
+    step = max(0.05 if experiment.quick else 0.02, slowest)
+    runs = Runs({name: resample(one, step) for name, one in recorded.items()}, recorded.labels)
+    statuses = {k: n for k in range(1, len(runs) + VARYING) for n in runs.names(status=k)}
+    study = Study(experiment, runs, driven([*runs.values()]), step, statuses)
+    for part in (_fit, _errors, _constants, _loops, _force):
+        part(study)
+    if experiment.rig is not None and not experiment.quick:
+        _track(study, experiment.rig)
+
+
+def driven(recordings: Sequence[Recording]) -> str:
+    """Return the input that all recordings have, beside displacement and force."""
+    for channel in ("displacement", "force"):
+        for name in (one.name for one in recordings if channel not in one):
+            remedy = f"add a column {channel}; a force is 0 N where nothing pulls"
+            raise DataError(f"{name} is without it", channel=channel, remedy=remedy)
+    shared = [x for x in ("voltage", "pressure") if all(x in one for one in recordings)]
+    if not shared:
+        remedy = "add the voltage of the valve to all of them, or the pressure"
+        raise DataError("the recordings share no input", channel="voltage", remedy=remedy)
+    return shared[0]
+
+
+def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
+    """Tell runs without load, with a constant one, with a held input, pulls and random ones apart."""
+    drive = driven(recordings)
+    forces = [np.abs(one["force"]) for one in recordings]
+    largest = max(float(np.percentile(f, 99)) for f in forces) if moves(forces) else np.inf
+    span = float(np.ptp(np.concatenate([one[drive] for one in recordings])))
+    labels = [_label(one, drive, largest, span) for one in recordings]
+    kinds = ("free", "weight", "held", "pulls", "random")
+    by = {kind: [one for one in labels if one["stage"] == kind] for kind in kinds}
+    varying = by["pulls"] or by["random"]
+    for runs, what in ((by["free"], "without load"), (varying, "moved under a varying force")):
+        if not runs:
+            raise DataError(f"no recording is {what}", channel="force", remedy="record one, too")
+    by["free"][0]["status"] = 1
+    numbers, last = chain((2, 3), count(VARYING + 1)), 0.0
+    for one in sorted(by["weight"], key=lambda one: float(one["force"])):
+        if one["force"] > last + FREE * largest:
+            one["status"], last = next(numbers), one["force"]
+    strongest = max(varying, key=lambda one: float(one["force"]))
+    strongest["status"] = VARYING
+    only = len(by["weight"] + by["pulls"] + by["random"]) == 1
+    tests = by["held"] + [strongest] * (not only) + by["random"][1:][-1:] * bool(by["pulls"])
+    for one in tests:
+        one["role"] = "test"
+    return [Labels(one.pop("role", "train"), one) for one in labels]
+
+
+def _label(one: Recording, drive: str, largest: float, span: float) -> dict[str, Any]:
+    """Return the kind of a run, its force [N], and how often its motion repeats [Hz]."""
+    u, force, step = one[drive], np.abs(one["force"]), one.sample_time or 1.0
+    low, high = np.percentile(force, (1, 99))
+    whole = cycles(u)
+    repeats = bool(whole) and np.ptp([u[cycle].max() for cycle in whole]) < REPEATS * np.ptp(u)
+    period = np.median([cycle.stop - 1 - cycle.start for cycle in whole]) if repeats else np.inf
+    label = {"force": float(high), "frequency": float(f"{1 / (period * step):.2g}")}
+    if high < FREE * largest or high - low < CONSTANT * high:
+        return label | {"stage": "free" if high < FREE * largest else "weight"}
+    pulled = int(np.argmax(np.abs(force - np.median(force[:10])) > FREE * high))
+    if np.ptp(np.percentile(u[pulled:], (1, 99))) < STILL * span:
+        level = float(f"{np.median(u[pulled:]):.2g}")
+        return label | {"stage": "held", "level": level, "start": pulled * step}
+    return label | {"stage": "pulls" if repeats else "random"}
+
+
+def _fit(study: Study) -> None:
+    """Fit models of single statuses without the force, then those with it."""
+    experiment, runs, step = study.experiment, study.runs, study.step
+    by = {s: runs.names("train", stage=s) for s in ("free", "status", "weight", "pulls", "random")}
+    train, free = [*chain(*by.values())], by["free"]
+    rate = runs.of(study.statuses[1], "frequency")
+    first = [name for name in free if runs.of(name, "frequency") == rate][:1]
+    pulls = by["pulls"] or by["weight"] + by["random"]
+    papers = {"method": "pso", "memory": "rdpi", "constants": False, "learns_from": "loaded"}
+    mpi: dict[str, dict[str, Any]] = {
+        "": {"thresholds": "identified", "nonnegative": False, "rate_time_constant": 0.0}
+        | {"output_map": "free-polynomial", "map_size": 9},
+        ", ours": {"rate_time_constant": 5 * step},
+    }
+    learners: list[tuple[str, str, dict[str, Any], list[str]]] = [
+        (f"MPI-{k}{suffix}", "rdpi", {"input": study.drive, **settings}, [name])
+        for k, name in study.statuses.items()
+        for suffix, settings in mpi.items()
+        if k != VARYING
+    ] + [
+        (AS_PRINTED, "mpi-narmax", papers, first + pulls),
+        (ALL_RATES, "mpi-narmax", papers, free + pulls),
+        (MORE, "mpi-narmax", papers | {"learns_from": "all"}, train),
+        (PLAIN, "mpi-narmax", {"method": "ls", "memory": "rdpi", "n_sets": 2}, train),
+        ("balance, one record", "balance", {}, free + pulls),
+        (OURS, "balance", {}, train),
+        ("coupled-memory", "coupled-memory", {}, train),
+        (PRESSURE, "balance", {"input": ("pressure",)}, train),
+    ]
+    sensed = study.drive == "voltage" and all("pressure" in one for one in runs.values())
+    left_out = [MORE] * experiment.quick + [PRESSURE] * (not sensed)  # MORE takes longest
+    learners = [one for one in learners if one[0] not in left_out]
+    rows: dict[str, tuple[Cell, ...]] = {}
+    for place, (name, family, settings, names) in enumerate(learners):
+        experiment.tell(0.1 + 0.75 * place / len(learners), name)
+        given = {"input": (study.drive,), "seed": experiment.seed, **settings}
+        estimator = registry.load("estimators", family)(**given)
+        fitted = experiment.fit(name, estimator, [runs[run] for run in names])
+        study.learned[name] = names
+        text = ", ".join(names) if names != train else "all training runs"
+        rows[name] = text, fitted.seconds, fitted.n_free
+    experiment.table("models", ("learned from", "time [s]", "parameters"), rows)
+
+
+def _errors(study: Study) -> None:
+    """Add errors by status, on pulls, on motion that is not repeated, and with the input held."""
+    experiment, runs, learned = study.experiment, study.runs, study.learned
+    held, varying = runs.names(stage="held"), study.statuses[VARYING]
+    groups = {f"status {k}": [name] for k, name in study.statuses.items()} | {
+        "training pulls": runs.names("train", stage="pulls"),
+        "random": [n for n in runs.names("test", stage="random") if n != varying],
+        "held": held,
+    }
+    off = {k: {n: study.errors(n, g) for n in learned} for k, g in groups.items() if g}
+    off["learned from"] = {n: study.errors(n, names) for n, names in learned.items()}
+    for place, key in enumerate(("mae", "rmse")):
+        columns = [name for name in off if name.startswith("status ")]
+        rows = {n: [off[column][n][place] for column in columns] for n in learned}
+        experiment.table(key, columns, rows)
+    order = ("learned from", "training pulls", "status 4", "random", "held")
+    shown = [what for what in order if what in off]
+    columns = [f"{what}, {which}" for what in shown for which in ("MAE", "RMSE")]
+    rows = {n: [error for what in shown for error in off[what][n]] for n in learned}
+    experiment.table("errors", columns, rows)
+    blind = [name for name in learned if name[4].isdigit()]  # MPI-1, ...
+    for what in off.keys() & order[2:]:
+        found, key = off[what], what.replace(" ", "_")
+        best = min(blind, key=lambda name: found[name])
+        each = ("{} {:.2f} / {:.2f} mm".format(n, *found[n]) for n in (best, *HEADLINE))
+        worse = [n for n in learned if n not in blind and found[n] >= found[best]]
+        gains = [found[best][0] / found[n][0] for n in HEADLINE]
+        said = {"": "; ".join(each), "_worse": "; ".join(worse) or "none", "_gains": gains}
+        experiment.says(**{key + name: fact for name, fact in said.items()})
+    if held:
+        moved = {n: [study.counted(run, model=n) for run in held] for n in ("", *learned)}
+        rows = {
+            n or "muscle": [round(float(np.ptp(y[y.size // 2 :])), 6) for y in every]
+            for n, every in moved.items()
+        }
+        experiment.table("held", [f"swing at {runs.of(run, 'level'):g}" for run in held], rows)
+
+
+def _constants(study: Study) -> None:
+    """Add Table 1 beside ours, and where the printed MPI passes the turning point of its map."""
+    experiment, largest, status = study.experiment, {}, study.statuses[1]
+    hysteresis, map_of_b = experiment.paper.printed("mpi-narmax-mpi").parts
+    powers = np.polynomial.Polynomial(map_of_b.polynomial)
+    turns = powers.deriv().roots()
+    turn = float(turns[(abs(turns.imag) < 1e-9) & (turns.real > 0)].real.min())
+    rows: list[tuple[Cell, ...]] = []
+    for f in (0.05, 0.1, 0.2, 0.22):
+        wave = sine(np.arange(round(2000 / f)) * 0.001, 1 / f, protocol.HIGH, protocol.LOW)
+        b = np.asarray(hysteresis.simulate(wave, sample_time=0.001))[wave.size // 2 :]
+        moved, past = powers(b), np.mean(np.abs(b) > turn)
+        largest[f] = float(b.max())
+        rows.append((f, largest[f], 100 * float(past), float(moved.min()), float(moved.max())))
+    columns = ("largest b", "past the fold [%]", "lowest [mm]", "highest [mm]")
+    experiment.table("folded", columns, rows)
+    model: Any = experiment.models["MPI-1"]
+    pi, polynomial = model.parts
+    # Table 1's b has no offset; ours is scaled to be as large as that at 0.1 Hz.
+    b = np.asarray(pi.simulate(study.counted(status, study.drive), sample_time=study.step))
+    scale = largest[0.1] / float(np.abs(b - pi.offset).max())
+    inner = [(pi.offset - polynomial.centre) / polynomial.scale, 1 / scale / polynomial.scale]
+    a = np.polynomial.Polynomial(polynomial.polynomial)(np.polynomial.Polynomial(inner)).coef
+    a = np.pad(a, (0, max(0, len(pi.thresholds) - a.size)))[::-1]
+    table = zip(pi.thresholds, *np.multiply(scale, (pi.rate_weights, pi.weights)), a, strict=True)
+    found = {str(i): [*map(float, row)] for i, row in enumerate(table, start=1)}
+    experiment.table("constants", ["r", "k", "d", "a"], found)
+
+
+def _loops(study: Study) -> None:
+    """Add loops by rate and load, time plots, errors, and the displacement by force."""
+    experiment, runs, statuses = study.experiment, study.runs, study.statuses
+    kinds = {"pulls": "varying load", "weight": "constant load", "free": "no load"}
+    panels: dict[str, dict[str, tuple[Array, Array]]] = {"no load": {}}
+    for stage, kind in kinds.items():
+        for name in runs.names(stage=stage):
+            u, y = runs[name][study.drive], runs[name]["displacement"]
+            if rate := runs.of(name, "frequency"):
+                part = slice(None) if stage == "pulls" else cycles(u)[-1]
+                panels.setdefault(f"{rate:g} Hz", {})[kind] = u[part], y[part]
+                if stage == "free":
+                    panels["no load"][f"{rate:g} Hz"] = u[part], y[part]
+    experiment.figure("loads", {n: c for n, c in sorted(panels.items()) if len(c) > 1} or panels)
+    pulls = [*runs.names("train", stage="pulls")[:1], statuses[VARYING]]
+    shown, held = ("MPI-1", AS_PRINTED, ALL_RATES), runs.names(stage="held")
+    experiment.figure("time", study.curves((statuses[1], *pulls), "time", shown))
+    loops = [*statuses.values(), *pulls[:-1]]
+    experiment.figure("statuses", study.curves(loops, study.drive, shown))
+    experiment.figure("pulls", study.curves(pulls, "force", shown[1:]))
+    off = study.counted(statuses[1], model="MPI-1") - study.counted(statuses[1])
+    share, edges = np.histogram(off, 61, weights=np.full(off.size, 100 / off.size))
+    experiment.figure("histogram", {"": {"MPI-1": (0.5 * (edges[1:] + edges[:-1]), share)}})
+    if held:
+        muscle = {name: (study.counted(name, "force"), study.counted(name)) for name in held}
+        each = study.curves(held, "force", (*shown[1:], OURS))
+        experiment.figure("held", {"": muscle} | each)
+
+
+def _force(study: Study) -> None:
+    """Add the force estimated from displacement and pressure."""
+    experiment, runs, test = study.experiment, study.runs, study.statuses[VARYING]
+    known = experiment.models[PRESSURE if PRESSURE in study.learned else OURS]
+    experiment.models["force"] = load_of(known)
+    rows: dict[str, list[float]] = {}
+    for name in runs:
+        force = study.counted(name, "force")
+        estimated = study.counted(name, "force", "force")
+        rows[name] = [rmse(force, estimated), float(np.ptp(force))]
+    experiment.table("force", ["RMSE [N]", "range [N]"], rows)
+    experiment.says(force_percent=100 * rows[test][0] / rows[test][1])
+
+
+def _track(study: Study, rig: Rig) -> None:
+    """Add how a sine is followed under the pulls of status 4, with every controller."""
+    experiment, step, pulls = study.experiment, study.step, study.runs[study.statuses[VARYING]]
+    seed, models = experiment.seed, experiment.models
+    experiment.tell(0.9, "closed loops")
+    low, high = np.percentile(pulls["displacement"], (1, 99))
+    middle, amplitude = round(0.53 * low + 0.47 * high), round(0.3 * (high - low))
+    wave: Array = middle + amplitude * np.sin(0.2 * np.pi * pulls.time)
+    reference = Recording({"displacement": wave, "force": pulls["force"].clip(0.0)}, step)
+    unloaded = registry.load("estimators", "balance")(input=(study.drive,), scheduling=())
+    unloaded.fit(study.runs[study.statuses[1]])
+    inverse = models[OURS].inverse()
+    laws = {
+        "inverse without force": unloaded.model_.inverse(),
+        "inverse with force": inverse,
+        "inverse, estimated force": EstimatedLoad(BlockController(inverse), models["force"]),
+        "PID": tune_pid(rig, sample_time=step, scheduled={"force": 0.0}, seed=seed),
+    }
+    rows, drawn = {}, {"reference": (pulls.time, wave)}
+    for name, law in laws.items():
+        found = track(law, rig, reference, approach=10.0, settle=5.0, seed=seed)
+        rows[name] = found.rmse["displacement"], found.largest["displacement"]
+        drawn[name] = found.recording.time, found.recording["displacement"]
+    facts = {"middle": middle, "amplitude": amplitude}
+    experiment.table("tracked", ["RMSE [mm]", "largest [mm]"], rows, **facts)
+    experiment.figure("tracked", {"": drawn})
+
+
+RERUN = Rerun(run, sort)

@@ -151,7 +151,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "field-models": "mckibben.papers.field_models.rerun:field_models",
         "mpi-narmax": "mckibben.papers.mpi_narmax.rerun:mpi_narmax",
         "multistate-friction": "mckibben.papers.multistate_friction.rerun:multistate_friction",
-        "sdchm": "mckibben.papers.sdchm.rerun:sdchm",
+        "sdchm": "mckibben.papers.sdchm.run:RERUN",
     },
     "protocols": {
         "activation-pressure": "mckibben.papers.activation_pressure.protocol:activation_pressure",
@@ -169,7 +169,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "mpi-narmax-mpi": "mckibben.papers.mpi_narmax.published:modified_prandtl_ishlinskii",
         "multistate-friction": "mckibben.papers.multistate_friction.published:multistate_friction",
         "multistate-static-force": "mckibben.papers.multistate_friction.published:static_force",
-        "sdchm-coupling": "mckibben.papers.sdchm.published:coupling",
+        "sdchm-coupling": "mckibben.papers.sdchm.printed:coupling",
     },
     "setups": {
         "arm": "mckibben.rigs.setups.arm:Arm",

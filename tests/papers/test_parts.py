@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,7 @@ from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.papers.keeping import fitted, recorded
-from mckibben.papers.sdchm.models import BALANCE, LINEAR, OURS, PREDICTING, PUBLISHED, Models
-from mckibben.papers.sdchm.prediction import Predictions
-from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS, Recordings
 from mckibben.signals import triangle
-from mckibben.signals.protocol import protocol
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 
@@ -97,45 +92,3 @@ def test_box_jenkins_finds_a_numerator_of_the_printed_structure() -> None:
     assert isinstance(model, TransferFunction)
     assert model.numerator[1] == 0.0
     assert model.numerator == pytest.approx((0.8, 0.0, -0.3), abs=0.01)
-
-
-@dataclass(frozen=True)
-class Off:
-    """A model that is off by so much, and by the extensor's pressure where none is given."""
-
-    by: float | None = None
-
-    def simulate(self, recording: Recording) -> Recording:
-        by = recording[EXTENSOR] if self.by is None else self.by
-        return Recording({name: recording[name] + by for name in OUTPUTS}, recording.sample_time)
-
-
-@pytest.fixture(scope="module")
-def runs() -> Recordings:
-    """All runs that predictions are scored on, with displacements that are cheap."""
-    made = {}
-    for run in protocol("sdchm").runs:
-        u = run.inputs
-        driven = [u[f"pressure_{k}"] for k in (1, 2, 3)]
-        moved = {y: 20.0 * p + sum(driven) for y, p in zip(OUTPUTS, driven, strict=True)}
-        channels = {name: u[name][::20] for name in u.channels}
-        channels |= {name: y[::20] for name, y in moved.items()}
-        made[run.name] = (run, Recording(channels, 20 * (u.sample_time or 1.0)))
-    return Recordings(made)
-
-
-def predictions(runs: Recordings, **off: float | None) -> Predictions:
-    blocks: Any = dict.fromkeys(PREDICTING, Off(1.0)) | {k: Off(v) for k, v in off.items()}
-    return Predictions(Models(blocks, dict.fromkeys(blocks, 0.0)), runs)
-
-
-def test_groups_of_table_4_are_at_its_stiffness(runs: Recordings) -> None:
-    found = predictions(runs, **{OURS: None}).groups(OURS, 0.1)
-    assert list(found) == list("abcdefghijkl")
-    assert [rmse for _, rmse in found.values()] == pytest.approx([0.1] * 12)
-
-
-def test_joint_runs_come_first_and_choose_by_validation(runs: Recordings) -> None:
-    found = predictions(runs, **{LINEAR: 3.0, PUBLISHED: 8.0, BALANCE: 0.5})
-    assert found.headline == BALANCE
-    assert found.only_along_patterns == [PUBLISHED]

@@ -37,7 +37,7 @@ MOVES = ((1, 0.7), (2, 1.5), (3, 2.3))
 
 F = 1 / PERIOD
 MEAN, SWING, AMPLITUDE, OFFSET, TASK_LEVEL = 33.0, 6.0, 40.0, 5.0, 0.6
-"""Of the references of Table 5 and Figure 13: [Hz], [mm], and the latter's pressure of the extensor [bar]."""
+"""Of the references of Table 5 and Figure 13: [Hz], [mm], the latter's extensor [bar]."""
 
 REACHED = 0.8
 """Share of the way recorded of every muscle that references ask for at most, else they are smaller."""

@@ -252,7 +252,9 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     for one, name in product(recordings, needed):
         if name not in one:
             remedy = f"--column {name}=COLUMN; what was held: --constant '{name}=0 bar'"
-            raise DataError("it is not there", file=one.source, channel=name, remedy=remedy)
+            raise DataError(
+                "there is no such channel", file=one.source, channel=name, remedy=remedy
+            )
     swings = np.array([[_swing(one[name]) for name in muscles] for one in recordings])
     least, gap = MOVES * swings.max(), ONE * swings.max()
     moving = [[name for name, s in zip(muscles, row, strict=True) if s > least] for row in swings]
@@ -272,7 +274,9 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
         alone = [i for i in whole if moving[i] == [muscle]]
         if not alone:
             remedy = "record a cycle of it while the other muscles have no pressure"
-            raise DataError("it never rises to the highest alone", channel=muscle, remedy=remedy)
+            raise DataError(
+                "no recording moves it alone, to the highest", channel=muscle, remedy=remedy
+            )
         softest = [i for i in alone if levels[i] == min(levels[j] for j in alone)]
         stages[max(softest, key=lambda i: recordings[i].duration or 0.0)] = "hysteresis"
     for i in patterns - whole:

@@ -14,11 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from mckibben.arrays import Array
 from mckibben.recording import Recording
 from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
@@ -110,29 +108,23 @@ def _shortened(run: Run) -> Run:
 def _sines(stage: str, role: Role, driven: str, p0: float, peaks: Sequence[float]) -> Run:
     rate = 50.0 if stage == "hysteresis" else 20.0
     wave = sine(np.arange(round(PERIOD * len(peaks) * rate)) / rate, PERIOD, peaks)
-    pressures = [wave if k in driven else 0.0 * wave for k in "123"]
-    labels = {"stage": stage, "p0": p0, "driven": driven}
+    channels = {f"pressure_{k}": wave if k in driven else 0.0 * wave for k in "123"}
+    inputs = Recording(channels | {"pressure_extensor": np.full(wave.size, p0)}, 1 / rate)
     name = NAMES.get(stage, f"{stage}-p0-{{p0}}-drive-{{d}}").format(d=driven, p0=p0)
-    return _run(name, role, [*pressures, np.full(wave.size, p0)], rate, labels)
+    labels = {"stage": stage, "p0": p0, "driven": driven}
+    return Run(name, role, inputs, {"start.pressure_extensor": p0}, labels)
 
 
 def _joint(role: Role, number: int, p0: float | None) -> Run:
     """Return a run with all pressures random at once: muscles up to 0.05 Hz, the extensor to 0.02 Hz."""
     time = np.arange(round(JOINT_TIME * 20.0)) / 20.0
     seed, rise = 1000 * list(JOINT).index(role) + 10 * number, np.minimum(time / JOINT_START, 1.0)
-    pressures = [rise * random_wave(time, 0.05, HIGHEST, seed=seed + k) for k in (1, 2, 3)]
+    waves = {k: rise * random_wave(time, 0.05, HIGHEST, seed=seed + k) for k in (1, 2, 3)}
     moving = random_wave(time, 0.02, HIGHEST, seed=seed)
     extensor = moving if p0 is None else np.full(time.size, p0)
-    labels: dict[str, Any] = {"stage": "joint", "p0": float(extensor[0]), "driven": "123"}
-    labels["extensor"] = "moving" if p0 is None else "constant"
+    channels = {f"pressure_{k}": wave for k, wave in waves.items()}
+    inputs = Recording(channels | {"pressure_extensor": extensor}, 1 / 20.0)
+    start, kind = float(extensor[0]), "moving" if p0 is None else "constant"
     name = f"joint-{role}-moving-{number}" if p0 is None else f"joint-{role}-p0-{p0}"
-    return _run(name, role, [*pressures, extensor], 20.0, labels)
-
-
-def _run(
-    name: str, role: Role, pressures: Sequence[Array], rate: float, labels: dict[str, Any]
-) -> Run:
-    names = (*(f"pressure_{k}" for k in (1, 2, 3)), "pressure_extensor")
-    inputs = Recording(dict(zip(names, pressures, strict=True)), 1 / rate)
-    start = {"start.pressure_extensor": float(pressures[-1][0])}
-    return Run(name, role, inputs, start, labels)
+    labels = {"stage": "joint", "p0": start, "driven": "123", "extensor": kind}
+    return Run(name, role, inputs, {"start.pressure_extensor": start}, labels)

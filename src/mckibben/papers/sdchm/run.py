@@ -73,10 +73,8 @@ def _width(u: Array, y: Array) -> list[Cell]:
 
 def _motions(experiment: Experiment, runs: Runs) -> None:
     """Add how the arm moves: by pattern, Figure 4, and by the extensor's pressure, Figure 5."""
-    patterns, alone = (
-        runs.names(stage=stage) or runs.names(stage="network") or [*runs]
-        for stage in ("coupling", "stiffness")
-    )
+    whole = runs.names(stage="hysteresis") + runs.names(stage="network")
+    patterns, alone = (runs.names(stage=key) or whole for key in ("coupling", "stiffness"))
     levels = sorted({float(runs.of(name, "p0")) for name in patterns})
     middle, first = levels[len(levels) // 2], min(runs.of(name, "driven") for name in alone)
     chosen = {
@@ -171,8 +169,10 @@ def _off(experiment: Experiment, name: str, recordings: Sequence[Recording]) -> 
 def _sets(experiment: Experiment, runs: Runs) -> None:
     """Add the errors on test runs: all pressures random at once, and along the patterns."""
     names = [name for name in PREDICTING if name in experiment.models]
-    held = runs.select("validation", stage="joint") or runs.select("validation") or runs.select()
-    best = min((OURS, BALANCE), key=lambda n: rms(_off(experiment, n, held)))
+    held = runs.select("validation", stage="joint") or runs.select("validation")
+    best = min(
+        (OURS, BALANCE), key=lambda n: rms(_off(experiment, n, held or runs.select("train")))
+    )
     for kind in ("constant", "moving", "along"):
         joint = {"stage": "joint", "extensor": kind}
         labels = {"stage": "network"} if kind == "along" else joint
@@ -194,7 +194,7 @@ def _sets(experiment: Experiment, runs: Runs) -> None:
         columns = [f"RMSE of y{output[-1]} [mm]" for output in outputs]
         columns += ["worst RMSE of range [%]", "largest error [mm]", "Err [%]"]
         levels = sorted({f"{runs.of(name, 'p0'):g}" for name in runs.names("test", **labels)})
-        facts = {"n": len(test), "samples": len(y), "levels": ", ".join(levels)}
+        facts: dict[str, Any] = {"n": len(test), "samples": len(y), "levels": ", ".join(levels)}
         facts["covered"] = ", ".join(f"{span:.0f}" for span in np.ptp(y, axis=0))
         experiment.table(kind, [*columns, "validation runs, RMSE [mm]"], rows, **facts)
         (one, *_), output = test, outputs[0]
@@ -202,16 +202,11 @@ def _sets(experiment: Experiment, runs: Runs) -> None:
         curves = {one.origin: one[output]} | curves
         experiment.figure(kind, {str(one.name): {n: (one.time, z) for n, z in curves.items()}})
         failing = [f"{n} ({size[n]:.1f} mm)" for n in names if size[n] > size[LINEAR]]
-        rival = min((RAW, DAMPED), key=lambda n: size[n])
-        found = {"best": size[best], "worst": rows[best][len(outputs)], "linear": size[LINEAR]}
-        found["all"] = ", ".join(f"{name} {value:.2f} mm" for name, value in size.items())
-        if failing:
-            found["failing"] = ", ".join(failing)
-        if size[rival] < size[LINEAR]:
-            ours = (PUBLISHED, OURS, BALANCE)
-            found["ratios"] = ", ".join(f"{n} {size[n] / size[rival]:.2f}" for n in ours)
-        facts = {f"{kind}_{name}": value for name, value in found.items()}
-        experiment.says(best=best, **facts, **{f"{kind}_rival": rival})
+        facts = {"best": size[best], "worst": rows[best][len(outputs)], "linear": size[LINEAR]}
+        facts["all"] = ", ".join(f"{name} {value:.2f} mm" for name, value in size.items())
+        facts |= {"failing": ", ".join(failing)} if failing else {}
+        experiment.says(best=best, on="validation" if held else "training")
+        experiment.says(**{f"{kind}_{name}": value for name, value in facts.items()})
 
 
 def _groups(experiment: Experiment, runs: Runs) -> None:
@@ -252,9 +247,7 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     for one, name in product(recordings, needed):
         if name not in one:
             remedy = f"--column {name}=COLUMN; what was held: --constant '{name}=0 bar'"
-            raise DataError(
-                "there is no such channel", file=one.source, channel=name, remedy=remedy
-            )
+            raise DataError("it is missing", file=one.source, channel=name, remedy=remedy)
     swings = np.array([[_swing(one[name]) for name in muscles] for one in recordings])
     least, gap = MOVES * swings.max(), ONE * swings.max()
     moving = [[name for name, s in zip(muscles, row, strict=True) if s > least] for row in swings]
@@ -273,10 +266,8 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     for muscle in muscles:
         alone = [i for i in whole if moving[i] == [muscle]]
         if not alone:
-            remedy = "record a cycle of it while the other muscles have no pressure"
-            raise DataError(
-                "no recording moves it alone, to the highest", channel=muscle, remedy=remedy
-            )
+            remedy = "record a cycle of it, to the highest, while the others have no pressure"
+            raise DataError("no recording moves it alone", channel=muscle, remedy=remedy)
         softest = [i for i in alone if levels[i] == min(levels[j] for j in alone)]
         stages[max(softest, key=lambda i: recordings[i].duration or 0.0)] = "hysteresis"
     for i in patterns - whole:

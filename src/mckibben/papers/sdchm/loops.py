@@ -67,19 +67,13 @@ def numbered(recording: Recording, what: str) -> list[str]:
 
 
 def held(
-    outputs: Sequence[str],
-    moving: str,
-    time: Array,
-    p0: float,
-    scale: float = 1.0,
-    frequency: float = F,
-    load: float = 0.0,
+    outputs: Sequence[str], moving: str, time: Array, p0: float, scale: float = 1.0, f: float = F
 ) -> Task:
-    """Return a task that moves one output, as Table 5's or otherwise, while the others hold."""
+    """Return a task that moves one output, as Table 5's or at another frequency; the others hold."""
     channels = dict.fromkeys(outputs, np.full(time.size, scale * MEAN))
-    channels[moving] = scale * (MEAN + SWING * np.sin(2 * np.pi * frequency * time))
+    channels[moving] = scale * (MEAN + SWING * np.sin(2 * np.pi * f * time))
     reference = Recording(channels | {EXTENSOR: np.full(time.size, p0)}, float(time[1]))
-    return Task(reference, [moving], {"mean": scale * MEAN, "swing": scale * SWING, "p0": p0}, load)
+    return Task(reference, [moving], {"mean": scale * MEAN, "swing": scale * SWING, "p0": p0})
 
 
 def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
@@ -106,8 +100,9 @@ def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
         laws["disturbance observer"] = control_law("observer", inverses[BALANCE], lambda: pid)
         for frequency, load in BEYOND:
             longer = np.arange(round(max(40.0, 2 / frequency) / step), dtype=np.float64) * step
+            task = held(outputs, outputs[0], longer, at[0], scale, frequency)
             key = f"{frequency:g} Hz" + (f", {load:g} kg" if load else "")
-            beyond[key] = held(outputs, outputs[0], longer, at[0], scale, frequency, load)
+            beyond[key] = task._replace(load=load)
     every = tasks | {"task": Task(Recording(channels, step), outputs, facts)} | beyond
     ours = [name for name in laws if name not in (SDIHC, SINGLE, SDIHC_OURS)]
     keys = [(key, name) for key in every for name in (ours if key in beyond else laws)]

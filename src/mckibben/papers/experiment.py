@@ -302,8 +302,11 @@ class Experiment:
             Share of the whole work that is done then.
         """
         if self.data is not None:
+            used: dict[str, tuple[Recording, Labels]] = {}
             every = zip(self.data, self._sorted(self.data), strict=True)
-            used = {one.name: (one, labels) for one, labels in every if labels is not None}
+            for place, (one, labels) in enumerate(every, start=1):
+                if labels is not None:
+                    used[f"{one.name}-{place}" if one.name in used else one.name] = one, labels
             return Runs(
                 {name: one for name, (one, _) in used.items()},
                 {name: labels for name, (_, labels) in used.items()},

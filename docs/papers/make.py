@@ -21,8 +21,8 @@ from mckibben.report.reproduction import drawing, markdown
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "pictures" / "papers"
-RESOLUTION, COLOURS = 130, 32
-"""Dots per inch; in a picture, of a palette, which makes files a quarter of the size."""
+RESOLUTION, COLOURS = 130, 128
+"""Dots per inch; in a picture, of a palette, which makes files a third of the size."""
 
 
 def main() -> None:

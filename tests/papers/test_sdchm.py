@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mckibben import Recording
-from mckibben.errors import DataError
+from mckibben.errors import DataError, DataWarning
 from mckibben.papers.experiment import Reproduction, Runs, reproduce
 from mckibben.papers.sdchm.loops import (
     BALANCE,
@@ -132,10 +132,11 @@ def test_on_recordings_of_another_arm() -> None:
     plan, _ = quick()
     chosen = ("network-p0-0.0", f"network-p0-{TEST[1]}", "network-p0-1.8", "coupling-drive-1")
     names = [run.name for run in plan.runs if run.name.startswith(chosen)]
-    data = [
-        Recording({name: one[name] for name in one.channels}, one.sample_time)
-        for _, one in record(plan, arm, runs=names, jobs=1)
-    ]
+    with pytest.warns(DataWarning, match="limited to 0 to 2 bar"):
+        data = [
+            Recording({name: one[name] for name in one.channels}, one.sample_time)
+            for _, one in record(plan, arm, runs=names, jobs=1)
+        ]
     found = reproduce("sdchm", data=data, quick=True, jobs=1)
     errors = {name: row["RMSE of y1 [mm]"] for name, row in rows(found, "along").items()}
     assert errors[BALANCE] < 0.3 * errors[LINEAR]

@@ -86,7 +86,7 @@ def _motions(experiment: Experiment, runs: Runs) -> None:
         rows: dict[str, list[Cell]] = {}
         panels: Panels = {}
         for name, group, u, recording, output in by_group(runs, names):
-            level, y = f"extensor at {runs.of(name, 'p0'):g} bar", recording[output]
+            level, y = f"{runs.of(name, 'p0'):g} bar", recording[output]
             by_level = key == "stiffness"
             row = rows[f"{level}, y{output[-1]}" if by_level else group] = _width(u, y)
             widths += [float(cell) for cell in row[:1] if cell is not None]

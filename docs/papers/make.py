@@ -21,7 +21,7 @@ from mckibben.report.reproduction import drawing, markdown
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "pictures" / "papers"
-RESOLUTION, COLOURS = 130, 128
+RESOLUTION, COLOURS = 130, 256
 """Dots per inch; in a picture, of a palette, which makes files a third of the size."""
 
 
@@ -45,7 +45,7 @@ def write(found: Reproduction) -> None:
         with rc_context(dict(STYLE)):
             drawn(drawing(figure)).savefig(file, dpi=RESOLUTION, metadata=dict(METADATA["png"]))
         with Image.open(file) as whole:
-            few = whole.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+            few = whole.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
         few.save(file, optimize=True)
     date = datetime.now(UTC).date().isoformat()
     page = markdown(found, date, f"../pictures/papers/{found.name}")

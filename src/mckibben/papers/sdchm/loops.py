@@ -42,6 +42,9 @@ MEAN, SWING, AMPLITUDE, OFFSET, TASK_LEVEL = 33.0, 6.0, 40.0, 5.0, 0.6
 REACHED = 0.8
 """Share of the way recorded of every muscle that references ask for at most, else they are smaller."""
 
+DRAWN = 6
+"""Controllers that figures show, the first of the tables: as many as there are colours."""
+
 BEYOND = ((0.02, 0.0), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0), (0.02, 1.0), (0.02, 2.0))
 """Beyond the paper: frequency of the reference [Hz], and load on the disc [kg]."""
 
@@ -194,7 +197,7 @@ def _shown(
         errors = np.array([late[y] - late[f"reference_{y}"] for y in tracked.rmse])
         ends = {"lowest error [mm]": errors.min(), "highest error [mm]": errors.max()}
         rows[name] |= {end: float(error) for end, error in ends.items()}
-        for y in tracked.rmse:
+        for y in tracked.rmse if name in [*found][:DRAWN] else ():
             x = late[f"reference_{one}"] if alone else late.time
             title = f"y{one[-1]} moves: y{y[-1]}" if alone else f"y{y[-1]}"
             panels.setdefault(title, {"reference": (x, late[f"reference_{y}"])})

@@ -31,8 +31,8 @@ from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import track
 from mckibben.measured.sets import parted, sets_in
 from mckibben.papers.activation_pressure.protocol import FORCES
-from mckibben.papers.sdchm.compensation import CONTROL_TIME, loop_width, references, settle
-from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS
+from mckibben.papers.sdchm.loops import EXTENSOR, MOVES, held, widths
+from mckibben.papers.sdchm.protocol import PERIOD
 from mckibben.registry import load
 from mckibben.rigs import record
 from mckibben.signals import random_wave
@@ -47,6 +47,10 @@ Runs = dict[str, Recording]
 
 BALANCE = "balance"
 WITH_PATTERNS = "balance, whole protocol"
+
+OUTPUTS = ("displacement_1", "displacement_2", "displacement_3")
+CONTROL_TIME = 0.05
+"""Of the soft arm: what is followed, and the control step [s]."""
 
 RAIL_TESTS = ("status-4", "random-3")
 
@@ -214,26 +218,27 @@ def arm(seeds: int) -> Iterator[Row]:
         yield Row("arm", f"joint test, {what}, worst run", "mm", 0.8, figures)
     rig = load_rig("soft-arm")
     errors: Figures = defaultdict(list)
-    widths: Figures = defaultdict(list)
-    for task, reference in references(3, 3, CONTROL_TIME).items():
-        if task == "task":
-            continue
-        moving = OUTPUTS[int(task[-1]) - 1]
+    across: Figures = defaultdict(list)
+    time = np.arange(0, 3 * PERIOD, CONTROL_TIME, dtype=np.float64)
+    for (_, p0), moving in zip(MOVES, OUTPUTS, strict=True):
+        task = held(OUTPUTS, moving, time, p0)
         for name, model in first.items():
-            found = track(model.inverse(), rig, reference, settle=settle(reference))
+            found = track(model.inverse(), rig, task.reference, settle=task.settle)
             errors[name] += found.rmse.values()
-            widths[name] += [loop_width(found, moving, output) for output in OUTPUTS]
-    worst = [{name: [max(v)] for name, v in figures.items()} for figures in (errors, widths)]
+            across[name] += widths(found.recording, moving, OUTPUTS).values()
+    worst = [{name: [max(v)] for name, v in figures.items()} for figures in (errors, across)]
     yield Row("arm", "groups a to i open loop, worst", "mm", 0.5, worst[0])
-    yield Row("arm", "their e_w, worst", "%", 2.0, worst[1])
+    yield Row("arm", "their e_w, and cross-motion, worst", "%", 2.0, worst[1])
     ramp = np.linspace(0.5, 2.3, round(50.0 / CONTROL_TIME))
     still = dict.fromkeys(OUTPUTS, np.full(ramp.size, 33.0))
     sweep = Recording(still | {EXTENSOR: ramp}, CONTROL_TIME)
-    held: Figures = {}
+    holding: Figures = {}
     for name, model in first.items():
-        found = track(model.inverse(), rig, sweep, settle=settle(sweep))
-        held[name] = [max(found.rmse.values())]
-    yield Row("arm", "hold 33 mm, extensor 0.5 to 2.3 bar in 50 s, worst muscle", "mm", 0.5, held)
+        found = track(model.inverse(), rig, sweep, settle=50.0 / 3)
+        holding[name] = [max(found.rmse.values())]
+    yield Row(
+        "arm", "hold 33 mm, extensor 0.5 to 2.3 bar in 50 s, worst muscle", "mm", 0.5, holding
+    )
 
 
 def hanging(seeds: int) -> Iterator[Row]:

@@ -15,39 +15,71 @@ from PIL import Image
 
 from mckibben import registry
 from mckibben.checkpoints import Checkpoints
-from mckibben.papers.experiment import reproduce
+from mckibben.papers.experiment import Reproduction, reproduce
+from mckibben.papers.paper import papers
 from mckibben.report.printed import METADATA, STYLE, drawn
 from mckibben.report.reproduction import drawing, markdown
 
 HERE = Path(__file__).parent
-PICTURES = HERE.parent / "pictures" / "papers"
-RESOLUTION = 130
-"""Dots per inch."""
+HEAD = """# The five papers
 
-COLOURS = 64
-"""Of a picture, shades included."""
+Made by `python docs/papers/make.py`; do not edit. Each page begins with where every system, equation, table and
+figure of its paper is; what is printed stands beside what a full run gives. `mckibben reproduce NAME` runs one again,
+`--data FOLDER` on recordings of your own muscle. Models with the parameters that a paper prints are
+`mckibben.papers.paper.printed(NAME)`.
+
+| number | paper | what it asks | with your muscle |
+|---|---|---|---|"""
+
+TUTORIALS = {
+    "activation-pressure": "activation_pressure",
+    "field-models": "field_models",
+    "mpi-narmax": "own_load",
+    "multistate-friction": "friction",
+    "sdchm": "own_arm",
+}
+
+PICTURES = HERE.parent / "pictures" / "papers"
+RESOLUTION, COLOURS = 130, 256
+"""Dots per inch; in a picture, of a palette, which makes files a third of the size."""
 
 
 def main() -> None:
-    """Run the papers named, or all, and write their pages."""
+    """Run the papers named, or all, and write their pages and the list of them."""
+    (HERE / "README.md").write_text(listed(), encoding="utf-8")
     for name in sys.argv[1:] or registry.names("papers"):
         kept = HERE / "unfinished" / name
         found = reproduce(name, folder=kept, clear=False, progress=True)
-        folder = PICTURES / name
-        folder.mkdir(parents=True, exist_ok=True)
-        for old in folder.glob("*.png"):
-            old.unlink()
-        for figure in found.figures:
-            file = folder / f"{figure.key}.png"
-            with rc_context(dict(STYLE)):
-                drawn(drawing(figure)).savefig(file, dpi=RESOLUTION, metadata=dict(METADATA["png"]))
-            with Image.open(file) as picture:  # a third of the size
-                few = picture.convert("RGB").quantize(COLOURS)
-            few.save(file, optimize=True)
-        date = datetime.now(UTC).date().isoformat()
-        page = markdown(found, date, f"../pictures/papers/{name}")
-        (HERE / f"{name}.md").write_text(page, encoding="utf-8")
+        write(found)
         Checkpoints(kept).clear()
+
+
+def listed() -> str:
+    """Return the list of the papers, with their pages and what to do with one's own muscle."""
+    rows = [
+        f"| {each.number} | [{each.title}]({name}.md) | {each.question} "
+        f"| [tutorial](../tutorials/{TUTORIALS[name]}.md) |"
+        for name, each in papers().items()
+    ]
+    return "\n".join([HEAD, *rows]) + "\n"
+
+
+def write(found: Reproduction) -> None:
+    """Write the page of a re-run and its pictures."""
+    folder = PICTURES / found.name
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.png"):
+        old.unlink()
+    for figure in found.figures:
+        file = folder / f"{figure.key}.png"
+        with rc_context(dict(STYLE)):
+            drawn(drawing(figure)).savefig(file, dpi=RESOLUTION, metadata=dict(METADATA["png"]))
+        with Image.open(file) as whole:
+            few = whole.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+        few.save(file, optimize=True)
+    date = datetime.now(UTC).date().isoformat()
+    page = markdown(found, date, f"../pictures/papers/{found.name}")
+    (HERE / f"{found.name}.md").write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

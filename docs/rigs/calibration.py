@@ -20,7 +20,6 @@ from mckibben.metrics import err, loop_width
 from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
 from mckibben.papers.multistate_friction.protocol import SHORTEST
 from mckibben.papers.paper import paper
-from mckibben.papers.sdchm.printed import ORDERS, PREDICTION
 from mckibben.papers.sdchm.protocol import PATTERNS
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig, record
@@ -33,6 +32,9 @@ Row = tuple[str, str, str, str]
 
 TABLE_3 = {"12": 0.1124, "13": 0.0356, "21": 0.1521, "23": 0.2153, "31": 0.5368, "32": 0.6321}
 """Coupling gains that the soft arm's paper prints: first the muscle driven."""
+
+MODELS = ("SDCHM", "raw network")
+"""Of that paper's Table 4."""
 
 CONTRACTIONS = (
     (-4.33e-9, 3.58e-6, -1.11e-3, 1.33e-1),
@@ -122,11 +124,11 @@ def soft_arm() -> Iterator[Row]:
 
 def arm_hysteresis(identification: Recording) -> Iterator[Row]:
     """Give the errors of the paper's hysteresis model on one muscle (its Table 2)."""
-    for n, printed in ORDERS.items():
+    for n, printed in paper("sdchm").tables["orders"].printed["Err [%]"].items():
         model = GPIEstimator(
             input="pressure_1",
             output="displacement_1",
-            n_operators=n,
+            n_operators=int(n),
             threshold_rule="paper",
             initial="virgin",
         )
@@ -141,8 +143,12 @@ def arm_motion(runs: Mapping[str, Recording]) -> Iterator[Row]:
 
     A mean absolute error is at most the root mean square, so that RMSE / Err bounds it from above.
     """
-    printed = np.array(list(PREDICTION.values())).reshape(len(runs), 3, 4)
-    bounds = 100 * printed[..., 1::2] / printed[..., ::2]
+    columns = paper("sdchm").tables["groups"].printed
+    err_, rmse_ = (
+        np.array([[*columns[f"{what}, {name}, as published"].values()] for name in MODELS])
+        for what in ("Err [%]", "RMSE [mm]")
+    )
+    bounds = (100 * rmse_ / err_).T.reshape(len(runs), 3, 2)
     for (pattern, recording), bound in zip(runs.items(), bounds, strict=True):
         sdchm, raw = bound.T
         moved = [recording[f"displacement_{k}"] for k in (1, 2, 3)]

@@ -151,7 +151,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "field-models": "mckibben.papers.field_models.run:RERUN",
         "mpi-narmax": "mckibben.papers.mpi_narmax.run:RERUN",
         "multistate-friction": "mckibben.papers.multistate_friction.run:RERUN",
-        "sdchm": "mckibben.papers.sdchm.rerun:sdchm",
+        "sdchm": "mckibben.papers.sdchm.run:RERUN",
     },
     "protocols": {
         "activation-pressure": "mckibben.papers.activation_pressure.protocol:activation_pressure",
@@ -159,9 +159,6 @@ PLUGINS: dict[str, dict[str, str]] = {
         "mpi-narmax": "mckibben.papers.mpi_narmax.protocol:mpi_narmax",
         "multistate-friction": "mckibben.papers.multistate_friction.protocol:multistate_friction",
         "sdchm": "mckibben.papers.sdchm.protocol:sdchm",
-    },
-    "published": {
-        "sdchm-coupling": "mckibben.papers.sdchm.published:coupling",
     },
     "setups": {
         "arm": "mckibben.rigs.setups.arm:Arm",

@@ -16,6 +16,7 @@ from mckibben.blocks.dynamics.process_model import ProcessModel
 from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.blocks.hysteresis.envelopes import Exponential, Tanh
 from mckibben.blocks.hysteresis.envelopes import PiecewiseLinear as Lines
+from mckibben.papers.paper import printed
 from mckibben.registry import load
 
 Make = Callable[[], object]
@@ -143,11 +144,11 @@ NO_INVERSE: dict[str, tuple[Any, str]] = {
         example("transfer-function", numerator=(0.0, 1.0)),
         "'transfer-function'",
     ),
-    "process model": (load("published", "field-models-p2uz")(), "P2UZ"),
+    "process model": (printed("field-models-p2uz"), "P2UZ"),
     "narx": (example("narx-polynomial"), "'narx-polynomial'"),
     "coupling": (Coupling(((1.0, 1.0), (1.0, 1.0)), PAIR, PAIR), "singular"),
-    "force": (load("published", "multistate-static-force")(), "ForceFeedforward"),
-    "mpi-narmax": (load("published", "mpi-narmax-mpi")(), "inverse"),
+    "force": (printed("multistate-static-force"), "ForceFeedforward"),
+    "mpi-narmax": (printed("mpi-narmax-mpi"), "inverse"),
 }
 
 RATED = example("rate-dependent-pi")

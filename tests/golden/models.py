@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from mckibben import GPI, PI, Block, Channel, Parallel, PerChannel, Series
+from mckibben.papers.paper import printed, printed_models
 from mckibben.registry import load, names
 from tests.golden.running import SAMPLE_TIME, Array
 
@@ -373,7 +374,7 @@ def _of_envelopes() -> dict[str, Block]:
 def registered() -> dict[str, Block]:
     """Return an example of every registered kind, and every printed model."""
     found: dict[str, Block] = {kind: example(kind) for kind in names("blocks")}
-    return found | {f"published {name}": load("published", name)() for name in names("published")}
+    return found | {f"published {name}": printed(name) for name in printed_models()}
 
 
 def all_models() -> dict[str, Block]:

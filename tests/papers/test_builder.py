@@ -66,7 +66,8 @@ def test_every_line_of_an_index_leads_somewhere(name: str) -> None:
     about: Paper = paper(name)
     for item in about.items:
         kind, _, key = item.here.partition(":")
-        known = {"table": [*about.tables], "figure": [*about.figures]}.get(kind)
+        keys = {"table": [*about.tables], "figure": [*about.figures], "model": [*about.models]}
+        known = keys.get(kind)
         assert not item.here or (exists(item.here) if known is None else key in known), item
     listed = {item.here for item in about.items}
     redrawn = {f"table:{key}": text.of for key, text in about.tables.items()}

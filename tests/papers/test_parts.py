@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,8 @@ from mckibben import GPI, PIEstimator, Recording, registry
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.papers.keeping import fitted, recorded
-from mckibben.papers.sdchm.models import BALANCE, LINEAR, OURS, PREDICTING, PUBLISHED, Models
-from mckibben.papers.sdchm.prediction import Predictions
-from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS, Recordings
+from mckibben.papers.experiment import Experiment
+from mckibben.rigs import load_rig
 from mckibben.signals import triangle
 from mckibben.signals.protocol import protocol
 from tests.cli.conftest import Cli
@@ -45,6 +42,19 @@ def recording() -> Recording:
     return Recording({"pressure": u, "displacement": GPI.example().simulate(u)}, 0.02)
 
 
+def experiment(folder: Path, name: str = "multistate-friction") -> Experiment:
+    return Experiment(
+        name,
+        load_rig(protocol(name).rig),
+        None,
+        quick=True,
+        seed=0,
+        jobs=1,
+        kept=Checkpoints(folder, name),
+        tell=lambda share, text: None,
+    )
+
+
 def test_a_fit_is_made_once(
     tmp_path: Path, recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -56,26 +66,17 @@ def test_a_fit_is_made_once(
         return fit(self, *args, **kwargs)
 
     monkeypatch.setattr(Estimator, "fit", counted)
-    first, second = (
-        fitted(Checkpoints(tmp_path), "pi", PIEstimator(), recording) for _ in range(2)
-    )
+    first, second = (experiment(tmp_path).fit("pi", PIEstimator(), recording) for _ in range(2))
     assert first == second
     assert len(fits) == 1
-    fitted(Checkpoints(tmp_path), "pi", PIEstimator(n_operators=3), recording)
-    fitted(Checkpoints(tmp_path, "another paper"), "pi", PIEstimator(), recording)
+    experiment(tmp_path).fit("pi", PIEstimator(n_operators=3), recording)
+    experiment(tmp_path, "field-models").fit("pi", PIEstimator(), recording)
     assert len(fits) == 3
 
 
 def test_recordings_are_read_back_and_damaged_ones_made_again(tmp_path: Path) -> None:
     def again() -> Recording:
-        ((_, found),) = recorded(
-            Checkpoints(tmp_path),
-            "multistate-friction",
-            ["isobaric-1bar"],
-            0,
-            lambda share, text: None,
-        )
-        return found
+        return experiment(tmp_path).record(names=["isobaric-1bar"])["isobaric-1bar"]
 
     first = again()
     (file,) = (tmp_path / "unfinished").glob("*.csv")
@@ -96,45 +97,3 @@ def test_box_jenkins_finds_a_numerator_of_the_printed_structure() -> None:
     assert isinstance(model, TransferFunction)
     assert model.numerator[1] == 0.0
     assert model.numerator == pytest.approx((0.8, 0.0, -0.3), abs=0.01)
-
-
-@dataclass(frozen=True)
-class Off:
-    """A model that is off by so much, and by the extensor's pressure where none is given."""
-
-    by: float | None = None
-
-    def simulate(self, recording: Recording) -> Recording:
-        by = recording[EXTENSOR] if self.by is None else self.by
-        return Recording({name: recording[name] + by for name in OUTPUTS}, recording.sample_time)
-
-
-@pytest.fixture(scope="module")
-def runs() -> Recordings:
-    """All runs that predictions are scored on, with displacements that are cheap."""
-    made = {}
-    for run in protocol("sdchm").runs:
-        u = run.inputs
-        driven = [u[f"pressure_{k}"] for k in (1, 2, 3)]
-        moved = {y: 20.0 * p + sum(driven) for y, p in zip(OUTPUTS, driven, strict=True)}
-        channels = {name: u[name][::20] for name in u.channels}
-        channels |= {name: y[::20] for name, y in moved.items()}
-        made[run.name] = (run, Recording(channels, 20 * (u.sample_time or 1.0)))
-    return Recordings(made)
-
-
-def predictions(runs: Recordings, **off: float | None) -> Predictions:
-    blocks: Any = dict.fromkeys(PREDICTING, Off(1.0)) | {k: Off(v) for k, v in off.items()}
-    return Predictions(Models(blocks, dict.fromkeys(blocks, 0.0)), runs)
-
-
-def test_groups_of_table_4_are_at_its_stiffness(runs: Recordings) -> None:
-    found = predictions(runs, **{OURS: None}).groups(OURS, 0.1)
-    assert list(found) == list("abcdefghijkl")
-    assert [rmse for _, rmse in found.values()] == pytest.approx([0.1] * 12)
-
-
-def test_joint_runs_come_first_and_choose_by_validation(runs: Recordings) -> None:
-    found = predictions(runs, **{LINEAR: 3.0, PUBLISHED: 8.0, BALANCE: 0.5})
-    assert found.headline == BALANCE
-    assert found.only_along_patterns == [PUBLISHED]

@@ -11,9 +11,6 @@ import pytest
 
 from mckibben import example
 from mckibben.papers.field_models.run import BJ, LEAST_SQUARES, NARX, P2UZ, PAPERS, SLOPES
-from mckibben.papers.reproduction import reproduce
-from mckibben.papers.sdchm.compensation import OURS_INVERTED
-from mckibben.papers.sdchm.models import BALANCE, DAMPED, LINEAR, OURS, PUBLISHED
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 
@@ -125,21 +122,3 @@ def test_multistate_friction(cli: Cli) -> None:
     # coefficients differ and forces are alike, so both laws are of the length in mm
     for name in ("force at 200 mm, 4 bar [N]", "force at 184 mm, 4 bar [N]"):
         assert static[name]["here"] == pytest.approx(static[name]["printed"], rel=0.2)
-
-
-def test_sdchm() -> None:
-    """Along the patterns the order is the paper's; what is printed has no damping elsewhere."""
-    found = reproduce("sdchm", quick=True, jobs=1).to_dict()
-    joint = by_model(table(found, "extensor constant"))
-    worst = {name: max(row[f"RMSE {k} [mm]"] for k in (1, 2, 3)) for name, row in joint.items()}
-    assert min(worst.values()) < 0.6 * worst[LINEAR] < 0.6 * worst[PUBLISHED]
-    rmse = {name: row["RMSE 1 [mm]"] for name, row in by_model(table(found, "test set")).items()}
-    assert rmse[OURS] < rmse[PUBLISHED] < 0.5 * rmse[DAMPED] < 0.5 * rmse[LINEAR]
-    groups = by_model(table(found, "RMSE [mm] (its Table 4)"))
-    assert (groups["a"]["printed SDCHM"], groups["l"]["printed raw network"]) == (1.17, 13.64)
-    assert all(row[OURS] < 1.5 for row in groups.values())
-    printed = {name: row["printed"] for name, row in by_model(table(found, "Table 3")).items()}
-    assert (printed["G21"], printed["G31"], printed["G23"]) == (0.1521, 0.5368, 0.2153)
-    figure = by_model(table(found, "Figure 13"))
-    assert figure[OURS_INVERTED]["worst RMSE [mm]"] < 3.0
-    assert figure[BALANCE]["worst RMSE [mm]"] < 6.0

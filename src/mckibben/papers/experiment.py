@@ -277,10 +277,16 @@ class Experiment:
             Share of the whole work that is done then.
         """
         if self.data is not None:
-            every = list(zip(self.data, self._sorted(self.data), strict=True))
-            used = {one.name: (one, labels) for one, labels in every if labels is not None}
-            unused = ", ".join(one.name for one, labels in every if labels is None)
-            self.warned |= {f"Recordings that are not used: {unused}.": None} if unused else {}
+            used: dict[str, tuple[Recording, Labels]] = {}
+            every = zip(self.data, self._sorted(self.data), strict=True)
+            for place, (one, labels) in enumerate(every, start=1):
+                if labels is not None:
+                    used[f"{one.name}-{place}" if one.name in used else one.name] = one, labels
+            unused = [
+                one.name for one in self.data if not any(one is each for each, _ in used.values())
+            ]
+            if unused:
+                self.warned[f"Recordings that are not used: {', '.join(unused)}."] = None
             return Runs(
                 {name: one for name, (one, _) in used.items()},
                 {name: labels for name, (_, labels) in used.items()},

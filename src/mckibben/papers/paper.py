@@ -36,8 +36,8 @@ class Item(_Strict):
     what : str
         What it is.
     here : str
-        Where it lives: a table or figure of the re-run by its key (``table:NAME``, ``figure:NAME``), a
-        module or class, or nothing.
+        Where it lives: a table or figure of the re-run, or a printed model, by its key (``table:KEY``,
+        ``figure:KEY``, ``model:NAME``), a rig, a module or class, or nothing.
     differs : str
         How it differs from what is printed; empty where it is exact.
     command : str

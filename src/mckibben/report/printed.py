@@ -6,7 +6,7 @@ Neither pyplot nor any global state is touched, and the same drawing gives the s
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -79,6 +79,9 @@ _WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 2.6, "beads": 0.5}
 _LEGEND = 45
 """Letters of three names that stand side by side above a panel at most."""
 
+_LEGEND_LINE = 0.14
+"""Height that a figure gains by every line of a legend beyond two [in]."""
+
 METADATA: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
     {
         "png": {"Software": MAKER},
@@ -143,7 +146,9 @@ def drawn(drawing: Drawing) -> Figure:
     elif drawing.columns == 1:
         panel_height = 1.7
     note = 0.25 if drawing.note else 0.0
-    height = rows * panel_height + 0.2 + note
+    names = [[curve.name for curve in panel.curves if curve.name] for panel in drawing.panels]
+    lines = max(-(-len(own) // _legend_columns(own)) for own in names)
+    height = rows * panel_height + 0.2 + note + _LEGEND_LINE * max(lines - 2, 0)
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, sharex=drawing.stacked).ravel()
     for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=False)):
@@ -199,11 +204,10 @@ def draw_panel(axis: Axes, panel: Panel, bottom: bool) -> None:
         axis.set_xlim(left=0)
     handles, names = axis.get_legend_handles_labels()
     if handles:
-        n_columns = 3 if sum(map(len, names[:3])) < _LEGEND else 1
         axis.legend(
             *(handles, names),
             title=verbatim(panel.title) or None,
-            ncols=n_columns,
+            ncols=_legend_columns(names),
             loc="lower left",
             bbox_to_anchor=(0, 1),
             borderaxespad=0.2,
@@ -211,6 +215,10 @@ def draw_panel(axis: Axes, panel: Panel, bottom: bool) -> None:
         )
     else:
         axis.set_title(verbatim(panel.title), loc="left")
+
+
+def _legend_columns(names: Sequence[str]) -> int:
+    return 3 if sum(map(len, names[:3])) < _LEGEND else 1
 
 
 def _curve(axis: Axes, curve: Curve) -> None:

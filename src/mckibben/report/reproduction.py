@@ -168,7 +168,7 @@ def _indexed(item: Item, found: Reproduction) -> str:
     kind, _, key = item.here.partition(":")
     shown: tuple[Table | Figure, ...] = found.tables if kind == "table" else found.figures
     titles = [heading(one, quick=found.quick) for one in shown if one.key == key]
-    here = f"`{item.here}`" if item.here else "–"
+    here = f'`printed("{key}")`' if kind == "model" else f"`{item.here}`" if item.here else "–"
     here = f"[{key}](#{_anchor(titles[0])})" if titles else here
     differs = item.differs or ("the same quantities, on the rig" if titles else "exact")
     command = f"`{item.command}`" if item.command else ""

@@ -1,19 +1,19 @@
-"""The experiments on a soft arm of three contractile muscles round an extensor.
+"""The experiments on a soft arm of three muscles round an extensor.
 
 Source: Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
 Pneumatic Artificial Muscle-Driven Soft Manipulator, Sections 2.2 and 5.
 
 The paper's signals are sines of 0.02 Hz, on one muscle at a time or on all three alike. Its equation
 starts them in the middle of their range, with a jump at every change of amplitude; here each cycle
-starts at its minimum.
-
-Runs in which all pressures are random at once are ours: the paper's patterns visit but a few lines among
-all combinations of pressures, and a model can be close along them and anything at all beside.
+starts at its minimum. Runs in which all pressures are random at once are ours: the paper's patterns
+visit but a few lines among all combinations of pressures, and a model can be close along them and
+anything at all beside.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,25 +22,33 @@ from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
 from mckibben.signals.protocol import Protocol, Role, Run
 
-PERIOD = 50.0
-"""Of every sine [s]."""
+PERIOD, HIGHEST = 50.0, 2.5
+"""Of every sine [s], and the pressure that all muscles withstand [bar], Table 1."""
 
-PATTERNS: dict[str, tuple[int, ...]] = {"1": (1,), "2": (2,), "3": (3,), "123": (1, 2, 3)}
-"""Which muscles are driven together; the others have no pressure."""
-
-IDENTIFICATION_PEAKS = (1.0, 1.5, 2.0, 2.5)
-"""Peak of each cycle when the hysteresis of a muscle is identified [bar], Eq. (22)."""
-
-TRAINING_PEAKS = (1.5, 2.5)
-"""Peaks of the two cycles that train the network [bar]; the paper does not say which of Eq. (22)'s."""
+PATTERNS = ("1", "2", "3", "123")
+"""Muscles that are driven together; the others have no pressure."""
 
 TRAINING = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.5)
-VALIDATION = (0.1, 0.5, 0.7, 1.1, 1.5, 1.7, 2.3)
-TEST = (0.3, 0.9, 1.3, 1.9, 2.1, 2.4)
-"""Pressures of the extensor [bar] whose runs train, validate and test, Section 5.1."""
+VALIDATION, TEST = (0.1, 0.5, 0.7, 1.1, 1.5, 1.7, 2.3), (0.3, 0.9, 1.3, 1.9, 2.1, 2.4)
 
-PREDICTION = (0.1, 1.5, 1.7)
-"""Pressures of the extensor in the check of predictions [bar]; all belong to the validation set."""
+STAGES: tuple[tuple[str, Role, Sequence[str], Sequence[float], Sequence[float]], ...] = (
+    ("hysteresis", "train", "123", (0.0,), (1.0, 1.5, 2.0, 2.5)),
+    ("network", "train", PATTERNS, TRAINING, (1.5, 2.5)),
+    ("network", "validation", PATTERNS, VALIDATION, (1.5, 2.5)),
+    ("network", "test", PATTERNS, TEST, (1.5, 2.5)),
+    ("prediction", "test", PATTERNS, (0.1, 1.5, 1.7), (1.4, 1.4)),
+    ("coupling", "test", PATTERNS, (1.0,), (1.3, 1.3)),
+    ("stiffness", "test", "1", (0.0, 0.5, 1.0, 1.5, 2.0, 2.5), (0.7, 0.7)),
+)
+"""Stage, role, muscles driven, pressures of the extensor, and peak of each cycle [bar]: Eq. (22),
+Sections 5.1 and 2.2. Which of Eq. (22)'s cycles train the network the paper does not say."""
+
+NAMES = {
+    "hysteresis": "gpi-{d}",
+    "coupling": "coupling-drive-{d}",
+    "stiffness": "stiffness-p0-{p0}",
+}
+"""Of the runs of a stage; others have both."""
 
 JOINT: dict[Role, tuple[float | None, ...]] = {
     "train": (0.4, 1.2, 2.0, None, None),
@@ -49,105 +57,74 @@ JOINT: dict[Role, tuple[float | None, ...]] = {
 }
 """Pressures of the extensor in runs with all pressures random [bar]; None where it moves too."""
 
-JOINT_TIME, JOINT_FREQUENCY, EXTENSOR_FREQUENCY = 150.0, 0.05, 0.02
-"""Of those runs [s], and highest frequencies of the muscles' pressures and the extensor's [Hz]."""
+JOINT_TIME, JOINT_START = 150.0, 20.0
+"""Of those runs, and in which the muscles' pressures set in from rest, as patterns do [s]."""
 
-JOINT_START = 20.0
-"""Time in which the muscles' random pressures set in from rest [s], where the patterns start too."""
+QUICK = {"hysteresis": 2.0, "joint": 1.5}
+"""Periods of each run that the quick run records, else 1: the last; the first of joint runs."""
 
-HIGHEST = 2.5
-"""Pressure that all muscles withstand [bar], Table 1."""
+QUICK_RUNS = (
+    *("gpi", "network-p0-0.0", "network-p0-1.2", "network-p0-2.5", "network-p0-1.3"),
+    *("prediction-p0-0.1", "coupling", "stiffness-p0-0", "stiffness-p0-1.0"),
+    *("joint-validation-p0-0.5", "joint-test-p0-1.1", "joint-test-moving-3"),
+)
+"""How names of runs begin that the quick run records."""
 
 
 def sdchm() -> Protocol:
-    """Return all runs: identification, network, prediction, coupling patterns, joint random."""
+    """Return all runs: identification, network, prediction, coupling, stiffness, joint random."""
     runs = [
-        _run(f"gpi-{k}", "train", (k,), 0.0, IDENTIFICATION_PEAKS, 50.0, stage="hysteresis")
-        for k in (1, 2, 3)
+        _sines(stage, role, d, p0, peaks)
+        for stage, role, patterns, levels, peaks in STAGES
+        for p0 in levels
+        for d in patterns
     ]
-    roles: Iterable[tuple[Role, tuple[float, ...]]] = (
-        ("train", TRAINING),
-        ("validation", VALIDATION),
-        ("test", TEST),
-    )
-    for role, pressures in roles:
-        for p0 in pressures:
-            for pattern, driven in PATTERNS.items():
-                name = f"network-p0-{p0:.1f}-drive-{pattern}"
-                runs.append(_run(name, role, driven, p0, TRAINING_PEAKS, 20.0, stage="network"))
-    for p0 in PREDICTION:
-        for pattern, driven in PATTERNS.items():
-            name = f"prediction-p0-{p0:.1f}-drive-{pattern}"
-            runs.append(_run(name, "test", driven, p0, (1.4, 1.4), 20.0, stage="prediction"))
-    for pattern, driven in PATTERNS.items():
-        name = f"coupling-drive-{pattern}"
-        runs.append(_run(name, "test", driven, 1.0, (1.3, 1.3), 20.0, stage="coupling"))
-    for p0 in (0.0, 0.5, 1.0, 1.5, 2.0, 2.5):
-        name = f"stiffness-p0-{p0:.1f}"
-        runs.append(_run(name, "test", (1,), p0, (0.7, 0.7), 20.0, stage="stiffness"))
-    for role in JOINT:
-        runs += _joint(role)
+    runs += [_joint(role, number, p0) for role in JOINT for number, p0 in enumerate(JOINT[role])]
     return Protocol(
         name="sdchm",
         rig="soft-arm",
         source="Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for "
         "Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator, Sections 2.2 and 5.1",
         runs=tuple(runs),
-        notes=f"Sines start at their minimum; network runs have cycles of {TRAINING_PEAKS} bar. "
+        notes="Sines start at their minimum; network runs have cycles of (1.5, 2.5) bar. "
         "Runs with all pressures random are ours.",
     )
 
 
-def _run(
-    name: str,
-    role: Role,
-    driven: tuple[int, ...],
-    p0: float,
-    peaks: tuple[float, ...],
-    rate: float,
-    *,
-    stage: str,
-) -> Run:
-    time = np.arange(round(PERIOD * len(peaks) * rate)) / rate
-    wave = sine(time, PERIOD, peaks)
-    channels = {f"pressure_{k}": wave if k in driven else 0.0 * wave for k in (1, 2, 3)}
-    channels["pressure_extensor"] = np.full(time.size, p0)
-    return Run(
-        name=name,
-        role=role,
-        inputs=Recording(channels, 1 / rate),
-        settings={"start.pressure_extensor": p0},
-        labels={"stage": stage, "p0": p0, "driven": "".join(map(str, driven))},
-    )
+def quick() -> tuple[Protocol, list[str]]:
+    """Return the protocol with shortened runs, and the names of those that a quick run records."""
+    whole = sdchm()
+    names = [run.name for run in whole.runs if run.name.startswith(QUICK_RUNS)]
+    return replace(whole, name="sdchm-quick", runs=tuple(map(_shortened, whole.runs))), names
 
 
-def _joint(role: Role) -> list[Run]:
-    """Return the runs of a role with all pressures random at once."""
-    first = 1000 * list(JOINT).index(role)
+def _shortened(run: Run) -> Run:
+    stage, inputs = run.labels["stage"], run.inputs
+    n = round(QUICK.get(stage, 1.0) * PERIOD / (inputs.sample_time or 1.0))
+    part = inputs.slice(0, n) if stage == "joint" else inputs.slice(len(inputs) - n, len(inputs))
+    return replace(run, inputs=replace(part, start_time=0.0))
+
+
+def _sines(stage: str, role: Role, driven: str, p0: float, peaks: Sequence[float]) -> Run:
+    rate = 50.0 if stage == "hysteresis" else 20.0
+    wave = sine(np.arange(round(PERIOD * len(peaks) * rate)) / rate, PERIOD, peaks)
+    channels = {f"pressure_{k}": wave if k in driven else 0.0 * wave for k in "123"}
+    inputs = Recording(channels | {"pressure_extensor": np.full(wave.size, p0)}, 1 / rate)
+    name = NAMES.get(stage, f"{stage}-p0-{{p0}}-drive-{{d}}").format(d=driven, p0=p0)
+    labels = {"stage": stage, "p0": p0, "driven": driven}
+    return Run(name, role, inputs, {"start.pressure_extensor": p0}, labels)
+
+
+def _joint(role: Role, number: int, p0: float | None) -> Run:
+    """Return a run with all pressures random at once: muscles up to 0.05 Hz, the extensor to 0.02 Hz."""
     time = np.arange(round(JOINT_TIME * 20.0)) / 20.0
-    runs = []
-    for number, p0 in enumerate(JOINT[role]):
-        seed = first + 10 * number
-        channels = {
-            f"pressure_{k}": np.minimum(time / JOINT_START, 1.0)
-            * random_wave(time, JOINT_FREQUENCY, HIGHEST, seed=seed + k)
-            for k in (1, 2, 3)
-        }
-        channels["pressure_extensor"] = (
-            random_wave(time, EXTENSOR_FREQUENCY, HIGHEST, seed=seed)
-            if p0 is None
-            else np.full(time.size, p0)
-        )
-        start = float(channels["pressure_extensor"][0])
-        extensor = "moving" if p0 is None else "constant"
-        name = f"moving-{number}" if p0 is None else f"p0-{p0:.1f}"
-        runs.append(
-            Run(
-                name=f"joint-{role}-{name}",
-                role=role,
-                inputs=Recording(channels, 1 / 20.0),
-                settings={"start.pressure_extensor": start},
-                labels={"stage": "joint", "p0": start, "driven": "123", "extensor": extensor},
-            )
-        )
-    return runs
+    seed, rise = 1000 * list(JOINT).index(role) + 10 * number, np.minimum(time / JOINT_START, 1.0)
+    waves = {k: rise * random_wave(time, 0.05, HIGHEST, seed=seed + k) for k in (1, 2, 3)}
+    moving = random_wave(time, 0.02, HIGHEST, seed=seed)
+    extensor = moving if p0 is None else np.full(time.size, p0)
+    channels = {f"pressure_{k}": wave for k, wave in waves.items()}
+    inputs = Recording(channels | {"pressure_extensor": extensor}, 1 / 20.0)
+    start, kind = float(extensor[0]), "moving" if p0 is None else "constant"
+    name = f"joint-{role}-moving-{number}" if p0 is None else f"joint-{role}-p0-{p0}"
+    labels = {"stage": "joint", "p0": start, "driven": "123", "extensor": kind}
+    return Run(name, role, inputs, {"start.pressure_extensor": start}, labels)

@@ -1,0 +1,209 @@
+"""Closed loops on the arm: inverses of the models that predict, and PID."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Series
+from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.control import Controller, Tracked, control_law, track, tune_pid
+from mckibben.errors import ModelWarning
+from mckibben.estimators.coupled.fuzzy import Consequents, Search, fit_network, printed_swarm
+from mckibben.estimators.coupled.sdchm import SDCHMEstimator, as_block, network_inputs
+from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.metrics import loop_width
+from mckibben.papers.experiment import Cell, Curves, Experiment, Runs
+from mckibben.papers.sdchm.protocol import PERIOD
+from mckibben.recording import Recording
+from mckibben.rigs import Rig
+from mckibben.system.workers import Tell, all_of
+
+EXTENSOR = "pressure_extensor"
+PUBLISHED, INDIVIDUAL = "SDCHM, as published", "individual hysteresis"
+OURS, BALANCE = "SDCHM, ours", "balance"
+SDIHC, SINGLE, SDIHC_OURS = "SDIHC, as published", "individual inverse", "SDIHC, ours"
+
+QUICK_SWARM, QUICK_SAMPLES, SAMPLES = {"particles": 8, "iterations": 6}, 1000, 6000
+"""Of the quick run's searches; samples on which the paper's inverse network is searched else."""
+
+MOVES = ((1, 0.7), (2, 1.5), (3, 2.3))
+"""Muscle that moves, and pressure of the extensor [bar], for every three groups of Table 5."""
+
+F = 1 / PERIOD
+MEAN, SWING, AMPLITUDE, OFFSET, TASK_LEVEL = 33.0, 6.0, 40.0, 5.0, 0.6
+"""Of the references of Table 5 and Figure 13: [Hz], [mm], the latter's extensor [bar]."""
+
+REACHED = 0.8
+"""Share of the way recorded of every muscle that references ask for at most, else they are smaller."""
+
+DRAWN = 6
+"""Controllers that figures show, the first of the tables: as many as there are colours."""
+
+BEYOND = ((0.02, 0.0), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0), (0.02, 1.0), (0.02, 2.0))
+"""Beyond the paper: frequency of the reference [Hz], and load on the disc [kg]."""
+
+
+class Task(NamedTuple):
+    """A reference, the outputs that move, what the words of its table need, and a load [kg]."""
+
+    reference: Recording
+    moving: Sequence[str]
+    facts: Mapping[str, float]
+    load: float = 0.0
+
+    @property
+    def settle(self) -> float:
+        """How much is not scored [s]: the first third, so that whole cycles are left."""
+        return (self.reference.duration or 0.0) / 3
+
+
+def numbered(recording: Recording, what: str) -> list[str]:
+    """Return a recording's numbered channels of a quantity, in order."""
+    names = [n for n in recording.channels if n.startswith(what) and n.rpartition("_")[2].isdigit()]
+    return sorted(names, key=lambda name: int(name.rpartition("_")[2]))
+
+
+def held(
+    outputs: Sequence[str], moving: str, time: Array, p0: float, scale: float = 1.0, f: float = F
+) -> Task:
+    """Return a task that moves one output, as Table 5's or at another frequency; the others hold."""
+    channels = dict.fromkeys(outputs, np.full(time.size, scale * MEAN))
+    channels[moving] = scale * (MEAN + SWING * np.sin(2 * np.pi * f * time))
+    reference = Recording(channels | {EXTENSOR: np.full(time.size, p0)}, float(time[1]))
+    return Task(reference, [moving], {"mean": scale * MEAN, "swing": scale * SWING, "p0": p0})
+
+
+def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
+    """Track the paper's references with every controller, and what it leaves open with some."""
+    outputs = numbered(next(iter(runs.values())), "displacement")
+    quick, seed, step = experiment.quick, experiment.seed, 0.1 if experiment.quick else 0.05
+    levels = [float(one[EXTENSOR].mean()) for one in runs.values()]
+    wanted = [1.0, *(p0 for _, p0 in MOVES), TASK_LEVEL]
+    middle, *at, p0 = np.clip(wanted, min(levels), max(levels)).tolist()
+    reached = min(max(float(one[y].max()) for one in runs.values()) for y in outputs)
+    scale = min(1.0, REACHED * reached / (AMPLITUDE + OFFSET))
+    pid = tune_pid(rig, sample_time=step, scheduled={EXTENSOR: middle}, seed=seed)
+    inverses = compensators(experiment, runs)
+    laws: dict[str, Block | Controller] = {**inverses, "PID": pid}
+    time = np.arange(round((1.5 if quick else 3) * PERIOD / step), dtype=np.float64) * step
+    moved = dict(zip(outputs[: 1 if quick else len(MOVES)], at, strict=False))
+    tasks = {f"tracking_{y[-1]}": held(outputs, y, time, p, scale) for y, p in moved.items()}
+    wave = scale * np.abs(AMPLITUDE * np.sin(2 * np.pi * F * time) + OFFSET)
+    channels = dict.fromkeys(outputs, wave) | {EXTENSOR: np.full(wave.size, p0)}
+    facts = {"amplitude": scale * AMPLITUDE, "offset": scale * OFFSET, "p0": p0}
+    beyond: dict[str, Task] = {}
+    if not quick:
+        laws["balance + PID"] = control_law("feedforward-pid", inverses[BALANCE], lambda: pid)
+        laws["disturbance observer"] = control_law("observer", inverses[BALANCE], lambda: pid)
+        for frequency, load in BEYOND:
+            longer = np.arange(round(max(40.0, 2 / frequency) / step), dtype=np.float64) * step
+            task = held(outputs, outputs[0], longer, at[0], scale, frequency)
+            key = f"{frequency:g} Hz" + (f", {load:g} kg" if load else "")
+            beyond[key] = task._replace(load=load)
+    every = tasks | {"task": Task(Recording(channels, step), outputs, facts)} | beyond
+    ours = [name for name in laws if name not in (SDIHC, SINGLE, SDIHC_OURS)]
+    keys = [(key, name) for key in every for name in (ours if key in beyond else laws)]
+    trials = [(laws[name], rig, every[key], seed) for key, name in keys]
+    found = dict(zip(keys, all_of(_tracked, trials, experiment.jobs), strict=True))
+    plane: dict[str, Curves] = {}
+    for key, task in every.items():
+        if key not in beyond:
+            panels = _shown(experiment, key, task, {name: found[key, name] for name in laws})
+            plane |= panels if key in tasks else {}
+    experiment.figure("tracking", plane)
+    worst = {key: max(one.rmse.values()) for key, one in found.items()}
+    if beyond:
+        rows = [[name, *(worst[key, name] for key in beyond)] for name in ours]
+        experiment.table("beyond", [*beyond], rows, **tasks["tracking_1"].facts)
+    most = {name: max(worst[key, name] for key in tasks) for name in laws}
+    experiment.says(tracking=", ".join(f"{name} {value:.2f} mm" for name, value in most.items()))
+    experiment.says(
+        moved=", ".join(y[-1] for y in moved), step=1e6 * found["task", SDIHC_OURS].step_time[0]
+    )
+
+
+def compensators(experiment: Experiment, runs: Runs) -> dict[str, Block]:
+    """Return all inverses, each of a model that predicts."""
+    models: dict[str, Any] = experiment.models
+    hysteresis, coupling, _ = models[PUBLISHED].parts
+    network = learned_inverse(experiment, models[PUBLISHED], runs)
+    return {
+        SDIHC: Series((network, coupling.inverse(), hysteresis.inverse())),
+        SINGLE: models[INDIVIDUAL].parts[0].inverse(),
+        SDIHC_OURS: models[OURS].inverse(),
+        BALANCE: models[BALANCE].inverse(),
+    }
+
+
+def learned_inverse(experiment: Experiment, model: Series, runs: Runs) -> FuzzyNetwork:
+    """Return the paper's inverse network, trained from displacements to couplings."""
+    *front, network = model.parts
+    patterns = runs.select("train", stage="network") or runs.select("train", stage="hysteresis")
+    data = SDCHMEstimator().data(patterns)
+    x, n = network_inputs(front, data.runs), len(data.outputs)
+    y = np.concatenate([np.column_stack([run.outputs, run.scheduled]) for run in data.runs])
+    limits = np.column_stack([y[:, :n].min(axis=0), y[:, :n].max(axis=0)])
+    swarm = printed_swarm(**(QUICK_SWARM if experiment.quick else {}))
+    samples = QUICK_SAMPLES if experiment.quick else SAMPLES
+
+    def swapped() -> FuzzyNetwork:
+        search = Search("pso", samples, swarm, experiment.seed)
+        learned = fit_network(y, x[:, :n], 3, Consequents(False, 1e-9), search, tracker=Tracker())
+        return as_block(learned, data.outputs, network.inputs[:n], data.scheduled, limits, False)
+
+    return experiment.kept.once("learned inverse", FuzzyNetwork, swapped, x, y)
+
+
+def _tracked(common: None, trial: tuple[Block | Controller, Rig, Task, int], _: Tell) -> Tracked:
+    law, rig, task, seed = trial
+    if task.load:
+        rig = rig.changed({"payload": float(rig.known().get("payload_kg", 0.0)) + task.load})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        return track(law, rig, task.reference, settle=task.settle, seed=seed)
+
+
+def widths(recording: Recording, moving: str, outputs: Sequence[str]) -> dict[str, float]:
+    """Return e_w of the output that moves over the last period, and cross-motion of others [%]."""
+    n = round(PERIOD / (recording.sample_time or 1.0))
+    u, found = recording[f"reference_{moving}"][-n:], {}
+    for name in outputs:  # each turned to begin at its minimum
+        x, y = (np.roll(wave, -int(np.argmin(u))) for wave in (u, recording[name][-n:]))
+        width = loop_width(x, y) if np.ptp(y) else 0.0
+        own = name == moving
+        what, ratio = ("e_w", 1.0) if own else ("cross-motion", float(np.ptp(y) / np.ptp(x)))
+        found[f"{what} of y{name[-1]} [%]"] = ratio * width
+    return found
+
+
+def _shown(
+    experiment: Experiment, key: str, task: Task, found: Mapping[str, Tracked]
+) -> dict[str, Curves]:
+    """Add what came of a reference; return panels of every output over the one that moves, or time."""
+    alone, one = len(task.moving) == 1, task.moving[0]
+    panels: dict[str, dict[str, tuple[Array, Array]]] = {}
+    rows: dict[str, dict[str, float]] = {}
+    for name, tracked in found.items():
+        late = tracked.recording
+        late = late.slice(int(np.searchsorted(late.time, task.settle)), len(late))
+        rows[name] = {f"RMSE of y{y[-1]} [mm]": error for y, error in tracked.rmse.items()}
+        rows[name] |= widths(late, one, [*tracked.rmse]) if alone else {}
+        errors = np.array([late[y] - late[f"reference_{y}"] for y in tracked.rmse])
+        ends = {"lowest error [mm]": errors.min(), "highest error [mm]": errors.max()}
+        rows[name] |= {end: float(error) for end, error in ends.items()}
+        for y in tracked.rmse if name in [*found][:DRAWN] else ():
+            x = late[f"reference_{one}"] if alone else late.time
+            title = f"y{one[-1]} moves: y{y[-1]}" if alone else f"y{y[-1]}"
+            panels.setdefault(title, {"reference": (x, late[f"reference_{y}"])})
+            panels[title][name] = x, late[y]
+    lines: dict[str, list[Cell]] = {name: [*cells.values()] for name, cells in rows.items()}
+    experiment.table(key, [*rows[name]], lines, **task.facts)
+    if not alone:
+        experiment.figure(key, panels)
+    return dict(panels)

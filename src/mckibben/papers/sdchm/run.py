@@ -1,0 +1,307 @@
+"""Coupled hysteresis of a soft arm: how it moves, how models predict it, what their inverses leave."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import cycle, product
+from typing import Any
+
+import numpy as np
+
+from mckibben import registry
+from mckibben.arrays import Array
+from mckibben.errors import DataError
+from mckibben.metrics import err, loop_width, rmse
+from mckibben.papers.experiment import Cell, Experiment, Labels, Rerun, Runs, rms
+from mckibben.papers.sdchm import loops
+from mckibben.papers.sdchm.loops import BALANCE, EXTENSOR, OURS, PUBLISHED, numbered
+from mckibben.papers.sdchm.protocol import PATTERNS, quick
+from mckibben.recording import Recording
+from mckibben.signals import cycles
+from mckibben.signals.protocol import Role
+
+LINEAR, MEMORY, TOO = "linear function of the pressures", "coupled memory", ", joint runs too"
+RAW, DAMPED = "raw network, as published", "raw network, damped"
+PREDICTING = (LINEAR, RAW, DAMPED, PUBLISHED, OURS, MEMORY, BALANCE, OURS + TOO, BALANCE + TOO)
+GROUPS = (PUBLISHED, RAW, OURS, BALANCE)
+SIZES = (5, 10, 15, 20)
+"""Models that predict, and those whose errors are listed by group; orders N of Table 2."""
+
+PAPERS: dict[str, Any] = {"threshold_rule": "paper", "initial": "virgin"}
+LETTERS = dict(zip(product(PATTERNS, "123"), "abcdefghijkl", strict=True))
+"""The paper's settings of a muscle's hysteresis; its groups, by muscles driven and output."""
+
+Panels = dict[str, dict[str, tuple[Array, Array]]]
+
+
+def run(experiment: Experiment) -> None:
+    """Record the patterns, identify the coupled models, predict, and track with their inverses."""
+    runs = experiment.record(*(quick() if experiment.quick else ()))
+    if any("saturated" in one.meta for one in runs.values()):  # a rig that withstands less
+        labels = dict(zip(runs, sort([*runs.values()]), strict=True))
+        kept = {name: one for name, one in labels.items() if one is not None}
+        runs = Runs({name: runs[name] for name in kept}, kept)
+    _motions(experiment, runs)
+    _fits(experiment, runs)
+    _parts(experiment, runs)
+    _sets(experiment, runs)
+    _groups(experiment, runs)
+    if experiment.rig is not None:
+        experiment.tell(0.7, "closed loops")
+        loops.run_loops(experiment, experiment.rig, runs)
+
+
+def by_group(runs: Runs, names: Sequence[str]) -> Iterator[tuple[str, str, Array, Recording, str]]:
+    """Yield every output of runs by the muscles driven: run, group, pressure, recording, output."""
+    for name in sorted(names, key=lambda n: (runs.of(n, "p0"), len(runs.of(n, "driven")), n)):
+        recording, driven = runs[name], runs.of(name, "driven")
+        for output in numbered(recording, "displacement"):
+            k = output.rpartition("_")[2]
+            letter = f"({LETTERS[driven, k]}) " if (driven, k) in LETTERS else ""
+            group = f"{letter}{' '.join(f'p{i}' for i in driven)}, y{k}"
+            pressure = recording[f"pressure_{k if k in driven else driven[0]}"]
+            yield name, group, pressure, recording, output
+
+
+def _width(u: Array, y: Array) -> list[Cell]:
+    """Return e_w over the last cycle of a pressure [%], and the range of the output over it [mm]."""
+    *_, last = cycles(u) or [slice(0, len(u))]
+    moved = float(np.ptp(y[last]))
+    return [loop_width(u[last], y[last]) if moved and cycles(u) else None, moved]
+
+
+def _motions(experiment: Experiment, runs: Runs) -> None:
+    """Add how the arm moves: by pattern, Figure 4, and by the extensor's pressure, Figure 5."""
+    whole = runs.names(stage="hysteresis") + runs.names(stage="network")
+    patterns, alone = (runs.names(stage=key) or whole for key in ("coupling", "stiffness"))
+    levels = sorted({float(runs.of(name, "p0")) for name in patterns})
+    middle, first = levels[len(levels) // 2], min(runs.of(name, "driven") for name in alone)
+    chosen = {
+        "coupling": [name for name in patterns if runs.of(name, "p0") == middle],
+        "stiffness": [name for name in alone if runs.of(name, "driven") == first],
+    }
+    widths: list[float] = []
+    for key, names in chosen.items():
+        rows: dict[str, list[Cell]] = {}
+        panels: Panels = {}
+        for name, group, u, recording, output in by_group(runs, names):
+            level, y = f"{runs.of(name, 'p0'):g} bar", recording[output]
+            by_level = key == "stiffness"
+            row = rows[f"{level}, y{output[-1]}" if by_level else group] = _width(u, y)
+            widths += [float(cell) for cell in row[:1] if cell is not None]
+            curves = panels.setdefault(f"y{output[-1]}" if by_level else group, {})
+            curves[level if by_level else recording.origin] = u, y
+        experiment.table(key, ["e_w [%]", "range [mm]"], rows, p0=middle, driven=first[0])
+        experiment.figure(key, panels)
+    if widths:
+        experiment.says(narrowest=min(widths), widest=max(widths))
+
+
+def _fits(experiment: Experiment, runs: Runs) -> None:
+    """Fit all models; validation patterns stop the search for antecedents of ours."""
+    short, hysteresis = experiment.quick, runs.names("train", stage="hysteresis")
+    recording, k = runs[hysteresis[0]], runs.of(hysteresis[0], "driven")
+    orders: dict[str, list[Cell]] = {}
+    for n in (10,) if short else SIZES:
+        for settings in (PAPERS, {"threshold_rule": "envelope", "initial": "first_sample"}):
+            channels = {"input": f"pressure_{k}", "output": f"displacement_{k}"}
+            gpi = registry.load("estimators", "gpi")(n_operators=n, seed=experiment.seed)
+            name = f"GPI {n}, {settings['threshold_rule']}"
+            block = experiment.fit(name, gpi.set_params(**channels, **settings), recording).block
+            y = experiment.simulate(name, recording)[channels["output"]]
+            orders.setdefault(str(n), []).append(err(recording[channels["output"]], y))
+        orders[str(n)].append(block.n_parameters)
+    columns = ["Err [%]", "Err, thresholds over the envelopes [%]", "parameters"]
+    experiment.table("orders", columns, orders, muscle=k)
+    search: dict[str, Any] = {"search_samples": loops.QUICK_SAMPLES} if short else {}
+    swarm: dict[str, Any] = search | loops.QUICK_SWARM if short else {}
+    starts: dict[str, Any] = {"n_starts": 4, "n_refined": 1} if short else {}
+    ours = search | ({"memory_settings": starts, "n_rounds": 1} if short else {})
+    chosen: dict[str, tuple[str, dict[str, Any]]] = {
+        LINEAR: ("tsfnn", {"n_sets": 1, "constants": True, "method": "ls"}),
+        RAW: ("tsfnn", {"method": "pso", "ridge": 1e-9} | swarm),
+        DAMPED: ("tsfnn", search),
+        PUBLISHED: ("sdchm-published", {"memory_settings": PAPERS | starts} | swarm),
+        loops.INDIVIDUAL: ("coupled-pi", {"memory_settings": PAPERS | starts}),
+        OURS: ("sdchm", ours),
+        MEMORY: ("coupled-memory", {}),
+        BALANCE: ("balance", {}),
+    }
+    joint = runs.select("train", stage="joint")
+    chosen |= {name + TOO: chosen[name] for name in (OURS, BALANCE) if joint}
+    patterns = [runs[name] for name in (*hysteresis, *runs.names("train", stage="network"))]
+    rows: dict[str, list[Cell]] = {}
+    for place, (name, (model, changes)) in enumerate(chosen.items()):
+        experiment.tell(0.32 + 0.38 * place / len(chosen), name)
+        estimator = registry.load("estimators", model)(seed=experiment.seed, **changes)
+        train = patterns + (joint if name.endswith(TOO) else [])
+        held = runs.select("validation", stage="network")
+        fitted = experiment.fit(name, estimator, train, validation=held)
+        rows[name] = [fitted.seconds, fitted.block.n_parameters]
+    experiment.table("identification", ["time [s]", "parameters"], rows)
+
+
+def _parts(experiment: Experiment, runs: Runs) -> None:
+    """Add the parts of the paper's model: hysteresis, Figure 9, and coupling gains, Table 3."""
+    published: Any = experiment.models[PUBLISHED]
+    hysteresis, coupling, _ = published.parts
+    panels: Panels = {}
+    for name in runs.names("train", stage="hysteresis"):
+        recording, k = runs[name], runs.of(name, "driven")
+        u, y = recording[f"pressure_{k}"], recording[f"displacement_{k}"]
+        found = np.asarray(hysteresis.parts[int(k) - 1].simulate(u))
+        panels[f"GPI {k}"] = {recording.origin: (u, y), "GPI": (u, found), "error": (u, found - y)}
+    experiment.figure("hysteresis", panels)
+    every = np.ndenumerate(coupling.matrix)
+    gains = {f"G{i + 1}{j + 1}": [float(gain)] for (i, j), gain in every if i != j}
+    radii = {"printed": experiment.paper.printed("sdchm-coupling").radius, "here": coupling.radius}
+    experiment.table("gains", ["gain"], gains, **radii)
+
+
+def _off(experiment: Experiment, name: str, recordings: Sequence[Recording]) -> Array:
+    """Return modelled less measured outputs over all recordings, shape (n, outputs) [mm]."""
+    outputs = numbered(recordings[0], "displacement")
+    found = ((experiment.simulate(name, one), one) for one in recordings)
+    return np.concatenate([model.matrix(outputs) - one.matrix(outputs) for model, one in found])
+
+
+def _sets(experiment: Experiment, runs: Runs) -> None:
+    """Add the errors on test runs: all pressures random at once, and along the patterns."""
+    names = [name for name in PREDICTING if name in experiment.models]
+    held = runs.select("validation", stage="joint") or runs.select("validation")
+    best = min(
+        (OURS, BALANCE), key=lambda n: rms(_off(experiment, n, held or runs.select("train")))
+    )
+    for kind in ("constant", "moving", "along"):
+        joint = {"stage": "joint", "extensor": kind}
+        labels = {"stage": "network"} if kind == "along" else joint
+        test, validation = (runs.select(role, **labels) for role in ("test", "validation"))
+        if not test:
+            continue
+        outputs = numbered(test[0], "displacement")
+        y = np.concatenate([one.matrix(outputs) for one in test])
+        y = y - y.mean(axis=0)
+        rows: dict[str, list[Cell]] = {}
+        size: dict[str, float] = {}
+        for name in names:
+            errors = _off(experiment, name, test)
+            each, size[name] = np.sqrt(np.mean(errors**2, axis=0)), rms(errors)
+            worst = float(100 * np.max(each / np.ptp(y, axis=0)))
+            largest, share = float(np.abs(errors).max()), err(y.ravel(), (y + errors).ravel())
+            seen = rms(_off(experiment, name, validation)) if validation else None
+            rows[name] = [*each.tolist(), worst, largest, share, seen]
+        columns = [f"RMSE of y{output[-1]} [mm]" for output in outputs]
+        columns += ["worst RMSE of range [%]", "largest error [mm]", "Err [%]"]
+        levels = sorted({f"{runs.of(name, 'p0'):g}" for name in runs.names("test", **labels)})
+        facts: dict[str, Any] = {"n": len(test), "samples": len(y), "levels": ", ".join(levels)}
+        facts["covered"] = ", ".join(f"{span:.0f}" for span in np.ptp(y, axis=0))
+        experiment.table(kind, [*columns, "validation runs, RMSE [mm]"], rows, **facts)
+        (one, *_), output = test, outputs[0]
+        curves = {n: experiment.simulate(n, one)[output] for n in (LINEAR, OURS, BALANCE)}
+        curves = {one.origin: one[output]} | curves
+        experiment.figure(kind, {str(one.name): {n: (one.time, z) for n, z in curves.items()}})
+        failing = [f"{n} ({size[n]:.1f} mm)" for n in names if size[n] > size[LINEAR]]
+        facts = {"best": size[best], "worst": rows[best][len(outputs)], "linear": size[LINEAR]}
+        facts["all"] = ", ".join(f"{name} {value:.2f} mm" for name, value in size.items())
+        facts |= {"failing": ", ".join(failing)} if failing else {}
+        experiment.says(best=best, on="validation" if held else "training")
+        experiment.says(**{f"{kind}_{name}": value for name, value in facts.items()})
+
+
+def _groups(experiment: Experiment, runs: Runs) -> None:
+    """Add the errors by group: Table 4, Figures 10 and 11."""
+    names = runs.names(stage="prediction") or runs.names("test", stage="network")
+    levels: dict[str, list[Cell]] = {}
+    groups: dict[str, list[Cell]] = {}
+    panels: Panels = {}
+    for name, group, u, recording, output in by_group(runs, names):
+        y, p0 = recording[output], runs.of(name, "p0")
+        found = {model: experiment.simulate(model, recording)[output] for model in GROUPS}
+        sizes = [rmse(y, z) for z in found.values()]
+        levels[f"{p0:g} bar, {group}"] = [*sizes]
+        if p0 == min(runs.of(n, "p0") for n in names):
+            groups[group] = [*(err(y, z) for z in found.values()), *sizes]
+            panels[group] = {recording.origin: (u, y)} | {n: (u, found[n]) for n in GROUPS[:3]}
+    if groups:
+        columns = [f"{what}, {name}" for what in ("Err [%]", "RMSE [mm]") for name in GROUPS]
+        experiment.table("groups", columns, groups, p0=min(runs.of(n, "p0") for n in names))
+        experiment.figure("prediction", panels)
+        experiment.table("levels", GROUPS, levels)
+
+
+# -- one's own recordings ------------------------------------------------------------------------------
+
+MOVES, ONE, WHOLE = 0.1, 0.02, 0.8
+"""Shares of the largest swing of a muscle's pressure: from which on a pressure moves; how far apart
+levels, or peaks, are that count as one; from which on patterns train; smaller ones are predicted."""
+
+TURNS: tuple[Role, ...] = ("test", "validation", "train")
+"""Roles, in turns, of recordings in which muscles move differently, or the extensor's pressure does."""
+
+
+def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
+    """Sort by which pressures move, whether alike, how high, and under which extensor's pressure."""
+    muscles = numbered(recordings[0], "pressure") or ["pressure_1", "pressure_2"]
+    needed = [*muscles, *(m.replace("pressure", "displacement") for m in muscles), EXTENSOR]
+    for one, name in product(recordings, needed):
+        if name not in one:
+            remedy = f"--column {name}=COLUMN; what was held: --constant '{name}=0 bar'"
+            raise DataError("it is missing", file=one.source, channel=name, remedy=remedy)
+    swings = np.array([[_swing(one[name]) for name in muscles] for one in recordings])
+    least, gap = MOVES * swings.max(), ONE * swings.max()
+    moving = [[name for name, s in zip(muscles, row, strict=True) if s > least] for row in swings]
+    driven = ["".join(name.rpartition("_")[2] for name in own) for own in moving]
+    means = np.array([float(one[EXTENSOR].mean()) for one in recordings])
+    still = np.array([_swing(one[EXTENSOR]) <= least for one in recordings])
+    means[still] = _clustered(means[still].tolist(), gap)
+    levels, peaks = means.tolist(), _clustered(swings.max(axis=1).tolist(), gap)
+    patterns = {
+        i
+        for i, (one, own) in enumerate(zip(recordings, moving, strict=True))
+        if own and still[i] and all(np.std(one[name] - one[own[0]]) < least for name in own)
+    }
+    whole = {i for i in patterns if peaks[i] > WHOLE * max(peaks)}
+    stages = dict.fromkeys(whole, "network")
+    for muscle in muscles:
+        alone = [i for i in whole if moving[i] == [muscle]]
+        if not alone:
+            remedy = "record a cycle of it, to the highest, while the others have no pressure"
+            raise DataError("no recording moves it alone", channel=muscle, remedy=remedy)
+        softest = [i for i in alone if levels[i] == min(levels[j] for j in alone)]
+        stages[max(softest, key=lambda i: recordings[i].duration or 0.0)] = "hysteresis"
+    for i in patterns - whole:
+        same = [j for j in patterns - whole if peaks[j] == peaks[i]]
+        n_levels, n_driven = (len({key[j] for j in same}) for key in (levels, driven))
+        stages[i] = "coupling" if n_levels == 1 else "stiffness" if n_driven == 1 else "prediction"
+    trained = sorted({levels[i] for i in whole})
+    roles: dict[float, Role] = dict.fromkeys(trained, "train")
+    roles |= dict.fromkeys(trained[1:-1:3], "test")
+    roles |= dict.fromkeys(trained[2:-1:3] if len(trained) > 5 else (), "validation")
+    turns = {True: cycle(TURNS), False: cycle(TURNS)}
+    found: list[Labels | None] = []
+    for i, which in enumerate(driven):
+        labels: dict[str, Any] = {"stage": stages.get(i, "joint"), "p0": levels[i], "driven": which}
+        role: Role = "train" if labels["stage"] == "hysteresis" else "test"
+        if labels["stage"] == "network":
+            role = roles[levels[i]]
+        elif which and i not in patterns:
+            labels["extensor"] = "constant" if still[i] else "moving"
+            role = next(turns[still[i]])
+        found.append(Labels(role, labels) if which else None)
+    return found
+
+
+def _swing(x: Array) -> float:
+    """Return a range without what is rare, such as spikes."""
+    return float(np.ptp(np.quantile(x, (0.01, 0.99))))
+
+
+def _clustered(values: Sequence[float], gap: float) -> list[float]:
+    """Return for each value the mean of those that follow one another without such a gap."""
+    ordered = np.sort(values)
+    ends = np.flatnonzero(np.diff(ordered) > gap)
+    means = [round(float(part.mean()), 2) for part in np.split(ordered, ends + 1)]
+    return [means[int(np.searchsorted(ordered[ends], value))] for value in values]
+
+
+RERUN = Rerun(run, sort)

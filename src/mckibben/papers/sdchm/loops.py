@@ -11,13 +11,11 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.control import Controller, Tracked, control_law, track, tune_pid
 from mckibben.errors import ModelWarning
-from mckibben.estimators.coupled.fuzzy import Consequents, Search, fit_network, printed_swarm
-from mckibben.estimators.coupled.sdchm import SDCHMEstimator, as_block, network_inputs
-from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.metrics import loop_width
+from mckibben.estimators.coupled.fuzzy import Search, printed_swarm
+from mckibben.estimators.coupled.sdchm import learned_inverse
+from mckibben.metrics import crosstalk, loop_width
 from mckibben.papers.experiment import Cell, Curves, Experiment, Runs
 from mckibben.papers.sdchm.protocol import PERIOD
 from mckibben.recording import Recording
@@ -129,35 +127,25 @@ def run_loops(experiment: Experiment, rig: Rig, runs: Runs) -> None:
 
 
 def compensators(experiment: Experiment, runs: Runs) -> dict[str, Block]:
-    """Return all inverses, each of a model that predicts."""
-    models: dict[str, Any] = experiment.models
-    hysteresis, coupling, _ = models[PUBLISHED].parts
-    network = learned_inverse(experiment, models[PUBLISHED], runs)
+    """Return all inverses, each of a model that predicts; the paper's is learned (Section 4)."""
+    models = experiment.models
+    swarm = printed_swarm(**(QUICK_SWARM if experiment.quick else {}))
+    samples = QUICK_SAMPLES if experiment.quick else SAMPLES
+    search = Search("pso", samples, swarm, experiment.seed)
+    patterns = runs.select("train", stage="network") or runs.select("train", stage="hysteresis")
+
+    def learned() -> Series:
+        return learned_inverse(models[PUBLISHED], patterns, search=search)
+
+    individual: Any = models[INDIVIDUAL]
     return {
-        SDIHC: Series((network, coupling.inverse(), hysteresis.inverse())),
-        SINGLE: models[INDIVIDUAL].parts[0].inverse(),
+        SDIHC: experiment.kept.once(
+            "learned inverse", Series, learned, models[PUBLISHED], patterns, search
+        ),
+        SINGLE: individual.parts[0].inverse(),
         SDIHC_OURS: models[OURS].inverse(),
         BALANCE: models[BALANCE].inverse(),
     }
-
-
-def learned_inverse(experiment: Experiment, model: Series, runs: Runs) -> FuzzyNetwork:
-    """Return the paper's inverse network, trained from displacements to couplings."""
-    *front, network = model.parts
-    patterns = runs.select("train", stage="network") or runs.select("train", stage="hysteresis")
-    data = SDCHMEstimator().data(patterns)
-    x, n = network_inputs(front, data.runs), len(data.outputs)
-    y = np.concatenate([np.column_stack([run.outputs, run.scheduled]) for run in data.runs])
-    limits = np.column_stack([y[:, :n].min(axis=0), y[:, :n].max(axis=0)])
-    swarm = printed_swarm(**(QUICK_SWARM if experiment.quick else {}))
-    samples = QUICK_SAMPLES if experiment.quick else SAMPLES
-
-    def swapped() -> FuzzyNetwork:
-        search = Search("pso", samples, swarm, experiment.seed)
-        learned = fit_network(y, x[:, :n], 3, Consequents(False, 1e-9), search, tracker=Tracker())
-        return as_block(learned, data.outputs, network.inputs[:n], data.scheduled, limits, False)
-
-    return experiment.kept.once("learned inverse", FuzzyNetwork, swapped, x, y)
 
 
 def _tracked(common: None, trial: tuple[Block | Controller, Rig, Task, int], _: Tell) -> Tracked:
@@ -175,10 +163,10 @@ def widths(recording: Recording, moving: str, outputs: Sequence[str]) -> dict[st
     u, found = recording[f"reference_{moving}"][-n:], {}
     for name in outputs:  # each turned to begin at its minimum
         x, y = (np.roll(wave, -int(np.argmin(u))) for wave in (u, recording[name][-n:]))
-        width = loop_width(x, y) if np.ptp(y) else 0.0
-        own = name == moving
-        what, ratio = ("e_w", 1.0) if own else ("cross-motion", float(np.ptp(y) / np.ptp(x)))
-        found[f"{what} of y{name[-1]} [%]"] = ratio * width
+        if name == moving:
+            found[f"e_w of y{name[-1]} [%]"] = loop_width(x, y) if np.ptp(y) else 0.0
+        else:
+            found[f"cross-motion of y{name[-1]} [%]"] = crosstalk(x, y, x)
     return found
 
 

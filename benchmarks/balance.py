@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mckibben.papers.activation_pressure.rerun import REST_LENGTH, modelled
 from numpy.typing import NDArray
 
 from mckibben import Recording, Series, compare, load_rig
@@ -31,6 +30,7 @@ from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import track
 from mckibben.measured.sets import parted, sets_in
 from mckibben.papers.activation_pressure.protocol import FORCES
+from mckibben.papers.activation_pressure.run import modelled
 from mckibben.papers.sdchm.loops import EXTENSOR, MOVES, held, widths
 from mckibben.papers.sdchm.protocol import PERIOD
 from mckibben.registry import load
@@ -256,8 +256,7 @@ def lifting() -> Iterator[Row]:
     train: list[Recording] = []
     tests: dict[tuple[float, float], Recording] = {}
     for run, made in record("activation-pressure", jobs=1):
-        contraction = made["displacement"] / REST_LENGTH
-        recording = made.with_channels({"contraction": ""}, contraction=contraction)
+        recording = made.with_derived(["contraction"])
         if run.role == "train":
             train.append(recording)
         else:
@@ -273,7 +272,7 @@ def lifting() -> Iterator[Row]:
             pressure = test["pressure"]
             for name, found in (
                 ("the paper's", modelled(theirs, test, frequency)),
-                ("activation-memory", modelled(memory, test, frequency)),
+                ("activation-memory", memory.simulate(test)["pressure"]),
                 (BALANCE, balance.simulate(test)["pressure"]),
             ):
                 figures[name].append(100 * rms(found - pressure) / float(np.ptp(pressure)))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mckibben.estimators.hysteresis.gpi import GPIEstimator
 from mckibben.estimators.hysteresis.mpi import MPIEstimator
 from mckibben.metrics import err, loop_width
+from mckibben.papers.activation_pressure import protocol as activation
 from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
 from mckibben.papers.multistate_friction.protocol import SHORTEST
 from mckibben.papers.paper import paper
@@ -24,7 +25,6 @@ from mckibben.papers.sdchm.protocol import PATTERNS
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig, record
 from mckibben.signals import resample, sine, triangle
-from mckibben.signals.protocol import activation_pressure as activation
 from mckibben.signals.protocol import protocol
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 from calibration import last_cycle, recorded, static_force
 from matplotlib.figure import Figure
 
-from mckibben.signals.protocol import activation_pressure as activation
+from mckibben.papers.activation_pressure import protocol as activation
 
 
 def soft_arm(figure: Figure) -> None:

@@ -272,7 +272,7 @@ def static_force(length: Array, pressure: Array | float) -> Array:
 
 def test_stand() -> Iterator[Row]:
     """Give the rows of the MAS-10."""
-    runs = recorded("multistate")
+    runs = recorded("multistate-friction")
     off = []
     for name, recording in runs.items():
         if name.startswith("isometric"):
@@ -431,7 +431,7 @@ def _pressure_width(contraction: Array, pressure: Array) -> float:
 RIGS: Mapping[str, tuple[str, Callable[[], Iterator[Row]]]] = {
     "soft-arm": ("sdchm", soft_arm),
     "mas20-hanging": ("field-models", hanging),
-    "mas10-test-stand": ("multistate", test_stand),
+    "mas10-test-stand": ("multistate-friction", test_stand),
     "rail": ("mpi-narmax", rail),
     "mckibben-530": ("activation-pressure", mckibben),
 }

@@ -50,7 +50,7 @@ def hanging(figure: Figure) -> None:
 
 def test_stand(figure: Figure) -> None:
     """Isobaric force, isometric force, and the hysteresis at 4 bar (Figures 2, 3 and 6)."""
-    runs = recorded("multistate")
+    runs = recorded("multistate-friction")
     axes: Any = figure.subplots(1, 3)
     for name, recording in runs.items():
         if name.startswith("isometric"):

@@ -100,7 +100,7 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
         turns = pressure[reversals(pressure)[1:-1]]
         peaks = turns[turns > pressure.mean()]
         repeats = peaks.size < 3 or float(np.ptp(peaks)) < REPEATS * float(np.ptp(pressure))
-        slow = at[place] < STATIC_SHARE * max(at)
+        slow = repeats and at[place] < STATIC_SHARE * max(at)
         stage = "static" if slow else "hysteresis" if repeats else "random"
         force = FORCE_STEP * round(forces[place] / FORCE_STEP)
         frequency = 0.0 if slow else round(20 * at[place]) / 20

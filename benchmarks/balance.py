@@ -283,7 +283,7 @@ def lifting() -> Iterator[Row]:
 def measured(folder: Path | None) -> Iterator[Row]:
     """Yield the targets of measured muscles, by the splits of docs/measured; nothing without them."""
     for one in sets_in(folder) if folder else ():
-        for _, task in one.tasks() if one.name in MEASURED else ():
+        for task in one.tasks() if one.name in MEASURED else ():
             train, test = parted(task, one.recordings(), one.folder)
             span = max(float(np.ptp(run["displacement"])) for run in test)
             others = ("coupled-memory",) if task.load else ("cpi", "gpi", "preisach")

@@ -30,8 +30,7 @@ from mckibben.comparison.channels import Channels
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.planning import plan_of
 from mckibben.errors import MckibbenError
-from mckibben.measured.sets import Set, parted, sets_in
-from mckibben.measured.splits import Task
+from mckibben.measured.sets import Set, Task, parted, sets_in
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 from peers_libraries import GRU, PEERS, START, Array, Peer, Run, Settings, Trial
@@ -298,7 +297,7 @@ def main() -> None:
     for one in sets_in(given.folder):
         try:
             recordings = one.recordings()
-            tasks += [run(one, task, recordings) for left, task in one.tasks() if not left]
+            tasks += [run(one, task, recordings) for task in one.tasks() if not task.leave_out]
         except MckibbenError as error:
             print(f"{one.title}: not read: {error}", file=sys.stderr)
     introduction = given.page.read_text(encoding="utf-8").partition(TABLES)[0]

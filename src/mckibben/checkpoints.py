@@ -36,9 +36,7 @@ Result = TypeVar("Result")
 FOLDER = "unfinished"
 """Within the folder of results; it goes when all is done."""
 
-_OURS = re.compile(
-    rf"-[0-9a-f]{{16}}\.(json|csv|csv-metadata\.json)$|^{re.escape(PART)}[0-9a-f]{{16}}\.part$"
-)
+_OURS = re.compile(rf"-[0-9a-f]{{16}}\.json$|^{re.escape(PART)}[0-9a-f]{{16}}\.part$")
 """Names that parts have, and what was being written when the program was killed."""
 
 
@@ -104,14 +102,6 @@ class Checkpoints:
         """Return a folder for a part that keeps its own parts, or None to keep nothing."""
         return None if self._folder is None else self._folder / name
 
-    def file(self, name: str, ending: str, *depends: object) -> Path | None:
-        """Return where a part is to be kept that is no JSON, or None to keep nothing."""
-        path = self._path(name, depends, ending)
-        if path is not None:
-            with written(path):
-                path.parent.mkdir(parents=True, exist_ok=True)
-        return path
-
     def clear(self) -> None:
         """Forget everything: all is done. What somebody else put there stays."""
         if self._folder is None or self._folder.is_symlink():
@@ -123,11 +113,11 @@ class Checkpoints:
             with suppress(OSError):  # not empty
                 Path(place).rmdir()
 
-    def _path(self, name: str, depends: object, ending: str = ".json") -> Path | None:
+    def _path(self, name: str, depends: object) -> Path | None:
         if self._folder is None:
             return None
         plain = "".join(c if c.isalnum() or c in "-." else "-" for c in name)
-        return self._folder / f"{plain}-{digest(self._digest, depends)[:16]}{ending}"
+        return self._folder / f"{plain}-{digest(self._digest, depends)[:16]}.json"
 
 
 def _warn(path: Path, error: Exception) -> None:

@@ -13,7 +13,7 @@ import mckibben
 from mckibben import DataError, Recording
 from mckibben.files.channels import NAME, described
 from mckibben.files.sources import roles
-from mckibben.measured.splits import split_of
+from mckibben.measured.sets import split_of
 from mckibben.outputs import claim, never
 from tests.files.made import Cells, one, put, refused, several
 

@@ -74,19 +74,6 @@ def test_a_fit_is_made_once(
     assert len(fits) == 3
 
 
-def test_recordings_are_read_back_and_damaged_ones_made_again(tmp_path: Path) -> None:
-    def again() -> Recording:
-        return experiment(tmp_path).record(names=["isobaric-1bar"])["isobaric-1bar"]
-
-    first = again()
-    (file,) = (tmp_path / "unfinished").glob("*.csv")
-    stamp = file.stat().st_mtime_ns
-    assert again() == first
-    assert file.stat().st_mtime_ns == stamp
-    file.write_bytes(file.read_bytes()[:1000])
-    assert again() == first
-
-
 def test_box_jenkins_finds_a_numerator_of_the_printed_structure() -> None:
     rng = np.random.default_rng(0)
     u = np.repeat(rng.uniform(1.0, 5.5, 150), 10) + 0.1 * rng.standard_normal(1500)

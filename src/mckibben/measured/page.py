@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -23,8 +23,6 @@ KEYS = ("test", "interval", "chosen", "rank", "gap", "parameters", "seconds", "s
 BEST = 1.1
 """Times the least error that is set in bold."""
 
-PER_CENT = 100.0
-
 HEAD = """# Every model on recordings
 
 Made by `{command}`; do not edit. Models are fitted and chosen on one side of each split and
@@ -38,48 +36,46 @@ Test RMSE in per cent of the range of what is tested on. Bold: the least of a co
 tenth of it; underlined: chosen by cross-validation. A dash: not offered for such channels.
 """
 
-CHOICE = """
-## How good the choice is
-
-| set | chosen | its test RMSE | rank | least test RMSE | above it | time |
-|---|---|---:|---:|---|---:|---:|
-"""
+CHOICE = ("set", "chosen", "its test RMSE", "rank", "least test RMSE", "above it", "time")
 
 
 def page(outcomes: Sequence[Outcome], command: str) -> str:
     """Return the page, in Markdown."""
+    return "\n".join(_lines(outcomes, command)).rstrip("\n") + "\n"
+
+
+def _lines(outcomes: Sequence[Outcome], command: str) -> Iterator[str]:
+    yield HEAD.format(command=command)
     compared = [one for one in outcomes if one.board and one.board.rows]
-    done = [one for one in compared if not one.left_out]
-    lines = [HEAD.format(command=command)]
     if compared:
-        lines += [CHOICE.strip("\n"), *(_choice(one) for one in compared)]
-    if done:
-        lines += [OVERVIEW]
-        lines += [*_matrix(done, lambda one: one.heading)]
+        yield "## How good the choice is\n"
+        yield from _table(CHOICE, map(_choice, compared))
+    if done := [one for one in compared if not one.left_out]:
+        yield OVERVIEW
+        yield from _matrix(done, lambda one: one.heading)
     for name in dict.fromkeys(one.set.name for one in outcomes):
         own = [one for one in outcomes if one.set.name == name]
-        lines += ["", f"## {_inline(own[0].set.title)}", ""]
-        if own[0].set.split.about:
-            lines += [own[0].set.split.about.strip(), ""]
+        yield f"\n## {_inline(own[0].set.title)}\n"
+        if about := own[0].set.split.about.strip():
+            yield f"{about}\n"
         for one in own:
             if not one.left_out:
-                lines += [*_section(one)]
+                yield from _section(one)
         for task in dict.fromkeys(one.task.name for one in own if one.left_out):
-            lines += [*_in_turn([one for one in own if one.left_out and one.task.name == task])]
-    return "\n".join(lines).rstrip("\n") + "\n"
+            yield from _in_turn([one for one in own if one.left_out and one.task.name == task])
 
 
 def table(outcomes: Iterable[Outcome]) -> pd.DataFrame:
     """Return every row of every task, one under another."""
-    frames = []
-    for one in outcomes:
-        if one.board is not None:
-            frame = one.board.to_frame()
-            frame.insert(0, "left_out", one.left_out)
-            frame.insert(0, "task", one.task.name)
-            frame.insert(0, "set", one.set.name)
-            frames.append(frame.assign(unit=one.board.unit, range=one.span))
-    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+    frames = {
+        (one.set.name, one.task.name, one.left_out): one.board.to_frame().assign(
+            unit=one.board.unit, range=one.span
+        )
+        for one in outcomes
+        if one.board is not None
+    }
+    keys = ["set", "task", "left_out"]
+    return pd.concat(frames, names=keys).reset_index(keys) if frames else pd.DataFrame()
 
 
 def _inline(text: str) -> str:
@@ -87,108 +83,96 @@ def _inline(text: str) -> str:
     return re.sub(r"([\\`*\[\]<>|#])", r"\\\1", " ".join(text.split()))
 
 
-def _tested(board: Leaderboard) -> list[Row]:
-    return [row for row in board.rows if row.test is not None]
+def _table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
+    first, *others = headings
+    yield f"| {' | '.join([first, *others])} |"
+    yield "|---|" + "---:|" * len(others)
+    for row in rows:
+        yield f"| {' | '.join(row)} |"
 
 
-def _choice(one: Outcome) -> str:
-    board = one.board
+def _choice(one: Outcome) -> list[str]:
+    board, seconds = one.board, f"{one.seconds:.0f} s"
     assert board is not None
     best, lowest = board.best, board.lowest
-    seconds = f"{one.seconds:.0f} s"
     if best is None or lowest is None:
         why = _inline(words.chosen(board) or one.failed)
-        return f"| {_inline(one.label)} | none: {why} | | | | | {seconds} |"
-    above = "–" if lowest.model == best.model else f"{PER_CENT * (one.regret or 0.0):.0f} %"
-    return (
-        f"| {_inline(one.label)} | `{best.model}` | {_figure(best, board)} | {best.test_rank} "
-        f"| `{lowest.model}` {_figure(lowest, board)} | {above} | {seconds} |"
-    )
+        return [_inline(one.label), f"none: {why}", "", "", "", "", seconds]
+    above = f"{100 * (best.test_error / lowest.test_error - 1):.0f} %"
+    return [
+        *(_inline(one.label), f"`{best.model}`", _error(best, board), str(best.test_rank)),
+        *(f"`{lowest.model}` {_error(lowest, board)}", "–" if lowest is best else above, seconds),
+    ]
 
 
-def _figure(row: Row, board: Leaderboard) -> str:
+def _error(row: Row, board: Leaderboard) -> str:
     return f"{numeral(row.test_error, 3)} {board.unit}".strip()
 
 
+def _tested(one: Outcome) -> list[Row]:
+    rows = one.board.rows if one.board else ()
+    return sorted((row for row in rows if row.test is not None), key=lambda row: row.test_error)
+
+
 def _matrix(done: Sequence[Outcome], heading: Callable[[Outcome], str]) -> Iterator[str]:
-    """Give a table of models by tasks."""
-    shares: list[dict[str, float]] = []
-    for one in done:
-        assert one.board is not None
-        shares.append({r.model: PER_CENT * r.test_error / one.span for r in _tested(one.board)})
-    models = {model for column in shares for model in column}
-    beside = [{m: e / max(min(c.values()), 1e-12) for m, e in c.items()} for c in shares]
+    """Give a table of models by tasks, those of most tasks and least errors first."""
+    errors = pd.DataFrame(
+        [{row.model: 100 * row.test_error / one.span for row in _tested(one)} for one in done]
+    ).T
+    ratios = errors / errors.min().clip(1e-12)
+    places = pd.DataFrame({"tasks": -ratios.count(axis=1), "error": ratios.median(axis=1)})
+    models = places.sort_values(["tasks", "error"]).index
+    values = errors.loc[models].to_numpy()
+    chosen = [one.board.best.model if one.board and one.board.best else "" for one in done]
 
-    def place(model: str) -> tuple[int, float]:
-        ratios = [column[model] for column in beside if model in column]
-        return -len(ratios), float(np.median(ratios))
+    def cells(row: int, model: str) -> Iterator[str]:
+        for error, column, best in zip(values[row], values.T, chosen, strict=True):
+            text = numeral(error, 3) if error < 100 else ">100"
+            text = f"**{text}**" if error <= BEST * np.nanmin(column) else text
+            text = f"<u>{text}</u>" if model == best else text
+            yield "–" if np.isnan(error) else text
 
-    yield "| model | " + " | ".join(_inline(heading(one)) for one in done) + " |"
-    yield "|---|" + "---:|" * len(done)
-    for model in sorted(models, key=place):
-        cells = [_cell(model, *both) for both in zip(done, shares, strict=True)]
-        yield f"| `{model}` | " + " | ".join(cells) + " |"
-
-
-def _cell(model: str, one: Outcome, column: Mapping[str, float]) -> str:
-    assert one.board is not None
-    if model not in column:
-        return "–"
-    text = numeral(column[model], 3) if column[model] < PER_CENT else ">100"
-    text = f"**{text}**" if column[model] <= BEST * min(column.values()) else text
-    chosen = one.board.best is not None and one.board.best.model == model
-    return f"<u>{text}</u>" if chosen else text
+    rows = ([f"`{model}`", *cells(row, model)] for row, model in enumerate(models))
+    yield from _table(["model", *(_inline(heading(one)) for one in done)], rows)
 
 
 def _in_turn(parts: Sequence[Outcome]) -> Iterator[str]:
     """Give the section of a task that leaves out in turn."""
-    yield f"### {_inline(parts[0].task.name) or 'Each left out in turn'}"
-    yield ""
-    done = [one for one in parts if one.board is not None and one.board.rows]
+    yield f"### {_inline(parts[0].task.name) or 'Each left out in turn'}\n"
+    done = [one for one in parts if _tested(one)]
     if done:
-        yield "Test RMSE on what is left out, in per cent of the range of all recordings."
-        yield ""
+        yield "Test RMSE on what is left out, in per cent of the range of all recordings.\n"
         yield from _matrix(done, lambda one: f"without {one.left_out}")
         yield ""
     for one in parts:
         if one not in done:
-            yield from (f"- without {one.left_out}: not compared: {one.reason}", "")
+            yield f"- without {one.left_out}: not compared: {one.failed}\n"
 
 
 def _section(one: Outcome) -> Iterator[str]:
     if one.task.name:
-        yield f"### {_inline(one.task.name)}"
-        yield ""
-    board = one.board
+        yield f"### {_inline(one.task.name)}\n"
+    board, tested = one.board, _tested(one)
     if board is None or not board.rows:
-        yield from (f"Not compared: {one.reason or 'no model has a place on these channels.'}", "")
+        yield f"Not compared: {one.failed}\n"
         return
-    columns = [c for c in columns_of_board(board) if c.key in KEYS]
-    yield f"Split: {board.split}. {words.chosen(board)}"
-    yield ""
-    yield "| model | " + " | ".join(column.label for column in columns) + " |"
-    yield "|---|" + "---:|" * len(columns)
-    tested = sorted(_tested(board), key=lambda row: row.test_error)
-    shown = [
-        *tested[:SHOWN],
-        *(r for r in tested[SHOWN:] if board.best and r.model == board.best.model),
-    ]
-    for row in shown:
-        given = row.to_dict()
-        yield f"| `{row.model}` | " + " | ".join(column.text(given) for column in columns) + " |"
+    columns = [column for column in columns_of_board(board) if column.key in KEYS]
+    yield f"Split: {board.split}. {words.chosen(board)}\n"
+    chosen = board.best.model if board.best else ""
+    shown = [row for k, row in enumerate(tested) if k < SHOWN or row.model == chosen]
+    given = [row.to_dict() for row in shown]
+    rows = [[f"`{row['model']}`", *(column.text(row) for column in columns)] for row in given]
     for figure in one.task.published:
         cells = [f"{figure.rmse:g}" if column.key == "test" else "–" for column in columns]
-        yield f"| {_inline(figure.what)} (printed) | " + " | ".join(cells) + " |"
+        rows.append([f"{_inline(figure.what)} (printed)", *cells])
+    yield from _table(["model", *(column.label for column in columns)], rows)
     yield ""
-    failed = [f"failed: `{row.model}`: {row.reason}" for row in board.rows if row.reason]
-    notes = [*_mended(one.notes), *words.comparison(board), *failed]
+    notes = []
+    if one.notes:  # that of the first file in full
+        more = f" (and {len(one.notes) - 1} more of the kind)" if len(one.notes) > 1 else ""
+        notes = [f"as read: {one.notes[0]}{more}"]
+    notes += words.comparison(board)
+    notes += [f"failed: `{row.model}`: {row.reason}" for row in board.rows if row.reason]
     yield from (f"- {note}" for note in notes)
     if notes:
         yield ""
-
-
-def _mended(notes: Sequence[str]) -> Iterator[str]:
-    """Give what was mended in reading, that of the first file in full."""
-    if notes:
-        more = f" (and {len(notes) - 1} more of the kind)" if len(notes) > 1 else ""
-        yield f"as read: {notes[0]}{more}"

@@ -13,8 +13,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.ranking import Standing, compare
 from mckibben.errors import DataError, MckibbenError
-from mckibben.measured.sets import Set, parted
-from mckibben.measured.splits import Task
+from mckibben.measured.sets import Set, Task, parted
 from mckibben.recording import Recording
 
 
@@ -25,8 +24,6 @@ class Outcome:
     Parameters
     ----------
     set : Set
-    left_out : str
-        What was left out, of a task that leaves out in turn; else empty.
     task : Task
     board : Leaderboard or None
         None where it failed.
@@ -34,7 +31,7 @@ class Outcome:
         Range of what is tested on, the largest of all outputs'; of a task that leaves out in turn, of
         all its recordings.
     seconds : float
-        Of the whole comparison, cross-validation and tests included.
+        Of the whole comparison.
     reason : str
         Why it failed.
     notes : tuple of str
@@ -42,7 +39,6 @@ class Outcome:
     """
 
     set: Set
-    left_out: str
     task: Task
     board: Leaderboard | None
     span: float = float("nan")
@@ -51,9 +47,14 @@ class Outcome:
     notes: tuple[str, ...] = ()
 
     @property
+    def left_out(self) -> str:
+        """What was left out, of a task that leaves out in turn; else empty."""
+        return "".join(self.task.leave_out)
+
+    @property
     def heading(self) -> str:
         """The set, and the task where there are several."""
-        return f"{self.set.title}: {self.task.name}" if self.task.name else self.set.title
+        return ": ".join(filter(None, (self.set.title, self.task.name)))
 
     @property
     def label(self) -> str:
@@ -63,23 +64,11 @@ class Outcome:
     @property
     def failed(self) -> str:
         """Why no model was fitted; empty where one was."""
-        if self.board is None:
-            return self.reason
-        if any(row.test is not None for row in self.board.rows):
+        rows = self.board.rows if self.board else ()
+        if any(row.test is not None for row in rows):
             return ""
-        reasons = dict.fromkeys(row.reason for row in self.board.rows if row.reason)
-        return " ".join(reasons) or "no model has a place on these channels"
-
-    @property
-    def regret(self) -> float | None:
-        """Test RMSE of the model chosen over the least of all, less 1; None where none is chosen."""
-        board = self.board
-        if board is None or board.best is None or board.lowest is None:
-            return None
-        return board.best.test_error / board.lowest.test_error - 1.0
-
-
-Tell = Callable[[float, str], None]
+        reasons = dict.fromkeys(row.reason for row in rows if row.reason)
+        return self.reason or " ".join(reasons) or "no model applies to these channels"
 
 
 def outcomes(
@@ -89,7 +78,7 @@ def outcomes(
     seed: int = 0,
     jobs: int | None = None,
     folder: Path | None = None,
-    tell: Tell | None = None,
+    tell: Callable[[float, str], None] | None = None,
 ) -> Iterator[Outcome]:
     """Give what comes of every task, one after another.
 
@@ -97,23 +86,23 @@ def outcomes(
     ----------
     sets : sequence of Set
     models : "all", "quick" or sequence of str
-        Of those that a task asks for.
+        Instead of those that a task asks for, unless "all".
     seed, jobs
         As of `mckibben.compare`.
     folder : path, optional
         Where finished models are kept, so that what was stopped goes on from there.
     tell : callable, optional
-        Told the share of tasks done, and words.
+        Called with the share of tasks done, and words.
     """
-    listed = [(one, left, task) for one in sets for left, task in one.tasks()]
+    listed = [(one, task) for one in sets for task in one.tasks()]
     read: dict[str, list[Recording]] = {}
-    for place, (one, left, task) in enumerate(listed):
-        whose = " ".join(filter(None, [one.name, task.name, left and f"without {left}"]))
+    named = models not in ("all", "quick")
+    for place, (one, task) in enumerate(listed):
+        whose = " ".join(filter(None, [one.name, task.name, *task.leave_out]))
 
-        def progress(standing: Standing, at: int = place, whose: str = whose) -> None:
+        def progress(standing: Standing, place: int = place, whose: str = whose) -> None:
             if tell is not None:
-                share = standing.done / max(standing.total, 1)
-                tell((at + share) / len(listed), f"{whose}: {standing}")
+                tell((place + standing.share) / len(listed), f"{whose}: {standing}")
 
         started = time.perf_counter()
         try:
@@ -127,11 +116,7 @@ def outcomes(
                 outputs=task.outputs,
                 load=task.load,
                 models=task.models if models == "all" else models,
-                settings={
-                    model: own
-                    for model, own in task.settings.items()
-                    if models in ("all", "quick") or model in models
-                },
+                settings={m: own for m, own in task.settings.items() if not named or m in models},
                 n_folds=task.folds,
                 seed=seed,
                 jobs=jobs,
@@ -140,16 +125,14 @@ def outcomes(
                 progress=progress,
             )
         except MckibbenError as error:
-            if isinstance(error, DataError) or models in ("all", "quick"):
-                yield Outcome(one, left, task, None, reason=str(error))
-                continue
-            raise
+            if named and not isinstance(error, DataError):
+                raise
+            yield Outcome(one, task, None, reason=str(error))
+            continue
         if board.stopped:
             raise KeyboardInterrupt
-        tested = [*train, *test] if left or not test else test
-        span = max(
-            float(np.ptp(np.concatenate([r[name] for r in tested]))) for name in board.outputs
-        )
+        tested = test if test and not task.leave_out else [*train, *test]
+        span = max(float(np.ptp(np.concatenate([r[y] for r in tested]))) for y in board.outputs)
         seconds = time.perf_counter() - started
         notes = tuple(f"{r.name}: {note}" for r in (*train, *test) for note in r.notes)
-        yield Outcome(one, left, task, board, span, seconds, notes=notes)
+        yield Outcome(one, task, board, span, seconds, notes=notes)

@@ -1,19 +1,27 @@
-"""Folders of recordings, each with the description beside its files, or one that is known here."""
+"""Folders of recordings, and what of each is fitted and tested: ``split`` in its ``channels.toml``.
+
+A folder without that file, and of a name in ``known``, is read by the description there.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from importlib import resources
 from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from mckibben.blocks.free_run import PERIODIC
+from mckibben.comparison.planning import N_FOLDS
 from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.files.channels import NAME, Folder, describing, description
+from mckibben.files.formats import reason
 from mckibben.files.sources import inside
-from mckibben.measured.splits import Split, Task, matches, split_of
 from mckibben.recording import Recording
 from mckibben.signals import resample
 
@@ -21,55 +29,163 @@ KNOWN = Path(str(resources.files("mckibben.measured"))) / "known"
 """Descriptions of public recordings, by the name of their folder: ``NAME.toml``."""
 
 
-@dataclass(frozen=True)
-class Set:
-    """A folder of recordings.
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class Published(_Strict):
+    """A figure printed for the same test: whose it is, and its RMSE in the unit of the output."""
+
+    what: str
+    rmse: float
+
+
+class Task(_Strict):
+    """What is fitted and what is tested.
 
     Parameters
     ----------
     name : str
-        The folder's.
-    folder : Path
-    description : Folder
-        Of its files.
-    split : Split
+        Heading of the page's section; default the folder's title.
+    optional : bool
+        Whether it is skipped where none of the files that it is tested on exists.
+    files : list of str
+        Patterns of names, with ``*`` and ``?``, of the recordings that take part; default all.
+    test, leave_out : list of str
+        Patterns of those that are tested on, whole: all at once, or one pattern in turn.
+    cut : float
+        Instead: share of every recording, from its start, that is fitted; the rest is tested.
+    inputs, outputs, load, models, settings, folds
+        As of `mckibben.compare`.
+    published : list of Published
     """
 
-    name: str
+    name: str = ""
+    optional: bool = False
+    files: list[str] = ["*"]
+    test: list[str] = []
+    leave_out: list[str] = []
+    cut: Annotated[float, Field(gt=0, lt=1)] | None = None
+    inputs: list[str] | None = None
+    outputs: list[str] | None = None
+    load: str | None = None
+    models: Literal["all", "quick"] | list[str] = "all"
+    settings: dict[str, dict[str, Any]] = {}
+    folds: Annotated[int, Field(ge=0)] = N_FOLDS
+    published: list[Published] = []
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if sum([bool(self.test), bool(self.leave_out), self.cut is not None]) > 1:
+            raise ValueError("give one of test, leave_out and cut")
+        return self
+
+    @property
+    def tested(self) -> list[str]:
+        """Patterns of the recordings that are tested on whole."""
+        return [*self.test, *self.leave_out]
+
+    def parts(self) -> list[Task]:
+        """Return the task, or one for every pattern that is left out in turn."""
+        each = [self.model_copy(update={"leave_out": [pattern]}) for pattern in self.leave_out]
+        return each or [self]
+
+
+class Split(_Strict):
+    """A folder's tasks, and how its recordings are made even.
+
+    Parameters
+    ----------
+    title : str
+        Default the folder's name.
+    about : str
+        Whose recordings these are, and what moves; for the page.
+    resample : float, optional
+        Sample time of all [s].
+    gaps : {"error", "split", "interpolate"}
+        As of `mckibben.read`.
+    period : int, optional
+        Samples after which the motion repeats itself: recordings are cut into periods, in which no
+        start counts.
+    periodic : list of str
+        Patterns of the names of recordings that do; default all.
+    tasks : list of Task
+        Default one, with the last quarter to test on.
+    """
+
+    title: str = ""
+    about: str = ""
+    resample: Annotated[float, Field(gt=0)] | None = None
+    gaps: Literal["error", "split", "interpolate"] = "interpolate"
+    period: Annotated[int, Field(ge=FEWEST)] | None = None
+    periodic: list[str] = ["*"]
+    tasks: Annotated[list[Task], Field(min_length=1)] = [Task()]
+
+    @field_validator("tasks")
+    @classmethod
+    def _distinct(cls, tasks: list[Task]) -> list[Task]:
+        if len({task.name for task in tasks}) < len(tasks):
+            raise ValueError("two tasks have the same name")
+        return tasks
+
+
+def split_of(given: dict[str, Any] | None, file: str | Path = NAME) -> Split:
+    """Return a table ``split``, checked; without one, a single task with compare's own split."""
+    try:
+        return Split.model_validate(given or {})
+    except ValidationError as error:
+        remedy = "correct it; docs/files.md shows what it can hold"
+        raise DataError(f"split.{reason(error)}", file=file, remedy=remedy) from None
+
+
+@dataclass(frozen=True)
+class Set:
+    """A folder of recordings, with the description of its files."""
+
     folder: Path
     description: Folder
     split: Split
 
     @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.folder.name
+
+    @property
     def title(self) -> str:
-        """What the page calls it."""
+        """The heading of its section."""
         return self.split.title or self.name
 
     def recordings(self) -> list[Recording]:
-        """Return all recordings, even in time, each named as its file.
-
-        Raises
-        ------
-        DataError
-            Naming the file that cannot be read, and why.
-        """
-        found = []
+        """Return all recordings, even in time, each named as its file."""
+        split, found = self.split, list[Recording]()
         with describing(self.folder, self.description):
             for path in inside(self.folder):
-                read_in = read(path, gaps=self.split.gaps, informative=False)
-                step = self.split.resample
-                found += read_in if step is None else [resample(one, step) for one in read_in]
-        if self.split.period is None:
-            return found
-        cut = [one for one in found if matches(one.name, self.split.periodic)]
-        return [*_periods(cut, self.split.period), *(one for one in found if one not in cut)]
+                for one in read(path, gaps=split.gaps, informative=False):
+                    even = one if split.resample is None else resample(one, split.resample)
+                    periodic = split.period is not None and matches(one.name, split.periodic)
+                    found += _periods(even, split.period or 0) if periodic else [even]
+        return found
 
-    def tasks(self) -> Iterator[tuple[str, Task]]:
-        """Give every task with what is left out, if it leaves out in turn: then it is several."""
+    def tasks(self) -> Iterator[Task]:
+        """Give every task; one that leaves out in turn is several."""
         names = [path.stem for path in self.folder.iterdir()]
         for task in self.split.tasks:
-            if not task.optional or any(map(task.tests, names)):
+            if not task.optional or any(matches(name, task.tested) for name in names):
                 yield from task.parts()
+
+
+def matches(name: str, patterns: Sequence[str]) -> bool:
+    """Return whether a name matches one of some patterns."""
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _periods(one: Recording, length: int) -> list[Recording]:
+    if len(one) % length:
+        problem = f"{len(one)} samples are not a whole number of periods of {length}"
+        raise DataError(problem, file=one.source, remedy="correct period in [split]")
+    parts = (one.slice(start, start + length) for start in range(0, len(one), length))
+    return [replace(part, start_time=0.0).with_meta(**{PERIODIC: True}) for part in parts]
 
 
 def sets_in(folder: Path) -> list[Set]:
@@ -81,41 +197,16 @@ def sets_in(folder: Path) -> list[Set]:
         If there are no recordings, or a description is wrong.
     """
     if not folder.is_dir():
-        raise DataError(
-            "there is no such folder", file=folder, remedy="name a folder of recordings"
-        )
-    places = sorted(one for one in folder.iterdir() if one.is_dir() and _has_recordings(one))
-    places = places or ([folder] if _has_recordings(folder) else [])
-    if not places:
+        remedy = "name a folder of recordings"
+        raise DataError("there is no such folder", file=folder, remedy=remedy)
+    places = [one for one in sorted(folder.iterdir()) if one.is_dir() and _has_recordings(one)]
+    if not places and not _has_recordings(folder):
         raise DataError(
             "there are no recordings in it, nor in the folders in it",
             file=folder,
-            remedy="give a folder for every set, with its files and, if needed, a channels.toml",
+            remedy=f"give a folder for every set, with its files and, if needed, a {NAME}",
         )
-    return [_set(place) for place in places]
-
-
-def _set(place: Path) -> Set:
-    beside, known = place / NAME, KNOWN / f"{place.name}.toml"
-    file = next((one for one in (beside, known) if one.is_file()), None)
-    said = Folder() if file is None else description(file)
-    return Set(place.name, place, said, split_of(said.split, str(file)))
-
-
-def _periods(recordings: list[Recording], length: int) -> list[Recording]:
-    """Return whole periods as recordings of their own, none of which goes on from another."""
-    found = []
-    for one in recordings:
-        if len(one) % length:
-            raise DataError(
-                f"{len(one)} samples are not a whole number of periods of {length}",
-                file=one.source,
-                remedy="correct period in [split]",
-            )
-        for start in range(0, len(one), length):
-            part = replace(one.slice(start, start + length), start_time=0.0)
-            found.append(part.with_meta(**{PERIODIC: True}))
-    return found
+    return [_set(place) for place in places or [folder]]
 
 
 def _has_recordings(place: Path) -> bool:
@@ -125,44 +216,42 @@ def _has_recordings(place: Path) -> bool:
         return False
 
 
+def _set(place: Path) -> Set:
+    files = (place / NAME, KNOWN / f"{place.name}.toml")
+    file = next((one for one in files if one.is_file()), None)
+    content = Folder() if file is None else description(file)
+    return Set(place, content, split_of(content.split, file or NAME))
+
+
 def parted(
-    task: Task, recordings: list[Recording], where: Path
+    task: Task, recordings: Sequence[Recording], folder: Path
 ) -> tuple[list[Recording], list[Recording]]:
-    """Return what a task fits, and what it tests on; nothing to test leaves the split to the comparison.
+    """Return what a task fits, and what it tests on: nothing where the comparison is to split.
 
     Raises
     ------
     DataError
-        If a side would be empty.
+        If a pattern matches nothing, or a side would be empty.
     """
-    called = sorted({one.name for one in recordings})
-    for pattern in (*task.files, *task.test):
-        if not any(matches(name, [pattern]) for name in called):
-            raise DataError(
-                f"no recording is called {pattern}: there are {', '.join(called)}",
-                file=where,
-                remedy="correct the patterns in [split]",
-            )
-    taking = [one for one in recordings if task.about(one.name)]
-    if task.cut is not None:
-        cuts = [round(task.cut * len(one)) for one in taking]
-        if not taking or any(
-            min(cut, len(one) - cut) < FEWEST for one, cut in zip(taking, cuts, strict=True)
-        ):
-            raise DataError(
-                f"cutting at {task.cut:g} leaves too little", file=where, remedy="change cut"
-            )
-        return (
-            [one.slice(0, cut) for one, cut in zip(taking, cuts, strict=True)],
-            [one.slice(cut, len(one)) for one, cut in zip(taking, cuts, strict=True)],
-        )
-    train = [one for one in taking if not task.tests(one.name)]
-    test = [one for one in taking if task.tests(one.name)]
-    if not train or (task.test and not test):
-        side = "fitted" if not train else "tested on"
-        raise DataError(
-            f"no recording is to be {side}: there are {', '.join(called)}",
-            file=where,
-            remedy="correct the patterns in [split]",
-        )
+    names = sorted({one.name for one in recordings})
+
+    def wrong(problem: str) -> DataError:
+        problem += f": the recordings are {', '.join(names)}"
+        return DataError(problem, file=folder, remedy="correct [split]")
+
+    for pattern in (*task.files, *task.tested):
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise wrong(f"no recording is called {pattern}")
+    used = [one for one in recordings if matches(one.name, task.files)]
+    if task.cut is None:
+        train = [one for one in used if not matches(one.name, task.tested)]
+        test = [one for one in used if matches(one.name, task.tested)]
+    else:
+        cuts = [round(task.cut * len(one)) for one in used]
+        train = [one.slice(0, cut) for one, cut in zip(used, cuts, strict=True)]
+        test = [one.slice(cut, len(one)) for one, cut in zip(used, cuts, strict=True)]
+        if any(len(one) < FEWEST for one in (*train, *test)):
+            raise wrong(f"cutting at {task.cut:g} leaves too little")
+    if not train or (task.tested and not test):
+        raise wrong(f"no recording is to be {'tested on' if train else 'fitted'}")
     return train, test

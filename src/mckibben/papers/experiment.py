@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import string
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import compress
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -19,9 +18,8 @@ from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.checkpoints import Checkpoints
-from mckibben.errors import DataError, MckibbenError, ModelWarning
+from mckibben.errors import DataError, ModelWarning
 from mckibben.estimators.optimisers.tracker import whole_searches
-from mckibben.files import read, write
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, record
@@ -35,6 +33,10 @@ Progress = Callable[[float, str], None]
 
 MOST = 2000
 """Points of a curve that is drawn."""
+
+
+def _nobody(share: float, text: str) -> None:
+    """Take no notice of progress."""
 
 
 @dataclass(frozen=True)
@@ -67,24 +69,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A paper's experiment, run again.
-
-    Parameters
-    ----------
-    name : str
-        As registered.
-    paper : Paper
-    on : str
-        The rig, or the folder of recordings.
-    summary : tuple of str
-        What came out.
-    tables, figures : tuple
-    notes : tuple of str
-        What differs from the paper.
-    quick : bool
-        Whether what takes long was left out.
-    seed : int
-    """
+    """A paper's experiment, run again: on a rig or recordings, with what differs as notes."""
 
     name: str
     paper: Paper
@@ -141,39 +126,19 @@ class Fitted:
     search: tuple[float, ...] = field(default=(), compare=False)
 
 
-@dataclass(frozen=True)
-class Labels:
-    """What a recording is for.
-
-    Parameters
-    ----------
-    role : {"train", "validation", "test"}
-    labels : mapping
-        As the paper's protocol gives them: stage, load, frequency.
-    """
+class Labels(NamedTuple):
+    """What a recording is for: role, and labels as in the paper's protocol (stage, load, frequency)."""
 
     role: Role
     labels: Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class Runs(Mapping[str, Recording]):
-    """Recordings by name, with what each is for."""
+class Runs(dict[str, Recording]):
+    """Recordings by name, in the order of the protocol, with what each is for."""
 
-    recordings: Mapping[str, Recording]
-    labels: Mapping[str, Labels]
-
-    def __getitem__(self, name: str) -> Recording:
-        """Return a recording."""
-        return self.recordings[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Return the names, in the order of the protocol."""
-        return iter(self.recordings)
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return len(self.recordings)
+    def __init__(self, recordings: Mapping[str, Recording], labels: Mapping[str, Labels]) -> None:
+        super().__init__(recordings)
+        self.labels = labels
 
     def names(self, role: Role | None = None, **labels: Any) -> list[str]:
         """Return the names of recordings of a role, and with all of the labels."""
@@ -186,67 +151,49 @@ class Runs(Mapping[str, Recording]):
 
     def select(self, role: Role | None = None, **labels: Any) -> list[Recording]:
         """Return the recordings of a role, and with all of the labels."""
-        return [self.recordings[name] for name in self.names(role, **labels)]
+        return [self[name] for name in self.names(role, **labels)]
 
     def of(self, name: str, label: str) -> Any:
         """Return a label of a recording."""
         return self.labels[name].labels[label]
 
 
-@dataclass(frozen=True)
-class Rerun:
+class Rerun(NamedTuple):
     """What a paper's module gives.
 
-    Parameters
-    ----------
-    run : callable
-        Takes an `Experiment` and fills it.
-    sort : callable
-        Takes recordings of one's own and returns what each is for, or None for one without use; raises
-        DataError where one that is needed is not there.
+    ``run`` fills an `Experiment`. ``sort`` takes recordings of one's own and returns what each is for,
+    or None for one without use; it raises DataError where one that is needed is missing.
     """
 
     run: Callable[[Experiment], None]
     sort: Callable[[Sequence[Recording]], Sequence[Labels | None]]
 
 
+@dataclass
 class Experiment:
     """A paper's experiment under way.
 
     Parameters
     ----------
-    name : str
-        Of the paper.
-    rig : Rig or None
-        That is recorded, and on which loops are closed; None with recordings alone.
-    data : sequence of Recording or None
-        One's own; None to record the rig.
-    quick : bool
-        Whether to leave out what takes long.
-    seed : int
-    jobs : int or None
-        Processes.
+    name, rig, data, quick, seed, jobs
+        As of `reproduce`; ``rig`` is None with recordings alone.
     kept : Checkpoints
-        Where recordings and fits are kept until all is done.
+        Fits, until all is done.
     tell : callable
-        Is told the share done, and what is next.
+        Called with the share done, and what is next.
     """
 
-    def __init__(
-        self,
-        name: str,
-        rig: Rig | None,
-        data: Sequence[Recording] | None,
-        *,
-        quick: bool,
-        seed: int,
-        jobs: int | None,
-        kept: Checkpoints,
-        tell: Progress,
-    ) -> None:
-        self.name, self.paper = name, paper(name)
-        self.rig, self.data = rig, data
-        self.quick, self.seed, self.jobs, self.kept, self.tell = quick, seed, jobs, kept, tell
+    name: str
+    rig: Rig | None
+    data: Sequence[Recording] | None
+    quick: bool = False
+    seed: int = 0
+    jobs: int | None = None
+    kept: Checkpoints = field(default_factory=lambda: Checkpoints(None))
+    tell: Progress = _nobody
+
+    def __post_init__(self) -> None:
+        self.paper = paper(self.name)
         self.models: dict[str, Block] = {}
         self.tables: list[Table] = []
         self.figures: list[Figure] = []
@@ -255,7 +202,7 @@ class Experiment:
         self._free: dict[tuple[str, int], tuple[Recording, Recording]] = {}
 
     def within(self, low: float, high: float) -> Progress:
-        """Return what tells the progress of a part."""
+        """Return what reports the progress of a part."""
         return lambda share, text: self.tell(low + (high - low) * share, text)
 
     def record(
@@ -277,50 +224,32 @@ class Experiment:
             Share of the whole work that is done then.
         """
         if self.data is not None:
-            used: dict[str, tuple[Recording, Labels]] = {}
-            every = zip(self.data, self._sorted(self.data), strict=True)
-            for place, (one, labels) in enumerate(every, start=1):
-                if labels is not None:
-                    used[f"{one.name}-{place}" if one.name in used else one.name] = one, labels
-            unused = [
-                one.name for one in self.data if not any(one is each for each, _ in used.values())
-            ]
-            if unused:
-                self.warned[f"Recordings that are not used: {', '.join(unused)}."] = None
-            return Runs(
-                {name: one for name, (one, _) in used.items()},
-                {name: labels for name, (_, labels) in used.items()},
-            )
+            return self._given(self.data)
         plan = protocol(self.name, self.rig) if what is None else what
         names = [run.name for run in plan.runs] if names is None else names
-        found = dict(self._recorded(plan, names, self.within(0.0, until)))
-        return Runs(found, {name: Labels(plan[name].role, plan[name].labels) for name in found})
+        tell, runs = self.within(0.0, until), dict[str, Recording]()
+        recorded = record(plan, self.rig, runs=names, seed=self.seed, jobs=self.jobs)
+        for run, recording in recorded:
+            runs[run.name] = recording
+            tell(len(runs) / len(names), f"recorded {run.name}")
+        return Runs(runs, {name: Labels(plan[name].role, plan[name].labels) for name in runs})
 
-    def _sorted(self, data: Sequence[Recording]) -> Sequence[Labels | None]:
-        """Return what recordings are for: as a rig has noted it, or else by what was driven."""
+    def _given(self, data: Sequence[Recording]) -> Runs:
+        """Return recordings with what they are for: as a rig has noted it, or by what was driven."""
+        labels: Sequence[Labels | None]
         if all(one.meta.get("protocol") == self.name for one in data):
-            return [Labels(one.meta["role"], one.meta["labels"]) for one in data]
-        rerun: Rerun = registry.load("papers", self.name)
-        return rerun.sort(data)
-
-    def _recorded(
-        self, plan: Protocol, names: Sequence[str], tell: Progress
-    ) -> Iterator[tuple[str, Recording]]:
-        """Yield runs in their order, those recorded before read from disk."""
-        files = {
-            n: self.kept.file(n, ".csv", plan.name, plan[n], self.rig, self.seed) for n in names
-        }
-        there = {name: _read(file) for name, file in files.items()}
-        missing = [name for name in names if there[name] is None]
-        fresh = record(plan, self.rig, runs=missing, seed=self.seed, jobs=self.jobs)
-        for done, name in enumerate(names, start=1):
-            recording, file = there[name], files[name]
-            if recording is None:
-                _, recording = next(fresh)
-                if file is not None:
-                    write(recording, file)
-            tell(done / len(names), f"recorded {name}")
-            yield name, recording
+            labels = [Labels(one.meta["role"], one.meta["labels"]) for one in data]
+        else:
+            labels = registry.load("papers", self.name).sort(data)
+        runs = Runs({}, used := {})
+        for place, (one, label) in enumerate(zip(data, labels, strict=True), start=1):
+            if label is not None:
+                name = f"{one.name}-{place}" if one.name in runs else one.name
+                runs[name], used[name] = one, label
+        unused = [str(one.name) for one, label in zip(data, labels, strict=True) if label is None]
+        if unused:
+            self.warned[f"Recordings that are not used: {', '.join(unused)}."] = None
+        return runs
 
     def fit(
         self, name: str, estimator: Any, recordings: Recording | Sequence[Recording], **how: Any
@@ -356,10 +285,7 @@ class Experiment:
                 warnings.simplefilter("always", ModelWarning)
                 found = self.models[name].simulate(recording)
             self.warned |= {f"{name} on {recording.name}: {w.message}.": None for w in caught}
-            self._free[key] = (
-                recording,
-                found,
-            )  # the recording is kept, so that its id stays its own
+            self._free[key] = recording, found  # with the recording, so that its id stays its own
         return self._free[key][1]
 
     def table(
@@ -383,20 +309,18 @@ class Experiment:
             That fill the fields of its title and note.
         """
         text = self.paper.tables[key]
-        given = [(n, *cells) for n, cells in rows.items()] if isinstance(rows, Mapping) else rows
-        lines = [list(line) for line in given]
-        headings = [text.rows, *columns]
-        for column in [*text.printed]:
-            printed = text.printed[column]
-            place = headings.index(column) if column in headings else len(headings)
-            headings.insert(place, f"{column}, printed")
-            for line in lines:
-                line.insert(place, printed.get(str(line[0])))
-        kept = [any(line[place] is not None for line in lines) for place in range(len(headings))]
+        lines = [(n, *cells) for n, cells in rows.items()] if isinstance(rows, Mapping) else rows
+        ours = dict(zip([text.rows, *columns], zip(*lines, strict=True), strict=False))
+        names = ours.get(text.rows, ())
+        theirs = {of: [cells.get(str(n)) for n in names] for of, cells in text.printed.items()}
+        every: dict[str, Sequence[Cell]] = {}
+        for column in dict.fromkeys((*ours, *theirs)):
+            every |= {f"{column}, printed": theirs[column]} if column in theirs else {}
+            every |= {column: ours[column]} if column in ours else {}
+        full = {column: cells for column, cells in every.items() if {*cells} - {None}}
         words = {"title": text.title.format(**facts), "note": text.note.format(**facts)}
-        shown = tuple(tuple(compress(line, kept)) for line in lines)
         filled = text.model_copy(update=words)
-        self.tables.append(Table(key, filled, tuple(compress(headings, kept)), shown))
+        self.tables.append(Table(key, filled, (*full,), (*zip(*full.values(), strict=True),)))
 
     def figure(self, key: str, panels: Mapping[str, Curves]) -> None:
         """Add a figure: title of a panel -> name of a curve -> its x and y, of which some are drawn.
@@ -416,12 +340,11 @@ class Experiment:
         self.facts |= facts
 
     def done(self, on: str) -> Reproduction:
-        """Return all that came out."""
+        """Return all that came out; a sentence without its facts is left out."""
         sentences = []
         for text in self.paper.summary.values():
             if {name for _, name, _, _ in string.Formatter().parse(text) if name} <= {*self.facts}:
                 sentences.append(text.format(**self.facts))
-        quick = [self.paper.quick] if self.quick else []
         return Reproduction(
             self.name,
             self.paper,
@@ -429,7 +352,7 @@ class Experiment:
             tuple(sentences),
             tuple(self.tables),
             tuple(self.figures),
-            (*self.paper.notes, *quick, *self.warned),
+            (*self.paper.notes, *([self.paper.quick] if self.quick else []), *self.warned),
             self.quick,
             self.seed,
         )
@@ -466,8 +389,8 @@ def reproduce(
     jobs : int, optional
         Processes; default as many as there are cores.
     folder : path, optional
-        Where recordings and models are kept until all is done, so that a re-run that was stopped and
-        is called again goes on from there.
+        Where models are kept until all is done, so that a re-run that was stopped and is called again
+        goes on from there.
     clear : bool
         Whether to forget what was kept when all is done; else the caller does, once it has written
         what is returned, by ``Checkpoints(folder).clear()``.
@@ -489,30 +412,12 @@ def reproduce(
     plant = load_rig(rig) if isinstance(rig, str) else rig
     kept = Checkpoints(folder, name, quick, seed)
     with one_blas_thread(), telling(progress, name) as tell:
-        experiment = Experiment(
-            name,
-            plant,
-            data,
-            quick=quick,
-            seed=seed,
-            jobs=jobs,
-            kept=kept,
-            tell=tell or (lambda share, text: None),
-        )
+        experiment = Experiment(name, plant, data, quick, seed, jobs, kept, tell or _nobody)
         rerun.run(experiment)
     if clear:
         kept.clear()
     on = f"{len(data)} recordings" if data is not None else f"rig {plant.name}" if plant else ""
     return experiment.done(on)
-
-
-def _read(file: Path | None) -> Recording | None:
-    """Return the recording in a file, or None if it is absent or damaged."""
-    try:
-        (recording,) = read(file, informative=False) if file is not None else (None,)
-    except MckibbenError:
-        return None
-    return recording
 
 
 def rms(errors: Array) -> float:

@@ -1,25 +1,19 @@
-"""Four methods on one recording, tested on another, and the whole field beside them."""
+"""Four methods on one recording, tested on another, and all models of the field on both."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.dynamics.process_model import ProcessModel
-from mckibben.blocks.dynamics.transfer_function import TransferFunction
-from mckibben.blocks.hysteresis.pi import PI
 from mckibben.blocks.memoryless import Affine
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.ranking import compare
 from mckibben.errors import DataError, MckibbenError, ModelError
-from mckibben.estimators.core.estimator import Estimator
-from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.metrics import score
 from mckibben.papers.experiment import Cell, Curves, Experiment, Labels, Rerun
 from mckibben.papers.paper import paper
@@ -37,15 +31,14 @@ N_FOLDS = 4
 """Of the cross-validation that chooses a model of the field; the quick run has none."""
 
 PRINTED_PI, PRINTED_P2UZ = "field-models-pi", "field-models-p2uz"
-NARX, BJ, P2UZ, SLOPES = "NARX", "BJ", "P2UZ", "PI"
+NARX, BJ, P2UZ, SLOPES = PAPERS = ("NARX", "BJ", "P2UZ", "PI")
 LEAST_SQUARES = "PI by least squares, ours"
-PAPERS = (NARX, BJ, P2UZ, SLOPES)
 
-NOTHING = (np.inf, -np.inf, np.inf, -np.inf)
-"""Errors of no model."""
+FAILED = [np.inf, -np.inf, np.inf, -np.inf]
+"""RMSE and fitness on calibration, then on test, of a seed that gave no model."""
 
 
-def methods(seed: int) -> dict[str, Estimator]:
+def methods(seed: int) -> dict[str, Any]:
     """Return the paper's four methods as published, and its PI model by least squares.
 
     Of the NARX model the paper prints neither regressors nor mapping: this one is a sigmoid network on
@@ -55,60 +48,40 @@ def methods(seed: int) -> dict[str, Estimator]:
     by the slopes of segments, Eqs. (14) and (15).
     """
     thresholds = paper("field-models").models[PRINTED_PI]["thresholds"]
-    return {
-        NARX: load("estimators", "narx-network")(
-            n_units=10, delay=1, refine=False, allow_unstable=True, n_starts=5, seed=seed
-        ),
-        BJ: load("estimators", "bj")(lags=(0, 2), initial="first_sample", seed=seed),
-        P2UZ: load("estimators", "p2uz")(initial="first_sample", seed=seed),
-        SLOPES: PIEstimator(thresholds=thresholds, method="slopes", seed=seed),
-        LEAST_SQUARES: PIEstimator(thresholds=thresholds, seed=seed),
+    network = {"n_units": 10, "delay": 1, "refine": False, "allow_unstable": True, "n_starts": 5}
+    settings: dict[str, tuple[str, dict[str, Any]]] = {
+        NARX: ("narx-network", network),
+        BJ: ("bj", {"lags": (0, 2), "initial": "first_sample"}),
+        P2UZ: ("p2uz", {"initial": "first_sample"}),
+        SLOPES: ("pi", {"thresholds": thresholds, "method": "slopes"}),
+        LEAST_SQUARES: ("pi", {"thresholds": thresholds}),
     }
+    return {name: load("estimators", of)(seed=seed, **how) for name, (of, how) in settings.items()}
 
 
-@dataclass(frozen=True)
-class Tried:
-    """What came of one method.
+class Tried(NamedTuple):
+    """A method: its model plain and matched, of the first seed that gave one; errors; why seeds failed.
 
-    Parameters
-    ----------
-    matched, plain : Block or None
-        Found with the first seed that gave one, with the paper's match behind and without.
-    matched_errors, plain_errors : array, shape (seeds, 4)
-        RMSE [mm] and fitness [%] on calibration, then on test; infinite where there is no model, or its
-        free run overflows.
-    failures : tuple of str
-        Why, one a seed that failed.
+    Errors have the shape (2, seeds, 4), plain first; the last axis is that of `FAILED`.
     """
 
-    matched: Series | None
-    plain: Block | None
-    matched_errors: Array
-    plain_errors: Array
-    failures: tuple[str, ...]
+    models: tuple[Any, Series] | None
+    errors: Array
+    failures: list[str]
 
     @property
     def lowest_test(self) -> float | None:
         """The lower median test RMSE of plain and matched [mm].
 
-        None where most seeds failed, or are worse than the mean of what was measured: what is broken is
-        nothing to compare with.
+        None where most seeds failed, or are worse than the mean of what was measured.
         """
-        medians = [median(self.plain_errors), median(self.matched_errors)]
-        return min((one[2] for one in medians if one is not None and one[3] > 0), default=None)
-
-    @property
-    def reason(self) -> str:
-        """Why it failed, and how often."""
-        if not self.failures:
-            return ""
-        return f"{len(self.failures)} of {len(self.plain_errors)} seeds: {self.failures[0]}"
+        medians = np.median(self.errors, axis=1)
+        return min((test for _, _, test, fitness in medians.tolist() if fitness > 0), default=None)
 
 
-def median(errors: Array) -> list[float] | None:
-    """Return the median errors over all seeds, those that failed counted as the worst."""
-    found = np.median(errors, axis=0)
-    return found.tolist() if np.isfinite(found).all() else None
+def finite(values: Array) -> list[Cell]:
+    """Return cells, empty where a value is not finite."""
+    return [value if np.isfinite(value) else None for value in values.tolist()]
 
 
 def run(experiment: Experiment) -> None:
@@ -125,16 +98,17 @@ def run(experiment: Experiment) -> None:
         seed=experiment.seed,
         jobs=experiment.jobs,
         folder=experiment.kept.inside("field"),
-        progress=lambda now: experiment.within(0.3, 0.95)(now.done / now.total, str(now)),
+        clear=False,
+        progress=lambda now: experiment.within(0.3, 0.95)(now.share, str(now)),
     )
-    if board.pending:
+    if board.stopped:
         raise KeyboardInterrupt
     experiment.says(seeds=f"{seeds[0]} to {seeds[-1]}", n_seeds=len(seeds))
     _errors_tables(experiment, tried)
     _parameters(experiment, tried)
     _board_table(experiment, board)
     shown = _summary(experiment, tried, board)
-    _figures(experiment, (train, test), tried, shown)
+    _figures(experiment, {"calibration": train, "test": test}, tried, shown)
 
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
@@ -164,19 +138,15 @@ def matched(model: Block, recording: Recording) -> Series:
 
     Raises
     ------
-    DataError
+    ModelError
         If the model's output does not move.
     """
-    x = model.simulate(recording.select([c.name for c in model.inputs]))[model.outputs[0].name]
+    channel = model.outputs[0]
+    x = model.simulate(recording.select([c.name for c in model.inputs]))[channel.name]
     z = recording["displacement"]
     if np.ptp(x) == 0:
-        raise DataError(
-            "the model's output does not move on it, so there is nothing to match",
-            file=recording.source,
-            remedy="give another recording, or another model",
-        )
+        raise ModelError("its output does not move. Remedy: give another recording, or model.")
     gain = float(np.ptp(z) / np.ptp(x))
-    channel = model.outputs[0]
     return Series((model, Affine(gain, float(z[0] - gain * x[0]), channel, channel)))
 
 
@@ -187,108 +157,91 @@ def _tried(
     tell, names = experiment.within(0.05, 0.3), [*every[seeds[0]]]
     found: dict[str, Tried] = {}
     for place, name in enumerate(names):
-        models: list[tuple[Series, Block]] = []
+        models: list[tuple[Block, Series]] = []
         errors, failures = [], []
         for at, seed in enumerate(seeds):
             tell((place + at / len(seeds)) / len(names), f"{name}, seed {seed}")
             try:
                 plain = experiment.fit(f"{name} {seed}", every[seed][name], train).block
-                both = matched(plain, train), plain
-                errors.append(tuple(_errors(model, train, test) for model in both))
+                both = plain, matched(plain, train)
+                errors.append([_errors(model, train, test) for model in both])
                 models.append(both)
             except MckibbenError as error:
                 failures.append(str(error))
-                errors.append((NOTHING, NOTHING))
-        model, plain_model = models[0] if models else (None, None)
-        of_matched, of_plain = np.array(errors).swapaxes(0, 1)
-        found[name] = Tried(model, plain_model, of_matched, of_plain, tuple(failures))
+                errors.append([FAILED, FAILED])
+        first = models[0] if models else None
+        found[name] = Tried(first, np.array(errors).swapaxes(0, 1), failures)
     return found
 
 
-def _errors(model: Block, train: Recording, test: Recording) -> tuple[float, ...]:
+def _errors(model: Block, *recordings: Recording) -> list[float]:
     found: list[float] = []
     with np.errstate(over="ignore", invalid="ignore"):
-        for recording in (train, test):
+        for recording in recordings:
             scored = score(recording["displacement"], model.simulate(recording)["displacement"])
             found += [scored.rmse, 100 * scored.r2]
     if not np.isfinite(found).all():
         raise ModelError(
             "its free run overflows. Remedy: use fewer units or terms, or another seed."
         )
-    return tuple(found)
+    return found
 
 
 def _errors_tables(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
     columns = ("RMSE calibration [mm]", "fitness [%]", "RMSE test [mm]", "fitness [%] test")
     rows: dict[str, list[Cell]] = {}
-    for name, one in tried.items():
-        cells: Sequence[Cell] = median(one.matched_errors) or (None,) * 4
-        rows[name] = [*cells, one.reason or None]
-    experiment.table("errors", [*columns, "failed because"], rows, **experiment.facts)
     spread: list[list[Cell]] = []
     for name, one in tried.items():
-        for match, errors in (("by range", one.matched_errors), ("none", one.plain_errors)):
-            worked = np.isfinite(errors[:, 0])
-            cells = []
-            for column in (errors[:, 0], errors[:, 2]):
-                ends = (
-                    (column[worked].min(), column[worked].max()) if worked.any() else (None, None)
-                )
-                middle = float(np.median(column))
-                cells += [middle if np.isfinite(middle) else None, *ends]
-            spread.append([name, match, *cells, len(errors) - len(one.failures)])
-    ways = [
-        f"RMSE {on} [mm], {way}"
-        for on in ("calibration", "test")
-        for way in ("median", "lowest", "highest")
-    ]
-    experiment.table("seeds", ["match", *ways, "seeds that worked"], spread, **experiment.facts)
+        n, n_failed = one.errors.shape[1], len(one.failures)
+        reason = f"{n_failed} of {n} seeds: {one.failures[0]}" if one.failures else None
+        rows[name] = [*finite(np.median(one.errors[1], axis=0)), reason]
+        for match, errors in (("by range", one.errors[1]), ("none", one.errors[0])):
+            rmses = errors[:, ::2]
+            ends = rmses.min(axis=0), np.where(np.isinf(rmses), -np.inf, rmses).max(axis=0)
+            cells = finite(np.ravel([np.median(rmses, axis=0), *ends], order="F"))
+            spread.append([name, match, *cells, n - n_failed])
+    experiment.table("errors", [*columns, "failed because"], rows, **experiment.facts)
+    sides, ways = ("calibration", "test"), ("median", "lowest", "highest")
+    each = [f"RMSE {side} [mm], {way}" for side in sides for way in ways]
+    experiment.table("seeds", ["match", *each, "seeds that worked"], spread, **experiment.facts)
 
 
 def _parameters(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
     """Add Table 1, and the parameters of P2UZ, Box-Jenkins and PI beside the printed."""
-    match = {name: one.matched.parts[1] for name, one in tried.items() if one.matched is not None}
-    experiment.table(
-        "match",
-        ["a", "b [mm]"],
-        {name: [m.gain, m.offset] for name, m in match.items() if isinstance(m, Affine)},
-    )
-    printed, found = experiment.paper.printed(PRINTED_P2UZ), tried[P2UZ].plain
-    if isinstance(found, ProcessModel):
-        rows: dict[str, list[Cell]] = {
-            "K": [printed.gain, found.gain],
-            "T_z [s]": [printed.zero_time, found.zero_time],
-            "T_w [s]": [printed.time_constants[0], found.time_constants[0]],
-            "zeta": [printed.damping, found.damping],
+    models = {name: one.models for name, one in tried.items() if one.models is not None}
+    match: dict[str, Any] = {name: both[1].parts[1] for name, both in models.items()}
+    plain = {name: both[0] for name, both in models.items()}
+    lines = {name: [one.gain, one.offset] for name, one in match.items()}
+    experiment.table("match", ["a", "b [mm]"], lines)
+    if P2UZ in plain:
+        both = experiment.paper.printed(PRINTED_P2UZ), plain[P2UZ]
+        rows = {
+            "K": [one.gain for one in both],
+            "T_z [s]": [one.zero_time for one in both],
+            "T_w [s]": [one.time_constants[0] for one in both],
+            "zeta": [one.damping for one in both],
         }
         experiment.table("p2uz", ["printed", "here"], rows)
-    linear = tried[BJ].plain
-    if isinstance(linear, TransferFunction):
-        polynomials = {
-            "B": linear.numerator,
-            "C": linear.noise_numerator,
-            "D": linear.noise_denominator,
-            "F": linear.denominator,
-        }
-        terms = {
-            name: [*map(float, values), None, None][:3] for name, values in polynomials.items()
-        }
+    if BJ in plain:
+        bj = plain[BJ]
+        polynomials = bj.numerator, bj.noise_numerator, bj.noise_denominator, bj.denominator
+        each = zip("BCDF", polynomials, strict=True)
+        terms = {name: [*map(float, values), None, None][:3] for name, values in each}
         experiment.table("bj", ["z^0", "z^-1", "z^-2"], terms)
-    models = [experiment.paper.printed(PRINTED_PI), tried[SLOPES].plain, tried[LEAST_SQUARES].plain]
-    columns = ["share printed", "share by slopes", "share by least squares, ours"]
-    shares = {
-        column: (np.array(model.weights) / np.sum(model.weights)).tolist()
-        for column, model in zip(columns, models, strict=True)
-        if isinstance(model, PI)
+    every = {
+        "share printed": experiment.paper.printed(PRINTED_PI),
+        "share by slopes": plain.get(SLOPES),
+        "share by least squares, ours": plain.get(LEAST_SQUARES),
     }
+    shares = {n: np.divide(pi.weights, sum(pi.weights)).tolist() for n, pi in every.items() if pi}
     thresholds = experiment.paper.models[PRINTED_PI]["thresholds"]
-    rows_of = {f"{r:g}": row for r, *row in zip(thresholds, *shares.values(), strict=True)}
-    experiment.table("weights", [*shares], rows_of)
+    weights = {f"{r:g}": row for r, *row in zip(thresholds, *shares.values(), strict=True)}
+    experiment.table("weights", [*shares], weights)
 
 
 def _board_table(experiment: Experiment, board: Leaderboard) -> None:
     columns = {
-        "CV RMSE [mm]": "validation_rmse" if board.chosen_by != "fit" else "",
+        "CV RMSE [mm]": "validation_rmse",
         "test RMSE [mm]": "test.rmse",
         "fit RMSE [mm]": "train.rmse",
         "R² [%]": "test.r2",
@@ -316,16 +269,16 @@ def _summary(
 ) -> dict[str, Row]:
     """Give what came out, and return the models of the field that are named, each by its name."""
     worked = {name: low for name in PAPERS if (low := tried[name].lowest_test) is not None}
-    name = min(worked, key=worked.__getitem__, default=None)
-    if name is not None:
-        experiment.says(best=name, best_error=worked[name])
+    best = min(worked, key=worked.__getitem__, default=None)
+    if best is not None:
+        experiment.says(best=best, best_error=worked[best])
     shown = {}
-    for key, row in (("chosen", board.best), ("lowest", board.lowest)):
-        if row is not None and row.sound and row.test is not None:
-            key = "fitted" if key == "chosen" and board.chosen_by == "fit" else key
-            experiment.says(**{key: row.model, f"{key}_error": row.test.rmse})
-            if name is not None:
-                experiment.says(**{f"{key}_ratio": row.test.rmse / worked[name]})
+    chosen = "fitted" if board.chosen_by == "fit" else "chosen"
+    for key, row in ((chosen, board.best), ("lowest", board.lowest)):
+        if row is not None and row.sound:
+            experiment.says(**{key: row.model, f"{key}_error": row.test_error})
+            if best is not None:
+                experiment.says(**{f"{key}_ratio": row.test_error / worked[best]})
             shown[row.model] = row
     if board.not_recommended:
         experiment.says(none=board.not_recommended)
@@ -334,41 +287,26 @@ def _summary(
 
 def _figures(
     experiment: Experiment,
-    recordings: tuple[Recording, Recording],
+    runs: Mapping[str, Recording],
     tried: Mapping[str, Tried],
     shown: Mapping[str, Row],
 ) -> None:
-    paper = {name: tried[name].matched for name in PAPERS}
-    ours = {row.model: row.block for row in shown.values()}
-    ours[LEAST_SQUARES] = tried[LEAST_SQUARES].plain
-    both = dict(zip(("calibration", "test"), recordings, strict=True))
-    experiment.figure(
-        "signals", {title: {"": (run.time, run["pressure"])} for title, run in both.items()}
-    )
-    experiment.figure(
-        "loops",
-        {t: {run.origin: (run["pressure"], run["displacement"])} for t, run in both.items()},
-    )
-    for title, run in both.items():
-        panels: dict[str, Curves] = {
-            whose: {run.origin: (run.time, run["displacement"])} | _outputs(run, models)
-            for whose, models in (("the paper's methods", paper), ("ours", ours))
-        }
+    """Add signals, loops and responses; models far out of the measured range would hide the others."""
+    theirs = {name: both[1] for name in PAPERS if (both := tried[name].models)}
+    ours: dict[str, Block] = {name: row.block for name, row in shown.items() if row.block}
+    if (both := tried[LEAST_SQUARES].models) is not None:
+        ours[LEAST_SQUARES] = both[0]
+    experiment.figure("signals", {of: {"": (r.time, r["pressure"])} for of, r in runs.items()})
+    loops = {of: {r.origin: (r["pressure"], r["displacement"])} for of, r in runs.items()}
+    experiment.figure("loops", loops)
+    for title, one in runs.items():
+        y = one["displacement"]
+        panels: dict[str, Curves] = {}
+        for whose, models in (("the paper's methods", theirs), ("ours", ours)):
+            every = {name: model.simulate(one)["displacement"] for name, model in models.items()}
+            near = {n: x for n, x in every.items() if np.abs(x - y.mean()).max() < 2 * np.ptp(y)}
+            panels[whose] = {name: (one.time, x) for name, x in ({one.origin: y} | near).items()}
         experiment.figure(title, panels)
-
-
-def _outputs(
-    recording: Recording, models: Mapping[str, Block | None]
-) -> dict[str, tuple[Array, Array]]:
-    """Return what models give over time; those far out of the measured range would hide the others."""
-    found = {}
-    measured = recording["displacement"]
-    for name, model in models.items():
-        if model is not None:
-            modelled = model.simulate(recording)["displacement"]
-            if np.abs(modelled - measured.mean()).max() < 2 * np.ptp(measured):
-                found[name] = (recording.time, modelled)
-    return found
 
 
 RERUN = Rerun(run, sort)

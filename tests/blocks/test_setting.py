@@ -6,12 +6,12 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from mckibben.papers.activation_pressure.published import activation_pressure
 
 from mckibben import Block, ModelError, ModelWarning, Series, registry
 from mckibben.blocks.force.activation import ActivationPressure
 from mckibben.blocks.memoryless import Affine
 from mckibben.blocks.setting import settable, with_fields
+from mckibben.papers.paper import printed
 
 
 @pytest.mark.parametrize("kind", registry.names("blocks"))
@@ -24,7 +24,7 @@ def test_what_can_be_set_is_a_field_that_is_not_identified(kind: str) -> None:
 
 
 def test_it_is_set_in_whichever_part_has_it_and_nothing_else_moves() -> None:
-    model = activation_pressure()
+    model = printed("activation-pressure-profile")
     pressure = model.outputs[0]
     whole = Series((model, Affine(2.0, 0.0, pressure, pressure)))
     faster = with_fields(whole, {"frequency": 2})
@@ -48,7 +48,7 @@ def with_still(model: Block) -> Series:
 
 
 def test_beyond_what_was_identified_it_warns_and_what_was_is_refused() -> None:
-    model = activation_pressure()
+    model = printed("activation-pressure-profile")
     with pytest.warns(ModelWarning, match=r"frequency is set to 3.*from 0\.5.* to 2"):
         with_fields(model, {"frequency": 3.0})
     with pytest.raises(ModelError, match="frequency, rate_time_constant"):

@@ -16,7 +16,7 @@ import time
 import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,6 @@ from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import track
 from mckibben.measured.sets import parted, sets_in
 from mckibben.papers.activation_pressure.protocol import FORCES
-from mckibben.papers.activation_pressure.run import modelled
 from mckibben.papers.sdchm.loops import EXTENSOR, MOVES, held, widths
 from mckibben.papers.sdchm.protocol import PERIOD
 from mckibben.registry import load
@@ -271,7 +270,7 @@ def lifting() -> Iterator[Row]:
                 continue
             pressure = test["pressure"]
             for name, found in (
-                ("the paper's", modelled(theirs, test, frequency)),
+                ("the paper's", replace(theirs, frequency=frequency).simulate(test)["pressure"]),
                 ("activation-memory", memory.simulate(test)["pressure"]),
                 (BALANCE, balance.simulate(test)["pressure"]),
             ):

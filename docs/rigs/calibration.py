@@ -73,8 +73,8 @@ def soft_arm() -> Iterator[Row]:
         if name.startswith("coupling"):
             cycle = last_cycle(recording, 50.0)
             pattern = name.rpartition("-")[2]
-            u = sine(np.arange(len(cycle)) * 0.05, 50.0, 1.3)
             for k in (1, 2, 3):
+                u = cycle[f"pressure_{k if str(k) in pattern else pattern[0]}"]
                 width = loop_width(u, cycle[f"displacement_{k}"])
                 widths.append(width)
                 if str(k) in pattern:

@@ -118,7 +118,7 @@ def test_printed_figures_stand_before_ours() -> None:
 
 def test_a_sentence_without_its_facts_is_left_out_and_models_that_warn_are_named() -> None:
     made = experiment()
-    made.says(best="NARX", n_seeds=3, best_error=1.5)
+    made.says(best="NARX", n_seeds=3, best_seeds=3, best_plain=1.5, best_matched=1.6)
     found = made.done("a rig")
     assert len(found.summary) == 1
     assert "1.50 mm" in found.summary[0]
@@ -128,14 +128,14 @@ def test_a_sentence_without_its_facts_is_left_out_and_models_that_warn_are_named
         for text in paper("field-models").summary.values()
         for _, name, _, _ in string.Formatter().parse(text)
     }
-    assert {"best", "best_error"} <= fields
+    assert {"best", "best_plain"} <= fields
 
 
 def test_pages_name_the_paper_and_its_figures() -> None:
     made = experiment()
     x = np.linspace(0.0, 1.0, 100)
     made.figure("signals", {"calibration": {"": (x, x)}, "test": {"": (x, x), "ours": (x, x)}})
-    made.says(best="NARX", n_seeds=3, best_error=1.5)
+    made.says(best="NARX", n_seeds=3, best_seeds=3, best_plain=1.5, best_matched=1.6)
     found = made.done("rig mas20-hanging")
     (figure,) = found.figures
     assert [panel.title for panel in drawing(figure).panels] == ["calibration", "test"]

@@ -91,7 +91,7 @@ class Reproduction:
             "quick": self.quick,
             "seed": self.seed,
             "summary": list(self.summary),
-            "tables": [table.to_dict() for table in self.tables],
+            "tables": [table.to_dict() | {"quick": self.quick} for table in self.tables],
             "notes": list(self.notes),
         }
 

@@ -21,7 +21,7 @@ from mckibben.estimators.force.activation import (
     dominant_frequency,
     outermost,
 )
-from mckibben.papers.experiment import Cell, Curves, Experiment, Labels, Rerun, rms
+from mckibben.papers.experiment import Curves, Experiment, Labels, Rerun, rms
 from mckibben.recording import Recording
 from mckibben.signals import reversals
 from mckibben.signals.protocol import protocol
@@ -223,7 +223,7 @@ def _extremes(study: Study) -> None:
     experiment, sines = study.experiment, [*study.sines.values()]
     data = training_data(sines, "contraction", "pressure", None, ("force",))
     local, whole = list[Array](), list[Array]()
-    rows: dict[str, list[Cell]] = {}
+    rows: dict[str, list[float]] = {}
     static_curves: dict[str, dict[str, tuple[Array, Array]]] = {"before": {}, "after": {}}
     betas: list[Array] = []
     groups = by_force(data.runs)
@@ -245,7 +245,10 @@ def _extremes(study: Study) -> None:
             static_curves[when][named] = along, np.asarray(np.polyval(cubic, along))
         betas.append(cubics["after"][::-1])
     columns = [f"{end}, {when}" for when in ("before", "after") for end in ("minimum", "maximum")]
-    experiment.table("distance", columns, rows)
+    if len(rows) > 4:  # a cubic of the force goes through the extremes at four forces exactly
+        experiment.table("distance", columns, rows)
+        low, high = (sum(cells[k + 2] < cells[k] for cells in rows.values()) for k in (0, 1))
+        experiment.says(nearer_low=low, nearer_high=high, n_forces=len(rows))
     scatter = {"of every loop": np.vstack(local).T, "of every force": np.vstack(whole).T}
     experiment.figure("extrema", {"": {name: (x, y) for name, (x, y) in scatter.items()}})
     experiment.figure("static", static_curves)

@@ -224,9 +224,9 @@ def _parameters(experiment: Experiment, tried: Mapping[str, Tried]) -> None:
         experiment.table("p2uz", ["printed", "here"], rows)
     if BJ in plain:
         bj = plain[BJ]
-        polynomials = bj.numerator, bj.noise_numerator, bj.noise_denominator, bj.denominator
-        each = zip("BCDF", polynomials, strict=True)
-        terms = {name: [*map(float, values), None, None][:3] for name, values in each}
+        monic = {"C": bj.noise_numerator, "D": bj.noise_denominator, "F": bj.denominator}
+        terms: dict[str, list[Cell]] = {"B": [*map(float, bj.numerator)]}
+        terms |= {name: [1.0, *map(float, values)] for name, values in monic.items()}
         experiment.table("bj", ["z^0", "z^-1", "z^-2"], terms)
     every = {
         "share printed": experiment.paper.printed(PRINTED_PI),
@@ -271,7 +271,9 @@ def _summary(
     worked = {name: low for name in PAPERS if (low := tried[name].lowest_test) is not None}
     best = min(worked, key=worked.__getitem__, default=None)
     if best is not None:
-        experiment.says(best=best, best_error=worked[best])
+        plain, matched_ = np.median(tried[best].errors, axis=1)[:, 2].tolist()
+        n_worked = len(tried[best].errors[0]) - len(tried[best].failures)
+        experiment.says(best=best, best_seeds=n_worked, best_plain=plain, best_matched=matched_)
     shown = {}
     chosen = "fitted" if board.chosen_by == "fit" else "chosen"
     for key, row in ((chosen, board.best), ("lowest", board.lowest)):

@@ -42,7 +42,7 @@ MODELS: Mapping[str, tuple[str, dict[str, Any]]] = {
     OURS: ("multistate", {"static": None}),
     EIGHTEEN: ("multistate-18", {"static": None}),
     "modified Maxwell-slip": ("mms", LINE | {"n_operators": 38}),
-    "modified PI": ("mpi", {"input": ELONGATION, "n_operators": 33}),
+    "modified PI": ("mpi", {"input": ELONGATION, "n_operators": 34}),
     "PI with weights of either sign": ("pi", SIGNED),
     "generalised Bouc-Wen": ("gbw", LINE),
     "Maxwell-slip": ("maxwell-slip", LINE),
@@ -147,7 +147,7 @@ def _errors(experiment: Experiment, found: Hysteresis) -> None:
     for model, name in CLOSED.items():
         modelled = experiment.simulate(name, found.loop)[HYSTERESIS]
         r2, fit = score(found.loop[HYSTERESIS], modelled).r2, found.fitted[name]
-        rows[model] = [fit.block.n_parameters, fit.rmse, r2]
+        rows[model] = [fit.n_free, fit.rmse, r2]
         free = {title: experiment.simulate(model, one) for title, one in found.runs.items()}
         lost = {
             title: one[HYSTERESIS] - found.runs[title][HYSTERESIS] for title, one in free.items()

@@ -100,20 +100,9 @@ class Reproduction:
 class Fitted:
     """What a fit gave.
 
-    Parameters
-    ----------
-    block : Block
-        The model.
-    rmse : float
-        Its free-running error on the data fitted, in the unit of the output; of several the largest.
-    seconds : float
-        That the fit took [s].
-    n_free : int
-        Numbers that the fit was free to choose.
-    standard_errors : tuple of float
-        Of ``block.pack()``, NaN where not known; of several outputs none.
-    search : tuple of float
-        Least error so far, whenever the search reported it.
+    ``rmse`` is the free-running error on the data fitted, in the unit of the output, of several the
+    largest; ``standard_errors`` are of ``block.pack()``, NaN where not known; ``search`` is the least
+    error so far, whenever the search reported it.
     """
 
     __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
@@ -377,17 +366,13 @@ def reproduce(
     name : str
         As ``mckibben reproduce --list`` lists it.
     rig : Rig or str, optional
-        That is recorded, and on which loops are closed. Default the one that the paper's protocol was
-        made for; with ``data`` none.
+        That is recorded, and on which loops are closed; default the protocol's, with ``data`` none.
     data : sequence of Recording, optional
-        Recordings of one's own instead. What each is for is seen from what was driven: see ``data`` of
-        `mckibben.papers.paper.Paper`.
+        Recordings of one's own instead; what each is for is found from what was driven.
     quick : bool
-        Whether to leave out what takes long: under a minute then.
-    seed : int
-        Of everything random.
-    jobs : int, optional
-        Processes; default as many as there are cores.
+        Whether to leave out what takes long.
+    seed, jobs
+        Of everything random; processes, default as many as there are cores.
     folder : path, optional
         Where models are kept until all is done, so that a re-run that was stopped and is called again
         goes on from there.
@@ -399,10 +384,8 @@ def reproduce(
 
     Raises
     ------
-    ModelError
-        If there is no paper of that name; the text lists those there are.
-    DataError
-        If a recording that the experiment needs is not there.
+    ModelError, DataError
+        If there is no such paper, or a recording that it needs is missing.
     """
     rerun: Rerun = registry.load("papers", name)
     if data is not None and not data:

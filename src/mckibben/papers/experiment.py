@@ -241,13 +241,20 @@ class Experiment:
         return runs
 
     def fit(
-        self, name: str, estimator: Any, recordings: Recording | Sequence[Recording], **how: Any
+        self,
+        name: str,
+        model: str,
+        recordings: Recording | Sequence[Recording],
+        settings: Mapping[str, Any] | None = None,
+        **how: Any,
     ) -> Fitted:
         """Return what an estimator finds on recordings, or found before the work was stopped.
 
-        The model is one of ``models`` from then on, under its name. ``how`` is what else its ``fit``
-        takes. Errors are those of its ``fit``.
+        The block is one of ``models`` from then on, under its name. ``model`` is the estimator's short
+        name; ``how`` is what else its ``fit`` takes. Errors are those of its ``fit``.
         """
+        made = registry.load("estimators", model)
+        estimator: Any = made(**{"seed": self.seed} | dict(settings or {}))
         search: list[float] = []
 
         def fit() -> Fitted:
@@ -261,8 +268,8 @@ class Experiment:
             error = float(np.max(found.rmse))
             return Fitted(estimator.model_, error, found.seconds, found.n_free, errors, best)
 
-        settings = (type(estimator).__name__, estimator.get_params())
-        fitted = self.kept.once(name, Fitted, fit, settings, recordings, how)
+        depends = model, estimator.get_params(), recordings, how
+        fitted = self.kept.once(name, Fitted, fit, *depends)
         self.models[name] = fitted.block
         return fitted
 

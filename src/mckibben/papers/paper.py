@@ -70,8 +70,8 @@ class Paper(_Strict):
     """A paper.
 
     ``data`` is what recordings of one's own it needs; ``given`` what is taken from the paper or set,
-    and ``found`` what the recordings determine. Sentences of ``summary`` have fields in braces, which the
-    experiment fills; one without its fields is left out. ``notes`` are what differs from the paper,
+    and ``found`` what the recordings determine. Sentences of ``summary`` have fields in braces, which
+    the experiment fills; one without its fields is left out. ``notes`` are what differs from the paper,
     ``quick`` what a quick run leaves out. Tables, figures and printed models are by key.
     """
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.metrics import err, loop_width, rmse
@@ -104,12 +103,11 @@ def _fits(experiment: Experiment, runs: Runs) -> None:
     orders: dict[str, list[Cell]] = {}
     for n in (10,) if short else SIZES:
         for settings in (PAPERS, {"threshold_rule": "envelope", "initial": "first_sample"}):
-            channels = {"input": f"pressure_{k}", "output": f"displacement_{k}"}
-            gpi = registry.load("estimators", "gpi")(n_operators=n, seed=experiment.seed)
-            name = f"GPI {n}, {settings['threshold_rule']}"
-            block = experiment.fit(name, gpi.set_params(**channels, **settings), recording).block
-            y = experiment.simulate(name, recording)[channels["output"]]
-            orders.setdefault(str(n), []).append(err(recording[channels["output"]], y))
+            y, name = f"displacement_{k}", f"GPI {n}, {settings['threshold_rule']}"
+            own = settings | {"input": f"pressure_{k}", "output": y, "n_operators": n}
+            block = experiment.fit(name, "gpi", recording, own).block
+            error = err(recording[y], experiment.simulate(name, recording)[y])
+            orders.setdefault(str(n), []).append(error)
         orders[str(n)].append(block.n_parameters)
     columns = ["Err [%]", "Err, thresholds over the envelopes [%]", "parameters"]
     experiment.table("orders", columns, orders, muscle=k)
@@ -133,10 +131,9 @@ def _fits(experiment: Experiment, runs: Runs) -> None:
     rows: dict[str, list[Cell]] = {}
     for place, (name, (model, changes)) in enumerate(chosen.items()):
         experiment.tell(0.32 + 0.38 * place / len(chosen), name)
-        estimator = registry.load("estimators", model)(seed=experiment.seed, **changes)
         train = patterns + (joint if name.endswith(TOO) else [])
         held = runs.select("validation", stage="network")
-        fitted = experiment.fit(name, estimator, train, validation=held)
+        fitted = experiment.fit(name, model, train, changes, validation=held)
         rows[name] = [fitted.seconds, fitted.block.n_parameters]
     experiment.table("identification", ["time [s]", "parameters"], rows)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from mckibben import GPI, PIEstimator, Recording, registry
+from mckibben import GPI, Recording, registry
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.core.estimator import Estimator
@@ -66,11 +66,11 @@ def test_a_fit_is_made_once(
         return fit(self, *args, **kwargs)
 
     monkeypatch.setattr(Estimator, "fit", counted)
-    first, second = (experiment(tmp_path).fit("pi", PIEstimator(), recording) for _ in range(2))
+    first, second = (experiment(tmp_path).fit("pi", "pi", recording) for _ in range(2))
     assert first == second
     assert len(fits) == 1
-    experiment(tmp_path).fit("pi", PIEstimator(n_operators=3), recording)
-    experiment(tmp_path, "field-models").fit("pi", PIEstimator(), recording)
+    experiment(tmp_path).fit("pi", "pi", recording, {"n_operators": 3})
+    experiment(tmp_path, "field-models").fit("pi", "pi", recording)
     assert len(fits) == 3
 
 

@@ -73,12 +73,17 @@ def reproduce(
             results.claim(["report.html", "tables.json"])
         given: dict[str, Any] = {"name": name, "rig": plant, "data": recordings}
         given |= {"quick": quick, "seed": seed, "jobs": jobs, "folder": folder}
+
+        def passed_on(index: int, *news: Any) -> None:
+            if news:
+                tell(*news)
+
         # in a process of its own, which can be ended whatever it is at
         with (
             progress_bar(f"{name}:", plainly=True) as tell,
             workers.Workers(1, cores=jobs or threads.cores()) as one,
         ):
-            (outcome,) = one.results(_again, [given], _only_news(tell))
+            (outcome,) = one.results(_again, [given], passed_on)
             found: Reproduction = outcome.result()
         if results is not None:
             from mckibben.report.reproduction import reproduction_page
@@ -105,12 +110,10 @@ def _recordings(folder: Path, reading: Reading) -> list[Recording]:
     found: list[Recording] = []
     for path in inside(folder):
         parts = reading.read([path], None, informative=False)
-        several = len(parts) > 1
-        found += [
-            one.with_meta(name=f"{path.stem}-{place}" if several else path.stem)
-            for place, one in enumerate(parts, start=1)
-        ]
-    return [replace(one, start_time=0.0) for one in found]
+        for place, one in enumerate(parts, start=1):
+            name = f"{path.stem}-{place}" if len(parts) > 1 else path.stem
+            found.append(replace(one.with_meta(name=name), start_time=0.0))
+    return found
 
 
 def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Reproduction:
@@ -118,19 +121,6 @@ def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Re
     from mckibben.papers.experiment import reproduce as run
 
     return run(**given, clear=False, progress=tell)
-
-
-def _only_news(tell: Callable[[float, str], None]) -> Callable[..., None]:
-    """Return what passes on progress when there is news."""
-    last = ""
-
-    def told(index: int, *what: Any) -> None:
-        nonlocal last
-        if what and what[1] != last:
-            last = what[1]
-            tell(*what)
-
-    return told
 
 
 def _list(as_json: bool) -> None:
@@ -145,18 +135,12 @@ def _list(as_json: bool) -> None:
         say(f"{number}. {name}: {title}\n   {question}")
 
 
-def _cell(cell: str | float | None) -> str:
-    if cell is None:
-        return "-"
-    return numeral(cell, 4) if isinstance(cell, float) else str(cell)
-
-
 def _print(found: Reproduction) -> None:
     from mckibben.report.reproduction import heading
 
     for table in found.tables:
         say(f"\n{heading(table, quick=found.quick)}")
-        rows = [[_cell(cell) for cell in row] for row in table.rows]
+        rows = [[c if isinstance(c, str) else numeral(c, 4) for c in row] for row in table.rows]
         print_table(table.columns, rows)
         if table.text.note:
             say(table.text.note)

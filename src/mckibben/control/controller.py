@@ -14,6 +14,8 @@ from mckibben.blocks.fields import Channel
 from mckibben.control.connecting import Offer
 from mckibben.control.preview import dead_time_undone
 
+Ahead = tuple[Array, Array]
+
 
 class Controller(ABC):
     """Asked once a control step for the commands of n muscles."""
@@ -36,7 +38,7 @@ class Controller(ABC):
         """Forget the past, and get ready for steps of so many seconds."""
 
     @abstractmethod
-    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
+    def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         """Return the commands to apply until the next step [bar or V], shape (n,).
 
         Parameters
@@ -47,19 +49,14 @@ class Controller(ABC):
             What `Offer.measured` just was.
         scheduled : array
             What schedules the model, `Offer.scheduled`: an extensor's pressure, a load.
+        ahead : (array, array)
+            Reference and schedule as far ahead as `preview` and `samples_ahead` say, for compensators.
         """
 
     @property
     def n_clipped(self) -> int:
         """How many samples its compensator has clipped by itself since the start."""
         return 0
-
-    def foresees(self, reference: Array, scheduled: Array) -> None:
-        """Learn reference and schedule as they will be then, before `step`, where they are known.
-
-        The compensator goes by these, feedback by those of `step`.
-        """
-        del reference, scheduled
 
     def applied(self, pressures: Array) -> None:
         """Learn what was applied in the end, after limits."""
@@ -100,7 +97,6 @@ class BlockController(Controller):
             self._beside = offer.inputs(self._pid, bases)
 
     def reset(self, sample_time: float) -> None:
-        self._ahead: tuple[Array, Array] | None = None
         self._stream = self._compensator.stream(sample_time)
         self._feedback = None if self._pid is None else self._pid.stream(sample_time)
         feels = any(channel.name.endswith(MEASURED) for channel in self._compensator.inputs)
@@ -108,13 +104,9 @@ class BlockController(Controller):
         # block knows; a plan takes what schedules as it is now
         self._foresees, self._plans = self.preview > 0.0 or not feels, self.samples_ahead > 0
 
-    def foresees(self, reference: Array, scheduled: Array) -> None:
-        self._ahead = reference, scheduled
-
-    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
-        wanted, beside = reference, scheduled
-        if self._ahead is not None and self._foresees:
-            wanted, beside = self._ahead[0], scheduled if self._plans else self._ahead[1]
+    def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
+        wanted, beside = ahead if self._foresees else (reference, scheduled)
+        beside = scheduled if self._plans else beside
         found = self._stream.step(self._inputs(np.concatenate((wanted, beside, measured))))
         if self._feedback is not None:
             given = np.concatenate((reference, scheduled, measured, found))

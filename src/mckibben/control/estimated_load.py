@@ -9,7 +9,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.control.connecting import Offer
-from mckibben.control.controller import Controller
+from mckibben.control.controller import Ahead, Controller
 from mckibben.errors import ModelError
 
 
@@ -55,19 +55,13 @@ class EstimatedLoad(Controller):
         self._stream = self.estimate.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
         self._load = np.zeros(len(self.estimate.outputs))
-        self._coming: tuple[Array, Array] | None = None
 
-    def foresees(self, reference: Array, scheduled: Array) -> None:
-        """Pass on the reference; the load to come is taken to be that of now."""
-        self._coming = reference, scheduled
-
-    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
+    def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
+        """Return the controller's commands; the load to come is taken to be that of now."""
         found = self._stream.step(self._inputs(measured))
         self._load = self._load + self._share * (found - self._load)
-        if self._coming is not None:
-            coming, beside = self._coming
-            self.controller.foresees(coming, np.concatenate((self._load, beside)))
-        return self.controller.step(reference, measured, np.concatenate((self._load, scheduled)))
+        now, then = (np.concatenate((self._load, beside)) for beside in (scheduled, ahead[1]))
+        return self.controller.step(reference, measured, now, (ahead[0], then))
 
     def applied(self, pressures: Array) -> None:
         self.controller.applied(pressures)

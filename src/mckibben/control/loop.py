@@ -215,10 +215,8 @@ def track(
             felt = late[0].copy()
             felt[at_y] += noise * rng.standard_normal(len(at_y))
             started = time.perf_counter()
-            if further > 0:
-                then = min(t + further, n - 1)
-                controller.foresees(path[then], scheduled[then])
-            wanted = controller.step(path[t], felt, scheduled[t])
+            then = min(t + further, n - 1)
+            wanted = controller.step(path[t], felt, scheduled[t], (path[then], scheduled[then]))
             times[t] = time.perf_counter() - started
             if wanted.shape != low.shape or not np.isfinite(wanted).all():
                 raise ModelError(

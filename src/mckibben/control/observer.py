@@ -15,7 +15,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.control.connecting import Offer
-from mckibben.control.controller import Controller
+from mckibben.control.controller import Ahead, Controller
 from mckibben.errors import ModelError
 
 
@@ -58,7 +58,6 @@ class DisturbanceObserver(Controller):
         self._modelled = offer.selected(references, model.outputs, block.title, model.title)
 
     def reset(self, sample_time: float) -> None:
-        self._coming: tuple[Array, Array] | None = None
         self._ahead = self.compensator.stream(sample_time)
         self._beside = self._model.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
@@ -66,18 +65,13 @@ class DisturbanceObserver(Controller):
         self._expected: Array | None = None
         self._scheduled = np.empty(0)
 
-    def foresees(self, reference: Array, scheduled: Array) -> None:
-        self._coming = (reference, scheduled)
-
-    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
+    def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         """Return the compensator's commands for the reference without the disturbance."""
         if self._expected is not None:
             surprise = self._measured(measured) - self._expected
             self._disturbance += self._share * (surprise - self._disturbance)
         self._scheduled = scheduled
-        if self._coming is not None:
-            reference, scheduled = self._coming
-        wanted = self._inputs(np.concatenate((reference, scheduled, measured)))
+        wanted = self._inputs(np.concatenate((*ahead, measured)))
         wanted[: self._disturbance.size] -= self._disturbance
         return self._commands(self._ahead.step(wanted))
 

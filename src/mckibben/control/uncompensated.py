@@ -16,7 +16,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.control.controller import Controller
+from mckibben.control.controller import Ahead, Controller
 from mckibben.control.loop import Tracked, track
 from mckibben.control.roles import Plant, asked, followed_by, roles
 from mckibben.control.suiting import doubts
@@ -45,7 +45,7 @@ class Rule(Controller):
     def reset(self, sample_time: float) -> None:
         """Do nothing: it has no memory."""
 
-    def step(self, reference: Array, measured: Array, scheduled: Array) -> Array:
+    def step(self, reference: Array, measured: Array, scheduled: Array, ahead: Ahead) -> Array:
         return self.commands(reference)
 
 

@@ -100,20 +100,9 @@ class Reproduction:
 class Fitted:
     """What a fit gave.
 
-    Parameters
-    ----------
-    block : Block
-        The model.
-    rmse : float
-        Its free-running error on the data fitted, in the unit of the output; of several the largest.
-    seconds : float
-        That the fit took [s].
-    n_free : int
-        Numbers that the fit was free to choose.
-    standard_errors : tuple of float
-        Of ``block.pack()``, NaN where not known; of several outputs none.
-    search : tuple of float
-        Least error so far, whenever the search reported it.
+    ``rmse`` is the free-running error on the data fitted, in the unit of the output, of several the
+    largest; ``standard_errors`` are of ``block.pack()``, NaN where not known; ``search`` is the least
+    error so far, whenever the search reported it.
     """
 
     __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
@@ -252,13 +241,20 @@ class Experiment:
         return runs
 
     def fit(
-        self, name: str, estimator: Any, recordings: Recording | Sequence[Recording], **how: Any
+        self,
+        name: str,
+        model: str,
+        recordings: Recording | Sequence[Recording],
+        settings: Mapping[str, Any] | None = None,
+        **how: Any,
     ) -> Fitted:
         """Return what an estimator finds on recordings, or found before the work was stopped.
 
-        The model is one of ``models`` from then on, under its name. ``how`` is what else its ``fit``
-        takes. Errors are those of its ``fit``.
+        The block is one of ``models`` from then on, under its name. ``model`` is the estimator's short
+        name; ``how`` is what else its ``fit`` takes. Errors are those of its ``fit``.
         """
+        made = registry.load("estimators", model)
+        estimator: Any = made(**{"seed": self.seed} | dict(settings or {}))
         search: list[float] = []
 
         def fit() -> Fitted:
@@ -272,8 +268,8 @@ class Experiment:
             error = float(np.max(found.rmse))
             return Fitted(estimator.model_, error, found.seconds, found.n_free, errors, best)
 
-        settings = (type(estimator).__name__, estimator.get_params())
-        fitted = self.kept.once(name, Fitted, fit, settings, recordings, how)
+        depends = model, estimator.get_params(), recordings, how
+        fitted = self.kept.once(name, Fitted, fit, *depends)
         self.models[name] = fitted.block
         return fitted
 
@@ -377,17 +373,13 @@ def reproduce(
     name : str
         As ``mckibben reproduce --list`` lists it.
     rig : Rig or str, optional
-        That is recorded, and on which loops are closed. Default the one that the paper's protocol was
-        made for; with ``data`` none.
+        That is recorded, and on which loops are closed; default the protocol's, with ``data`` none.
     data : sequence of Recording, optional
-        Recordings of one's own instead. What each is for is seen from what was driven: see ``data`` of
-        `mckibben.papers.paper.Paper`.
+        Recordings of one's own instead; what each is for is found from what was driven.
     quick : bool
-        Whether to leave out what takes long: under a minute then.
-    seed : int
-        Of everything random.
-    jobs : int, optional
-        Processes; default as many as there are cores.
+        Whether to leave out what takes long.
+    seed, jobs
+        Of everything random; processes, default as many as there are cores.
     folder : path, optional
         Where models are kept until all is done, so that a re-run that was stopped and is called again
         goes on from there.
@@ -399,10 +391,8 @@ def reproduce(
 
     Raises
     ------
-    ModelError
-        If there is no paper of that name; the text lists those there are.
-    DataError
-        If a recording that the experiment needs is not there.
+    ModelError, DataError
+        If there is no such paper, or a recording that it needs is missing.
     """
     rerun: Rerun = registry.load("papers", name)
     if data is not None and not data:

@@ -18,8 +18,6 @@ from mckibben.blocks.saving import part_from_dict
 from mckibben.errors import ModelError
 
 Words = Annotated[str, Field(min_length=1)]
-Printed = dict[str, dict[str, int | float]]
-"""Heading of a column -> name of a row -> the figure that the paper prints."""
 
 
 class _Strict(BaseModel):
@@ -29,19 +27,9 @@ class _Strict(BaseModel):
 class Item(_Strict):
     """A system, equation, table or figure of the paper.
 
-    Parameters
-    ----------
-    of : str
-        As the paper numbers it: ``Eq. (3)``, ``Table 2``.
-    what : str
-        What it is.
-    here : str
-        Where it lives: a table or figure of the re-run, or a printed model, by its key (``table:KEY``,
-        ``figure:KEY``, ``model:NAME``), a rig, a module or class, or nothing.
-    differs : str
-        How it differs from what is printed; empty where it is exact.
-    command : str
-        What computes it.
+    ``of`` is its number in the paper. ``here`` is a table or figure of the re-run or a printed model by
+    its key (``table:KEY``, ``figure:KEY``, ``model:NAME``), a rig, a module or class, or nothing.
+    ``differs`` is empty where it is exact; ``command`` computes it.
     """
 
     of: Words
@@ -54,44 +42,23 @@ class Item(_Strict):
 class TableText(_Strict):
     """What a table of the re-run is called, and what the paper prints in it.
 
-    Parameters
-    ----------
-    title : str
-        May have fields in braces, which the experiment fills.
-    of : str
-        The table or figure of the paper that it stands beside; empty for ours.
-    rows : str
-        Heading of the first column.
-    note : str
-        How it was made; may have fields, too.
-    printed : mapping
-        The paper's figures, by column and row.
-    drawn : str
-        What its columns measure, with the unit, if printed and ours are drawn; else empty.
-    bound : float, optional
-        What the paper says that its figures are below, where it prints no more.
+    Title and note may have fields in braces, which the experiment fills. ``of`` is the paper's table or
+    figure, empty for ours; ``rows`` the heading of the first column; ``printed`` the paper's figures by
+    column and row. ``drawn`` is what its columns measure, with the unit, if printed and ours are drawn;
+    ``bound`` what the paper says that its figures are below, where it prints no more.
     """
 
     title: Words
     of: str = ""
     rows: str = "model"
     note: str = ""
-    printed: Printed = {}
+    printed: dict[str, dict[str, int | float]] = {}
     drawn: str = ""
     bound: float | None = None
 
 
 class FigureText(_Strict):
-    """What a figure of the re-run is called, and its axes.
-
-    Parameters
-    ----------
-    title : str
-    of : str
-        The figure of the paper that it redraws; empty for ours.
-    x, y : str
-        Labels of the axes, with units.
-    """
+    """What a figure of the re-run is called, the paper's that it redraws, and labels of the axes."""
 
     title: Words
     of: str = ""
@@ -102,32 +69,10 @@ class FigureText(_Strict):
 class Paper(_Strict):
     """A paper.
 
-    Parameters
-    ----------
-    number : int
-        Among the papers here.
-    title, question : str
-        What it is called, and what its experiment answers.
-    authors, published, doi : str
-        Who, where and when; empty where the text does not say.
-    protocol : str
-        What is driven and measured.
-    data : str
-        What recordings of one's own it needs.
-    given, found : tuple of str
-        What is taken from the paper, or set, and what the recordings determine.
-    summary : mapping of str to str
-        Sentences with fields in braces, which the experiment fills; one without its fields is left out.
-    notes : tuple of str
-        What differs from the paper.
-    quick : str
-        What a quick run leaves out.
-    items : tuple of Item
-        Every system, equation, table and figure.
-    tables, figures : mapping
-        Of the re-run, by key.
-    models : mapping
-        Models as printed, by name, each as a model's file holds it.
+    ``data`` is what recordings of one's own it needs; ``given`` what is taken from the paper or set,
+    and ``found`` what the recordings determine. Sentences of ``summary`` have fields in braces, which
+    the experiment fills; one without its fields is left out. ``notes`` are what differs from the paper,
+    ``quick`` what a quick run leaves out. Tables, figures and printed models are by key.
     """
 
     number: int
@@ -155,13 +100,7 @@ class Paper(_Strict):
 
 @cache
 def paper(name: str) -> Paper:
-    """Return a paper by its short name.
-
-    Raises
-    ------
-    ModelError
-        If there is none of that name; the text lists those there are.
-    """
+    """Return a paper by its short name; a ModelError lists those there are."""
     module = registry.load("papers", name).run.__module__
     text = resources.files(module.rpartition(".")[0]).joinpath("paper.toml").read_text("utf-8")
     return Paper.model_validate(tomllib.loads(text))

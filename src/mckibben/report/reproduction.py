@@ -183,4 +183,4 @@ def _anchor(title: str) -> str:
 def _cell(cell: Cell) -> str:
     if cell is None:
         return ""
-    return numeral(cell, 4) if isinstance(cell, float) else str(cell).replace("|", "\\|")
+    return cell.replace("|", "\\|") if isinstance(cell, str) else numeral(cell, 4)

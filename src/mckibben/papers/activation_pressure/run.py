@@ -15,8 +15,6 @@ from mckibben.estimators.core.data import training_data
 from mckibben.estimators.force.activation import (
     FORCE_STEP,
     STATIC_SHARE,
-    ActivationMemoryEstimator,
-    ActivationPressureEstimator,
     by_force,
     dominant_frequency,
     outermost,
@@ -72,10 +70,9 @@ def run(experiment: Experiment) -> None:
     slow, sines, waves = map(by_condition, ("static", "hysteresis", "random"))
     train = [*slow.values(), *sines.values()]
     experiment.tell(0.82, "the paper's model")
-    theirs: Any = ActivationPressureEstimator(seed=experiment.seed)
-    theirs = experiment.fit(THEIRS, theirs, train).block
+    theirs: Any = experiment.fit(THEIRS, "activation-pressure", train).block
     experiment.tell(0.9, "ours")
-    experiment.fit(OURS, ActivationMemoryEstimator(seed=experiment.seed), train)
+    experiment.fit(OURS, "activation-memory", train)
     printed = experiment.paper.printed("activation-pressure-profile")
     study = Study(experiment, slow, sines, waves, printed, theirs)
     _scores(study, "sines", sines)

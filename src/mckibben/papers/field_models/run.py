@@ -18,7 +18,6 @@ from mckibben.metrics import score
 from mckibben.papers.experiment import Cell, Curves, Experiment, Labels, Rerun
 from mckibben.papers.paper import paper
 from mckibben.recording import Recording
-from mckibben.registry import load
 from mckibben.signals import reversals
 
 SEEDS, QUICK_SEEDS = 10, 3
@@ -38,7 +37,7 @@ FAILED = [np.inf, -np.inf, np.inf, -np.inf]
 """RMSE and fitness on calibration, then on test, of a seed that gave no model."""
 
 
-def methods(seed: int) -> dict[str, Any]:
+def methods() -> dict[str, tuple[str, dict[str, Any]]]:
     """Return the paper's four methods as published, and its PI model by least squares.
 
     Of the NARX model the paper prints neither regressors nor mapping: this one is a sigmoid network on
@@ -49,14 +48,13 @@ def methods(seed: int) -> dict[str, Any]:
     """
     thresholds = paper("field-models").models[PRINTED_PI]["thresholds"]
     network = {"n_units": 10, "delay": 1, "refine": False, "allow_unstable": True, "n_starts": 5}
-    settings: dict[str, tuple[str, dict[str, Any]]] = {
+    return {
         NARX: ("narx-network", network),
         BJ: ("bj", {"lags": (0, 2), "initial": "first_sample"}),
         P2UZ: ("p2uz", {"initial": "first_sample"}),
         SLOPES: ("pi", {"thresholds": thresholds, "method": "slopes"}),
         LEAST_SQUARES: ("pi", {"thresholds": thresholds}),
     }
-    return {name: load("estimators", of)(seed=seed, **how) for name, (of, how) in settings.items()}
 
 
 class Tried(NamedTuple):
@@ -153,16 +151,16 @@ def matched(model: Block, recording: Recording) -> Series:
 def _tried(
     experiment: Experiment, train: Recording, test: Recording, seeds: range
 ) -> dict[str, Tried]:
-    every = {seed: methods(seed) for seed in seeds}
-    tell, names = experiment.within(0.05, 0.3), [*every[seeds[0]]]
+    tell, every = experiment.within(0.05, 0.3), methods()
     found: dict[str, Tried] = {}
-    for place, name in enumerate(names):
+    for place, (name, (model, settings)) in enumerate(every.items()):
         models: list[tuple[Block, Series]] = []
         errors, failures = [], []
         for at, seed in enumerate(seeds):
-            tell((place + at / len(seeds)) / len(names), f"{name}, seed {seed}")
+            tell((place + at / len(seeds)) / len(every), f"{name}, seed {seed}")
             try:
-                plain = experiment.fit(f"{name} {seed}", every[seed][name], train).block
+                own = settings | {"seed": seed}
+                plain = experiment.fit(f"{name} {seed}", model, train, own).block
                 both = plain, matched(plain, train)
                 errors.append([_errors(model, train, test) for model in both])
                 models.append(both)

@@ -169,9 +169,8 @@ def _fit(study: Study) -> None:
     rows: dict[str, tuple[Cell, ...]] = {}
     for place, (name, family, settings, names) in enumerate(learners):
         experiment.tell(0.1 + 0.75 * place / len(learners), name)
-        given = {"input": (study.drive,), "seed": experiment.seed, **settings}
-        estimator = registry.load("estimators", family)(**given)
-        fitted = experiment.fit(name, estimator, [runs[run] for run in names])
+        own = {"input": (study.drive,)} | settings
+        fitted = experiment.fit(name, family, [runs[run] for run in names], own)
         study.learned[name] = names
         text = ", ".join(names) if names != train else "all training runs"
         rows[name] = text, fitted.seconds, fitted.n_free

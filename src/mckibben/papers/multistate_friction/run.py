@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.laws import PolynomialForce
@@ -51,6 +50,9 @@ MODELS: Mapping[str, tuple[str, dict[str, Any]]] = {
 }
 """Estimators of the hysteresis and their settings: the paper's sizes, where it gives one."""
 
+AT_ONCE: dict[str, Any] = {"output": HYSTERESIS, "initial": "first_sample"}
+"""Settings of models that begin within a motion."""
+
 FRICTIONS = (PAPERS, OURS, EIGHTEEN)
 CLOSED = {model: f"{model}, closed loop" for model in MODELS}
 """Names of the models that are fitted to the closed loop."""
@@ -77,10 +79,13 @@ def run(experiment: Experiment) -> None:
     experiment.tell(0.45, "friction")
     for model, name in CLOSED.items():
         fewer = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
-        closed = _estimator(model, experiment.seed, **fewer)
-        found.fitted[name] = experiment.fit(name, closed, found.loop)
-        whole, rested = found.runs[found.chosen], replace(closed, initial="virgin")
-        found.fitted[model] = experiment.fit(model, rested, whole)
+        of, settings = MODELS[model]
+        closed, rested = (
+            settings | AT_ONCE | fewer,
+            settings | AT_ONCE | fewer | {"initial": "virgin"},
+        )
+        found.fitted[name] = experiment.fit(name, of, found.loop, closed)
+        found.fitted[model] = experiment.fit(model, of, found.runs[found.chosen], rested)
     _errors(experiment, found)
     experiment.tell(0.65, "how far parameters are determined")
     for key, model in (("friction", PAPERS), ("friction_ours", OURS))[: 2 - experiment.quick]:
@@ -89,20 +94,13 @@ def run(experiment: Experiment) -> None:
     _feedforward(experiment, found)
 
 
-def _estimator(model: str, seed: int, **how: Any) -> Any:
-    name, settings = MODELS[model]
-    how |= {"output": HYSTERESIS, "seed": seed, "initial": "first_sample"}
-    return registry.load("estimators", name)(**settings, **how)
-
-
 def _static_laws(experiment: Experiment, isometric: Sequence[Recording]) -> PolynomialForce:
     """Add errors of force laws on the isometric runs, and coefficients and forces of the paper's."""
     rows: dict[str, list[Cell]] = {}
     measured = np.concatenate([one["force"] for one in isometric])
     others = ("force-chou", "force-tondu", "force-petrovic", "force-minh", "force-schindele")
     for name in (LAW, *others)[: 1 if experiment.quick else None]:
-        estimator = registry.load("estimators", name)(seed=experiment.seed)
-        fit = experiment.fit(name, estimator, isometric)
+        fit = experiment.fit(name, name, isometric)
         modelled = np.concatenate([experiment.simulate(name, one)["force"] for one in isometric])
         rows[full_name(name)] = [fit.rmse, score(measured, modelled).r2, fit.block.n_parameters]
     experiment.table("laws", ["RMSE [N]", "r²", "parameters"], rows)
@@ -181,9 +179,10 @@ report of a search to the next, and how near to its least error is near."""
 
 def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis) -> None:
     """Add the parameters of a friction, and how far the closed loop determines them."""
-    fits = [first := found.fitted[CLOSED[model]]]
+    fits, (of, settings) = [first := found.fitted[CLOSED[model]]], MODELS[model]
     for seed in range(experiment.seed + 1, experiment.seed + (2 if experiment.quick else 5)):
-        fits.append(experiment.fit(f"{model}, seed {seed}", _estimator(model, seed), found.loop))
+        own = settings | AT_ONCE | {"seed": seed}
+        fits.append(experiment.fit(f"{model}, seed {seed}", of, found.loop, own))
     ranked = [one.block.by_strength() for one in fits if isinstance(one.block, MultistateFriction)]
     friction, order = ranked[0]
     ranges = parameter_ranges(friction, found.loop, others=[other for other, _ in ranked[1:]])

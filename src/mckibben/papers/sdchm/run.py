@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.metrics import err, loop_width, rmse
@@ -106,12 +105,11 @@ def _fits(experiment: Experiment, runs: Runs) -> None:
     orders: dict[str, list[Cell]] = {}
     for n in (10,) if short else SIZES:
         for settings in (PAPERS, {"threshold_rule": "envelope", "initial": "first_sample"}):
-            channels = {"input": f"pressure_{k}", "output": f"displacement_{k}"}
-            gpi = registry.load("estimators", "gpi")(n_operators=n, seed=experiment.seed)
-            name = f"GPI {n}, {settings['threshold_rule']}"
-            fitted = experiment.fit(name, gpi.set_params(**channels, **settings), recording)
-            y = experiment.simulate(name, recording)[channels["output"]]
-            orders.setdefault(str(n), []).append(err(recording[channels["output"]], y))
+            y, name = f"displacement_{k}", f"GPI {n}, {settings['threshold_rule']}"
+            own = settings | {"input": f"pressure_{k}", "output": y, "n_operators": n}
+            fitted = experiment.fit(name, "gpi", recording, own)
+            error = err(recording[y], experiment.simulate(name, recording)[y])
+            orders.setdefault(str(n), []).append(error)
         orders[str(n)].append(fitted.n_free)
     columns = ["Err [%]", "Err, thresholds over the envelopes [%]", "parameters"]
     experiment.table("orders", columns, orders, muscle=k)
@@ -141,9 +139,8 @@ def _fits(experiment: Experiment, runs: Runs) -> None:
         several = name in (RAW, PUBLISHED) and all(sets) and not short
         tried: dict[float, Fitted] = {}
         for seed in range(experiment.seed, experiment.seed + (SEEDS if several else 1)):
-            estimator = registry.load("estimators", model)(seed=seed, **changes)
-            label = f"{name}, seed {seed}"
-            fitted = experiment.fit(label, estimator, train, validation=sets[0])
+            label, settings = f"{name}, seed {seed}", changes | {"seed": seed}
+            fitted = experiment.fit(label, model, train, settings, validation=sets[0])
             errors = [rms(_off(experiment, label, some)) for some in sets] if several else [0.0]
             tried[errors[0]] = fitted
             by_seed += [[name, seed, *errors]] if several else []

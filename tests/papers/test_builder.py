@@ -178,18 +178,23 @@ def test_sines_and_random_waves_are_seen_without_their_names(scale: float) -> No
     wanted = [run.name for run in plan.runs if run.labels["force"] in (50.0, 150.0)]
     rig = load_rig("mckibben-530").changed({"muscle.length": 530.0 * scale})
     rerun: Rerun = registry.load("papers", plan.name)
+    own = {"rest_length": 530.0 * scale}
     made = [
-        (run.labels, replace(one, meta={"name": run.name, "rest_length": 530.0 * scale}))
+        (run.labels, replace(one, meta=own | {"name": run.name}).with_derived(["contraction"]))
         for run, one in record(plan, rig, runs=wanted)
     ]
     found = rerun.sort([one for _, one in made])
     for (labels, one), labelled in zip(made, found, strict=True):
         assert labelled is not None
-        for label in ("stage", "force"):
-            assert labelled.labels[label] == labels[label], one.name
+        assert labelled.labels["stage"] == labels["stage"], one.name
+        assert labelled.labels["force"] == pytest.approx(labels["force"], abs=1.0)
         if labels["stage"] == "hysteresis":
             assert labelled.labels["frequency"] == labels["frequency"]
     with pytest.raises(DataError, match="sines"):
         rerun.sort([one for labels, one in made if labels["stage"] == "random"])
+    bare = [one.select(["pressure", "displacement", "force"]) for _, one in made]
+    bare = [replace(one, meta={}) for one in bare]
     with pytest.raises(DataError, match="--rest-length"):
-        rerun.sort([replace(one, meta={}) for _, one in made])
+        reproduce("activation-pressure", data=bare)
+    with pytest.raises(DataError, match="slow cycle"):
+        rerun.sort([one for labels, one in made if labels["stage"] != "static"])

@@ -21,7 +21,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
 from mckibben.estimators.optimisers.tracker import whole_searches
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
-from mckibben.recording import Recording
+from mckibben.recording import REST_LENGTH, Recording, conversion
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, Role, protocol
 from mckibben.system.progress import telling
@@ -30,6 +30,8 @@ from mckibben.system.threads import one_blas_thread
 Cell = str | float | None
 Curves = Mapping[str, tuple[Array, Array]]
 Progress = Callable[[float, str], None]
+
+OWN = "Recordings of one's own: where words name the paper's signals, they are those of its rig."
 
 MOST = 2000
 """Points of a curve that is drawn."""
@@ -213,7 +215,7 @@ class Experiment:
             Share of the whole work that is done then.
         """
         if self.data is not None:
-            return self._given(self.data)
+            return self._given([self._complete(one) for one in self.data])
         plan = protocol(self.name, self.rig) if what is None else what
         names = [run.name for run in plan.runs] if names is None else names
         tell, runs = self.within(0.0, until), dict[str, Recording]()
@@ -222,6 +224,21 @@ class Experiment:
             runs[run.name] = recording
             tell(len(runs) / len(names), f"recorded {run.name}")
         return Runs(runs, {name: Labels(plan[name].role, plan[name].labels) for name in runs})
+
+    def _complete(self, one: Recording) -> Recording:
+        """Return a recording with all channels that the paper needs, or refuse it."""
+        one = one.with_derived(self.paper.channels)
+        for channel in self.paper.channels:
+            if channel not in one:
+                has = ", ".join(one.channels)
+                remedy = (
+                    f"--column {channel}=COLUMN, or take the file out if it is of something else"
+                )
+                if any(conversion(channel, name, 1.0) for name in one.channels):
+                    remedy = f"state {REST_LENGTH}"
+                problem = f"{self.name} needs it, and there are {has}"
+                raise DataError(problem, file=one.source, channel=channel, remedy=remedy)
+        return one
 
     def _given(self, data: Sequence[Recording]) -> Runs:
         """Return recordings with what they are for: as a rig has noted it, or by what was driven."""
@@ -309,6 +326,8 @@ class Experiment:
         ours = dict(zip([text.rows, *columns], zip(*lines, strict=True), strict=False))
         names = ours.get(text.rows, ())
         theirs = {of: [cells.get(str(n)) for n in names] for of, cells in text.printed.items()}
+        if self.data is not None:  # which need not have all that the paper has
+            theirs = {of: cells for of, cells in theirs.items() if of in ours}
         every: dict[str, Sequence[Cell]] = {}
         for column in dict.fromkeys((*ours, *theirs)):
             every |= {f"{column}, printed": theirs[column]} if column in theirs else {}
@@ -341,6 +360,7 @@ class Experiment:
         for text in self.paper.summary.values():
             if {name for _, name, _, _ in string.Formatter().parse(text) if name} <= {*self.facts}:
                 sentences.append(text.format(**self.facts))
+        own = [] if self.data is None else [OWN]
         return Reproduction(
             self.name,
             self.paper,
@@ -348,7 +368,7 @@ class Experiment:
             tuple(sentences),
             tuple(self.tables),
             tuple(self.figures),
-            (*self.paper.notes, *([self.paper.quick] if self.quick else []), *self.warned),
+            (*own, *self.paper.notes, *([self.paper.quick] if self.quick else []), *self.warned),
             self.quick,
             self.seed,
         )
@@ -400,6 +420,19 @@ def reproduce(
     if rig is None and data is None:
         rig = protocol(name).rig
     plant = load_rig(rig) if isinstance(rig, str) else rig
+    if plant is not None:
+        known = {
+            *plant.inputs,
+            *plant.outputs,
+            *(["contraction"] * ("displacement" in plant.outputs)),
+        }
+        for channel in paper(name).channels:
+            if channel not in known:
+                raise DataError(
+                    f"{name} needs it, and the rig {plant.name!r} has {', '.join(sorted(known))}",
+                    channel=channel,
+                    remedy=f"give a rig like {protocol(name).rig}",
+                )
     kept = Checkpoints(folder, name, quick, seed)
     with one_blas_thread(), telling(progress, name) as tell:
         experiment = Experiment(name, plant, data, quick, seed, jobs, kept, tell or _nobody)

@@ -83,6 +83,7 @@ class Paper(_Strict):
     doi: str = ""
     protocol: Words
     data: Words
+    channels: tuple[str, ...]
     given: tuple[Words, ...]
     found: tuple[Words, ...]
     summary: dict[str, Words]

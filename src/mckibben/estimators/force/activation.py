@@ -241,8 +241,8 @@ def dominant_frequency(run: Run) -> float:
 
 # -- characteristic points -------------------------------------------------------------------
 
-FORCE_STEP = 5.0
-"""Runs whose mean forces differ by less belong to one force [N]."""
+SAME_FORCE = 0.02
+"""Share of the largest mean force by which runs of one force differ at most."""
 
 LOW, HIGH = 0.07, 0.975
 """Boundaries of low and high pressure as shares of the range: Table 1 has y_3 at .028 and y_4 at
@@ -311,8 +311,9 @@ def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
     """Return which runs have one mean force [N], weakest first."""
     means = [float(run.scheduled.mean()) for run in runs]
     groups: dict[float, list[int]] = {}
+    apart = SAME_FORCE * max(map(abs, means))
     for i in np.argsort(means, kind="stable"):
-        near = next((force for force in groups if abs(force - means[i]) < FORCE_STEP), means[i])
+        near = next((force for force in groups if abs(force - means[i]) <= apart), means[i])
         groups.setdefault(near, []).append(int(i))
     return groups
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from mckibben.blocks.force.activation import ActivationPressure
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import training_data
 from mckibben.estimators.force.activation import (
-    FORCE_STEP,
     STATIC_SHARE,
     by_force,
     dominant_frequency,
@@ -33,8 +33,11 @@ QUICK = 3
 SHAPES = (100.0, 150.0)
 """Forces of the paper's Figure 10 [N]."""
 
-Recordings = Mapping[tuple[float, float], Recording]
-"""By force [N] and frequency [Hz]."""
+STRONGEST = 300.0
+"""Force up to which the printed profile holds [N]."""
+
+Recordings = Mapping[tuple[float, float, str], Recording]
+"""By force [N], frequency [Hz] and the name of their row."""
 
 BAR_PER_MPA = 10.0
 
@@ -61,11 +64,13 @@ def run(experiment: Experiment) -> None:
     runs = experiment.record(names=names, until=0.8)
 
     def by_condition(stage: str) -> Recordings:
-        found = {
-            (float(runs.of(name, "force")), float(runs.of(name, "frequency"))): runs[name]
-            for name in runs.names(stage=stage)
-        }
-        return {at: one.with_derived(["contraction"]) for at, one in sorted(found.items())}
+        found: dict[tuple[float, float, str], Recording] = {}
+        for name in runs.names(stage=stage):
+            force, frequency = float(runs.of(name, "force")), float(runs.of(name, "frequency"))
+            row = label(force, frequency)
+            row = f"{row}, {name}" if any(row == key[2] for key in found) else row
+            found[force, frequency, row] = runs[name].with_derived(["contraction"])
+        return dict(sorted(found.items()))
 
     slow, sines, waves = map(by_condition, ("static", "hysteresis", "random"))
     train = [*slow.values(), *sines.values()]
@@ -87,8 +92,7 @@ REPEATS = 0.1
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     """Tell slow cycles, sines and random waves apart, by the pressure, and under which force each is."""
-    whole = [one.with_derived(["contraction"]) for one in recordings]
-    runs = training_data(whole, "pressure", "contraction", None, ("force",)).runs
+    runs = training_data(recordings, "pressure", "contraction", None, ("force",)).runs
     forces = {i: force for force, own in by_force(runs).items() for i in own}
     at = [dominant_frequency(run) for run in runs]
     found: list[Labels | None] = []
@@ -99,22 +103,26 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
         repeats = peaks.size < 3 or float(np.ptp(peaks)) < REPEATS * float(np.ptp(pressure))
         slow = repeats and at[place] < STATIC_SHARE * max(at)
         stage = "static" if slow else "hysteresis" if repeats else "random"
-        force = FORCE_STEP * round(forces[place] / FORCE_STEP)
-        frequency = 0.0 if slow else round(20 * at[place]) / 20
-        labels = {"stage": stage, "force": force, "frequency": frequency}
+        labels = {
+            "stage": stage,
+            "force": forces[place],
+            "frequency": 0.0 if slow else float(f"{at[place]:.2g}"),
+        }
         found.append(Labels("test" if stage == "random" else "train", labels))
-    if not any(one and one.labels["stage"] == "hysteresis" for one in found):
-        raise DataError(
-            "no recording repeats a cycle of pressure",
-            channel="pressure",
-            remedy="record sines of the pressure, each at a held force",
-        )
+    stages = {one.labels["stage"] for one in found if one}
+    for stage, what in (("hysteresis", "sines"), ("static", "a slow cycle over its whole range")):
+        if stage not in stages:
+            raise DataError(
+                f"there are no {stage} runs: no recording has {what} of the pressure",
+                channel="pressure",
+                remedy=f"record {what}, at every force held",
+            )
     return found
 
 
 def label(force: float, frequency: float) -> str:
     """Return the name of a condition's row."""
-    return f"{force:.0f} N, {frequency:g} Hz"
+    return f"{abs(force) if abs(force) < 1 else force:.3g} N, {frequency:.2g} Hz"
 
 
 def static(model: ActivationPressure, recording: Recording) -> Array:
@@ -143,10 +151,10 @@ def static_rmse(model: ActivationPressure, runs: Iterable[Recording]) -> float:
 def _scores(study: Study, key: str, recordings: Recordings) -> None:
     """Add errors and correlations; give the worst, how many are above what is printed, and the ends."""
     rows: dict[str, list[float]] = {}
-    for (force, frequency), one in recordings.items():
+    for (_, frequency, row), one in recordings.items():
         y, both = one["pressure"], modelled(study, one, frequency).values()
         percents = [100 * rms(p - y) / float(np.ptp(y)) for p in both]
-        rows[label(force, frequency)] = [*percents, *(float(np.corrcoef(p, y)[0, 1]) for p in both)]
+        rows[row] = [*percents, *(float(np.corrcoef(p, y)[0, 1]) for p in both)]
     names = [f"{what}, {name}" for what in QUALITIES for name in (THEIRS, OURS)]
     study.experiment.table(key, names, rows)
     bound = study.experiment.paper.tables["sines"].bound or np.inf
@@ -165,20 +173,20 @@ ORDER = [2, 0, 1, 3]
 
 def _profile(study: Study) -> None:
     """Add the characteristic points at every force, and how far the static pressure is off."""
-    experiment, slow = study.experiment, study.slow or study.sines
+    experiment, slow = study.experiment, study.slow
+    known = all(abs(force) <= 1.1 * STRONGEST for force, *_ in slow)
+    models = {"printed": study.printed} if known else {}
     rows: dict[str, list[float]] = {}
-    for (force, _), recording in slow.items():
-        for whose, model in (("printed", study.printed), ("here", study.found)):
+    for (force, *_), recording in slow.items():
+        for whose, model in (models | {"here": study.found}).items():
             cells = np.concatenate([values[ORDER] for values in points(model, force)]).tolist()
-            rows[f"{force:.0f} N, {whose}"] = [*cells, static_rmse(model, [recording])]
+            rows[f"{force:.3g} N, {whose}"] = [*cells, static_rmse(model, [recording])]
     names = [f"e_{j + 1}" for j in ORDER] + [f"y_{j + 1} [bar]" for j in ORDER]
     experiment.table("points", [*names, "static RMSE [bar]"], rows)
-    experiment.says(
-        static=static_rmse(study.found, slow.values()),
-        static_printed=static_rmse(study.printed, slow.values()),
-        slope=study.found.gamma[0],
-        slope_printed=study.printed.gamma[0],
-    )
+    experiment.says(static=static_rmse(study.found, slow.values()))
+    for model in models.values():
+        experiment.says(static_printed=static_rmse(model, slow.values()))
+    experiment.says(slope=study.found.gamma[0], slope_printed=study.printed.gamma[0])
 
 
 def _constants(study: Study) -> None:
@@ -196,8 +204,8 @@ def _constants(study: Study) -> None:
 
 def _rates(study: Study) -> None:
     """Add gamma and phi, of which only the product has a meaning: gamma is 1 at mean frequency."""
-    frequencies = np.unique([frequency for _, frequency in study.sines])
-    forces = np.unique([force for force, _ in (*study.slow, *study.sines)])
+    frequencies = np.unique([frequency for _, frequency, _ in study.sines])
+    forces = np.unique([force for force, *_ in (*study.slow, *study.sines)])
     middle, columns = float(np.mean(frequencies)), []
     panels: dict[str, dict[str, tuple[Array, Array]]]
     panels = {"gamma by frequency [Hz]": {}, "phi by force [N]": {}}
@@ -209,7 +217,7 @@ def _rates(study: Study) -> None:
         panels["gamma by frequency [Hz]"][whose] = frequencies, gamma
         panels["phi by force [N]"][whose] = forces, phi
     names = ["slope of gamma [1/Hz]", *(f"gamma at {f:g} Hz" for f in frequencies)]
-    names += [f"phi at {f:.0f} N [bar s]" for f in forces]
+    names += [f"phi at {f:.3g} N [bar s]" for f in forces]
     rows = dict(zip(names, zip(*columns, strict=True), strict=True))
     study.experiment.table("rates", ["printed", "here"], rows, middle=middle)
     study.experiment.figure("rates", panels)
@@ -235,7 +243,7 @@ def _extremes(study: Study) -> None:
             "after": np.polyfit(*points(study.found, force), 3),
         }
         along = np.linspace(ends[0, 0], ends[1, 0], 400)
-        named = f"{abs(round(force)):d} N"
+        named = f"{abs(force):.3g} N"
         spans = float(np.ptp(e)), float(np.ptp(y))
         rows[named] = [_distance(c, along, end, spans) for c in cubics.values() for end in ends]
         for when, cubic in cubics.items():
@@ -267,28 +275,27 @@ def _loops(study: Study) -> None:
         for condition in _sample([*recordings]):
             one = recordings[condition]
             every = {one.origin: one["pressure"]} | modelled(study, one, condition[1])
-            panels[label(*condition)] = {n: (one["contraction"], p) for n, p in every.items()}
+            panels[condition[2]] = {n: (one["contraction"], p) for n, p in every.items()}
         study.experiment.figure(key, panels)
     shapes: dict[str, Curves] = {}
-    for (force, frequency), one in study.sines.items():
-        if force in SHAPES:
+    forces = [force for force, *_ in study.sines]
+    near = [min(forces, key=lambda force: abs(force - shape)) for shape in SHAPES]
+    for (force, frequency, row), one in study.sines.items():
+        if force in near:
             rest, e = static(study.found, one), one["contraction"]
             every = {"extracted": one["pressure"], THEIRS: modelled(study, one, frequency)[THEIRS]}
-            shapes[label(force, frequency)] = {n: (e, p - rest) for n, p in every.items()}
+            shapes[row] = {n: (e, p - rest) for n, p in every.items()}
     study.experiment.figure("shapes", shapes)
 
 
-def _sample(conditions: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return four conditions: weak and strong forces, low and high frequencies."""
-    if not conditions:
-        return []
-    forces, frequencies = (sorted(set(values)) for values in zip(*conditions, strict=True))
-    corners = [
-        (f, w)
-        for f in (forces[len(forces) // 2], forces[-1])
-        for w in (frequencies[len(frequencies) // 3], frequencies[-1])
-    ]
-    return [one for one in dict.fromkeys(corners) if one in conditions]
+def _sample(conditions: Sequence[tuple[float, float, str]]) -> list[tuple[float, float, str]]:
+    """Return up to four conditions: weak and strong forces, low and high frequencies."""
+    forces, frequencies = (sorted({one[place] for one in conditions}) for place in (0, 1))
+    wanted = product(
+        {len(forces) // 2, len(forces) - 1}, {len(frequencies) // 3, len(frequencies) - 1}
+    )
+    corners = {(forces[f], frequencies[w]) for f, w in wanted if conditions}
+    return list({one[:2]: one for one in conditions if one[:2] in corners}.values())
 
 
 RERUN = Rerun(run, sort)

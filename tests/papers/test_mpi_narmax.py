@@ -139,16 +139,20 @@ def test_what_is_needed_is_named(slim: Rig) -> None:
         sort([alone.select(["voltage", "displacement"]), pulled])
     with pytest.raises(DataError, match="pressure"):
         sort([alone.select(["voltage", "displacement", "force"]), pulled.select(OTHERS)])
-    roles = {one.role for one in sort([alone, pulled]) if one}
-    assert roles == {"train"}  # there is no other load to learn from
+    with pytest.raises(DataError, match="another load"):
+        sort([alone, pulled])
+    turned = alone.with_channels(displacement=-alone["displacement"])
+    with pytest.raises(DataError, match="--calibrate displacement"):
+        sort([turned, pulled])
 
 
 OTHERS = ["pressure", "displacement", "force"]
 
 
 @pytest.mark.long
-def test_two_recordings_of_another_muscle_are_enough(slim: Rig) -> None:
-    own = [recorded(slim, "alone", 5.0), recorded(slim, "pulled", 4.0, 30.0)]
+def test_three_recordings_of_another_muscle_are_enough(slim: Rig) -> None:
+    pulls = [recorded(slim, f"pulled-{force:g}", 4.0, force) for force in (20.0, 30.0)]
+    own = [recorded(slim, "alone", 5.0), *pulls]
     found = reproduce("mpi-narmax", data=[one.select(OTHERS) for one in own], quick=True)
     off = by_key(found.to_dict(), "mae")
     assert off[OURS]["status 4"] < 0.2 * off["MPI-1"]["status 4"]

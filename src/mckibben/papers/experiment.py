@@ -443,6 +443,22 @@ def reproduce(
     return experiment.done(on)
 
 
+def demand_rise(recordings: Sequence[Recording], by: str, channel: str) -> None:
+    """Refuse recordings in which a channel does not move, or falls as another rises."""
+    for one in recordings:
+        for name in (by, channel):
+            if np.ptp(one[name]) == 0:
+                remedy = "take the file out, or name another column"
+                raise DataError("it does not move", file=one.source, channel=name, remedy=remedy)
+        if np.corrcoef(one[by], one[channel])[0, 1] < 0:
+            raise DataError(
+                f"it falls as the {by} rises",
+                file=one.source,
+                channel=channel,
+                remedy=f"turn its sign: --calibrate {channel}=COLUMN:-1:0:{one.units[channel]}",
+            )
+
+
 def rms(errors: Array) -> float:
     """Return the root mean square."""
     return float(np.sqrt(np.mean(errors**2)))

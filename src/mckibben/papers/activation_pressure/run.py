@@ -19,7 +19,14 @@ from mckibben.estimators.force.activation import (
     dominant_frequency,
     outermost,
 )
-from mckibben.papers.experiment import Curves, Experiment, Labels, Rerun, rms
+from mckibben.papers.experiment import (
+    Curves,
+    Experiment,
+    Labels,
+    Rerun,
+    demand_rise,
+    rms,
+)
 from mckibben.recording import Recording
 from mckibben.signals import reversals
 from mckibben.signals.protocol import protocol
@@ -92,6 +99,7 @@ REPEATS = 0.1
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     """Tell slow cycles, sines and random waves apart, by the pressure, and under which force each is."""
+    demand_rise(recordings, "pressure", "contraction")
     runs = training_data(recordings, "pressure", "contraction", None, ("force",)).runs
     forces = {i: force for force, own in by_force(runs).items() for i in own}
     at = [dominant_frequency(run) for run in runs]

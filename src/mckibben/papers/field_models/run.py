@@ -15,7 +15,14 @@ from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.ranking import compare
 from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.metrics import score
-from mckibben.papers.experiment import Cell, Curves, Experiment, Labels, Rerun
+from mckibben.papers.experiment import (
+    Cell,
+    Curves,
+    Experiment,
+    Labels,
+    Rerun,
+    demand_rise,
+)
 from mckibben.papers.paper import paper
 from mckibben.recording import Recording
 from mckibben.signals import reversals
@@ -117,6 +124,8 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
             file=recordings[0].source,
             remedy="give one to calibrate and one to test, or cut it in two files",
         )
+
+    demand_rise(recordings, "pressure", "displacement")
 
     def rank(one: Recording) -> tuple[bool, float]:
         pressure = one["pressure"]

@@ -15,7 +15,15 @@ from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import BlockController, EstimatedLoad, track, tune_pid
 from mckibben.errors import DataError
 from mckibben.metrics import mae, rmse
-from mckibben.papers.experiment import Cell, Curves, Experiment, Labels, Rerun, Runs
+from mckibben.papers.experiment import (
+    Cell,
+    Curves,
+    Experiment,
+    Labels,
+    Rerun,
+    Runs,
+    demand_rise,
+)
 from mckibben.papers.mpi_narmax import protocol
 from mckibben.recording import Recording
 from mckibben.rigs import Rig
@@ -103,6 +111,11 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     for runs, what in ((by["free"], "without load"), (varying, "moved under a varying force")):
         if not runs:
             raise DataError(f"no recording is {what}", channel="force", remedy="record one, too")
+    free = [one for one, label in zip(recordings, labels, strict=True) if label in by["free"]]
+    demand_rise(free, drive, "displacement")
+    if len(by["weight"] + by["pulls"] + by["random"]) == 1:
+        remedy = "record another load: the strongest that varies is tested on"
+        raise DataError("there is one recording under a load", channel="force", remedy=remedy)
     by["free"][0]["status"] = 1
     numbers, last = chain((2, 3), count(VARYING + 1)), 0.0
     for one in sorted(by["weight"], key=lambda one: float(one["force"])):
@@ -110,8 +123,7 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
             one["status"], last = next(numbers), one["force"]
     strongest = max(varying, key=lambda one: float(one["force"]))
     strongest["status"] = VARYING
-    only = len(by["weight"] + by["pulls"] + by["random"]) == 1
-    tests = by["held"] + [strongest] * (not only) + by["random"][1:][-1:] * bool(by["pulls"])
+    tests = by["held"] + [strongest] + by["random"][1:][-1:] * bool(by["pulls"])
     for one in tests:
         one["role"] = "test"
     return [Labels(one.pop("role", "train"), one) for one in labels]
@@ -274,8 +286,10 @@ def _loops(study: Study) -> None:
 
 
 def _force(study: Study) -> None:
-    """Add the force estimated from displacement and pressure."""
+    """Add the force estimated from displacement and pressure, where pressure is recorded."""
     experiment, runs, test = study.experiment, study.runs, study.statuses[VARYING]
+    if not all("pressure" in one for one in runs.values()):
+        return
     known = experiment.models[PRESSURE if PRESSURE in study.learned else OURS]
     experiment.models["force"] = load_of(known)
     rows: dict[str, list[float]] = {}
@@ -302,9 +316,10 @@ def _track(study: Study, rig: Rig) -> None:
     laws = {
         "inverse without force": unloaded.model_.inverse(),
         "inverse with force": inverse,
-        "inverse, estimated force": EstimatedLoad(BlockController(inverse), models["force"]),
         "PID": tune_pid(rig, sample_time=step, scheduled={"force": 0.0}, seed=seed),
     }
+    if "force" in models:
+        laws["inverse, estimated force"] = EstimatedLoad(BlockController(inverse), models["force"])
     rows, drawn = {}, {"reference": (pulls.time, wave)}
     for name, law in laws.items():
         found = track(law, rig, reference, approach=10.0, settle=5.0, seed=seed)

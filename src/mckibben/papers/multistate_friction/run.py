@@ -19,7 +19,17 @@ from mckibben.estimators.catalogue import full_name
 from mckibben.estimators.core.ranges import parameter_ranges
 from mckibben.estimators.force.multistate import extract_hysteresis
 from mckibben.metrics import score
-from mckibben.papers.experiment import Cell, Curves, Experiment, Fitted, Labels, Rerun, Runs, rms
+from mckibben.papers.experiment import (
+    Cell,
+    Curves,
+    Experiment,
+    Fitted,
+    Labels,
+    Rerun,
+    Runs,
+    demand_rise,
+    rms,
+)
 from mckibben.papers.multistate_friction.protocol import SAMPLE_TIME
 from mckibben.recording import Recording
 from mckibben.signals import cycles
@@ -297,6 +307,8 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
         if (n := len({level for kind, level, _ in kinds if kind == held})) < least:
             message = f"it is held at {n} values while the {other} moves, of at least {least}"
             raise DataError(message, channel=held, remedy=f"record runs that hold the {held}")
+    isometric = [one for one, kind in zip(recordings, kinds, strict=True) if kind[0] == "length"]
+    demand_rise(isometric, "pressure", "force")
     loops = {place: kind for place, kind in enumerate(kinds) if kind[0] == "pressure"}
     chosen = min(loops, key=lambda place: (abs(loops[place][1] - top / 1.5), -loops[place][2]))
     stages = {"length": "static", "pressure": "friction"}

@@ -147,10 +147,10 @@ def _errors(experiment: Experiment, found: Hysteresis) -> None:
         r2, fit = score(found.loop[HYSTERESIS], modelled).r2, found.fitted[name]
         rows[model] = [fit.block.n_parameters, fit.rmse, r2]
         free = {title: experiment.simulate(model, one) for title, one in found.runs.items()}
-        lost = {
-            title: one[HYSTERESIS] - found.runs[title][HYSTERESIS] for title, one in free.items()
+        errors[model] = {
+            title: rms(free[title][HYSTERESIS] - one[HYSTERESIS])
+            for title, one in found.runs.items()
         }
-        errors[model] = {title: rms(values) for title, values in lost.items()}
     experiment.table("closed", ["parameters", "RMSE [N]", "r²"], rows, at=found.chosen)
     left = {model: found.fitted[name].rmse for model, name in CLOSED.items()}
     closer = sum(own < min(left[PAPERS], left[OURS]) for own in left.values())
@@ -187,14 +187,12 @@ def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis)
     friction, order = ranked[0]
     ranges = parameter_ranges(friction, found.loop, others=[other for other, _ in ranked[1:]])
     errors = np.array(first.standard_errors)[order]
-    theirs = {PAPERS: experiment.paper.printed("multistate-friction").values}.get(
-        model, (None,) * len(order)
-    )
+    printed = experiment.paper.printed("multistate-friction").values
+    theirs = printed if model == PAPERS else [math.nan] * len(order)
+    each = zip(theirs, friction.values, errors.tolist(), ranges.tolist(), strict=True)
     rows: dict[str, list[Cell]] = {}
-    for name, *three, (low, high) in zip(
-        friction.parameter_names, theirs, friction.values, errors, ranges.tolist(), strict=True
-    ):
-        cells = [None if x is None or math.isnan(x) else float(x) for x in three]
+    for name, (*three, (low, high)) in zip(friction.parameter_names, each, strict=True):
+        cells = [None if math.isnan(x) else x for x in three]
         ends: list[Cell] = [low, high if math.isfinite(high) else "any larger"]
         rows[name] = [*cells, *ends, "" if high < WIDE * low else "not determined"]
     columns = ["printed", "here", "standard error", "from", "to", "determined?"]

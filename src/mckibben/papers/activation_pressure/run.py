@@ -33,8 +33,10 @@ QUICK = 3
 SHAPES = (100.0, 150.0)
 """Forces of the paper's Figure 10 [N]."""
 
-Recordings = Mapping[tuple[float, float], Recording]
-"""By force [N] and frequency [Hz]."""
+Condition = tuple[float, float, str]
+"""Force [N], frequency [Hz], and name of the run."""
+
+Recordings = Mapping[Condition, Recording]
 
 BAR_PER_MPA = 10.0
 
@@ -62,7 +64,7 @@ def run(experiment: Experiment) -> None:
 
     def by_condition(stage: str) -> Recordings:
         found = {
-            (float(runs.of(name, "force")), float(runs.of(name, "frequency"))): runs[name]
+            (float(runs.of(name, "force")), float(runs.of(name, "frequency")), name): runs[name]
             for name in runs.names(stage=stage)
         }
         return {at: one.with_derived(["contraction"]) for at, one in sorted(found.items())}
@@ -112,9 +114,13 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     return found
 
 
-def label(force: float, frequency: float) -> str:
-    """Return the name of a condition's row."""
-    return f"{force:.0f} N, {frequency:g} Hz"
+def labelled(recordings: Recordings) -> dict[str, tuple[float, Recording]]:
+    """Return frequency and recording by the name of its row: the condition, and the run of several."""
+    found: dict[str, tuple[float, Recording]] = {}
+    for (force, frequency, name), one in recordings.items():
+        label = f"{force:.0f} N, {frequency:g} Hz"
+        found[f"{label}, {name}" if label in found else label] = frequency, one
+    return found
 
 
 def static(model: ActivationPressure, recording: Recording) -> Array:
@@ -143,10 +149,10 @@ def static_rmse(model: ActivationPressure, runs: Iterable[Recording]) -> float:
 def _scores(study: Study, key: str, recordings: Recordings) -> None:
     """Add errors and correlations; give the worst, how many are above what is printed, and the ends."""
     rows: dict[str, list[float]] = {}
-    for (force, frequency), one in recordings.items():
+    for label, (frequency, one) in labelled(recordings).items():
         y, both = one["pressure"], modelled(study, one, frequency).values()
         percents = [100 * rms(p - y) / float(np.ptp(y)) for p in both]
-        rows[label(force, frequency)] = [*percents, *(float(np.corrcoef(p, y)[0, 1]) for p in both)]
+        rows[label] = [*percents, *(float(np.corrcoef(p, y)[0, 1]) for p in both)]
     names = [f"{what}, {name}" for what in QUALITIES for name in (THEIRS, OURS)]
     study.experiment.table(key, names, rows)
     bound = study.experiment.paper.tables["sines"].bound or np.inf
@@ -167,10 +173,11 @@ def _profile(study: Study) -> None:
     """Add the characteristic points at every force, and how far the static pressure is off."""
     experiment, slow = study.experiment, study.slow or study.sines
     rows: dict[str, list[float]] = {}
-    for (force, _), recording in slow.items():
+    for force in dict.fromkeys(force for force, _, _ in slow):
+        own = [one for at, one in slow.items() if at[0] == force]
         for whose, model in (("printed", study.printed), ("here", study.found)):
             cells = np.concatenate([values[ORDER] for values in points(model, force)]).tolist()
-            rows[f"{force:.0f} N, {whose}"] = [*cells, static_rmse(model, [recording])]
+            rows[f"{force:.0f} N, {whose}"] = [*cells, static_rmse(model, own)]
     names = [f"e_{j + 1}" for j in ORDER] + [f"y_{j + 1} [bar]" for j in ORDER]
     experiment.table("points", [*names, "static RMSE [bar]"], rows)
     experiment.says(
@@ -196,8 +203,8 @@ def _constants(study: Study) -> None:
 
 def _rates(study: Study) -> None:
     """Add gamma and phi, of which only the product has a meaning: gamma is 1 at mean frequency."""
-    frequencies = np.unique([frequency for _, frequency in study.sines])
-    forces = np.unique([force for force, _ in (*study.slow, *study.sines)])
+    frequencies = np.unique([frequency for _, frequency, _ in study.sines])
+    forces = np.unique([force for force, _, _ in (*study.slow, *study.sines)])
     middle, columns = float(np.mean(frequencies)), []
     panels: dict[str, dict[str, tuple[Array, Array]]]
     panels = {"gamma by frequency [Hz]": {}, "phi by force [N]": {}}
@@ -261,31 +268,32 @@ def _loops(study: Study) -> None:
     """Add loops of sines and random waves, and the hysteresis extracted from them."""
     for key, recordings in (("sines", study.sines), ("waves", study.waves)):
         panels: dict[str, Curves] = {}
-        for condition in _sample([*recordings]):
-            one = recordings[condition]
-            every = {one.origin: one["pressure"]} | modelled(study, one, condition[1])
-            panels[label(*condition)] = {n: (one["contraction"], p) for n, p in every.items()}
+        sample = {at: recordings[at] for at in _sample([*recordings])}
+        for label, (frequency, one) in labelled(sample).items():
+            every = {one.origin: one["pressure"]} | modelled(study, one, frequency)
+            panels[label] = {n: (one["contraction"], p) for n, p in every.items()}
         study.experiment.figure(key, panels)
     shapes: dict[str, Curves] = {}
-    for (force, frequency), one in study.sines.items():
-        if force in SHAPES:
-            rest, e = static(study.found, one), one["contraction"]
-            every = {"extracted": one["pressure"], THEIRS: modelled(study, one, frequency)[THEIRS]}
-            shapes[label(force, frequency)] = {n: (e, p - rest) for n, p in every.items()}
+    shown = {at: one for at, one in study.sines.items() if at[0] in SHAPES}
+    for label, (frequency, one) in labelled(shown).items():
+        rest, e = static(study.found, one), one["contraction"]
+        every = {"extracted": one["pressure"], THEIRS: modelled(study, one, frequency)[THEIRS]}
+        shapes[label] = {n: (e, p - rest) for n, p in every.items()}
     study.experiment.figure("shapes", shapes)
 
 
-def _sample(conditions: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+def _sample(conditions: Sequence[Condition]) -> list[Condition]:
     """Return four conditions: weak and strong forces, low and high frequencies."""
     if not conditions:
         return []
-    forces, frequencies = (sorted(set(values)) for values in zip(*conditions, strict=True))
+    first = {at[:2]: at for at in reversed(conditions)}
+    forces, frequencies = (sorted(set(values)) for values in zip(*first, strict=True))
     corners = [
         (f, w)
         for f in (forces[len(forces) // 2], forces[-1])
         for w in (frequencies[len(frequencies) // 3], frequencies[-1])
     ]
-    return [one for one in dict.fromkeys(corners) if one in conditions]
+    return [first[at] for at in dict.fromkeys(corners) if at in first]
 
 
 RERUN = Rerun(run, sort)

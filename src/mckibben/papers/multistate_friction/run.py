@@ -50,7 +50,7 @@ MODELS: Mapping[str, tuple[str, dict[str, Any]]] = {
 }
 """Estimators of the hysteresis and their settings: the paper's sizes, where it gives one."""
 
-AT_ONCE: dict[str, Any] = {"output": HYSTERESIS, "initial": "first_sample"}
+FROM_FIRST_SAMPLE: dict[str, Any] = {"output": HYSTERESIS, "initial": "first_sample"}
 """Settings of models that begin within a motion."""
 
 FRICTIONS = (PAPERS, OURS, EIGHTEEN)
@@ -78,14 +78,12 @@ def run(experiment: Experiment) -> None:
     found = _hysteresis(runs, _static_laws(experiment, isometric))
     experiment.tell(0.45, "friction")
     for model, name in CLOSED.items():
-        fewer = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
         of, settings = MODELS[model]
-        closed, rested = (
-            settings | AT_ONCE | fewer,
-            settings | AT_ONCE | fewer | {"initial": "virgin"},
-        )
+        fewer = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
+        closed = settings | FROM_FIRST_SAMPLE | fewer
         found.fitted[name] = experiment.fit(name, of, found.loop, closed)
-        found.fitted[model] = experiment.fit(model, of, found.runs[found.chosen], rested)
+        whole, rested = found.runs[found.chosen], closed | {"initial": "virgin"}
+        found.fitted[model] = experiment.fit(model, of, whole, rested)
     _errors(experiment, found)
     experiment.tell(0.65, "how far parameters are determined")
     for key, model in (("friction", PAPERS), ("friction_ours", OURS))[: 2 - experiment.quick]:
@@ -181,7 +179,7 @@ def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis)
     """Add the parameters of a friction, and how far the closed loop determines them."""
     fits, (of, settings) = [first := found.fitted[CLOSED[model]]], MODELS[model]
     for seed in range(experiment.seed + 1, experiment.seed + (2 if experiment.quick else 5)):
-        own = settings | AT_ONCE | {"seed": seed}
+        own = settings | FROM_FIRST_SAMPLE | {"seed": seed}
         fits.append(experiment.fit(f"{model}, seed {seed}", of, found.loop, own))
     ranked = [one.block.by_strength() for one in fits if isinstance(one.block, MultistateFriction)]
     friction, order = ranked[0]

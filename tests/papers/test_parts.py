@@ -13,6 +13,7 @@ from mckibben import GPI, Recording, registry
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.core.estimator import Estimator
+from mckibben.papers.activation_pressure.run import labelled
 from mckibben.papers.experiment import Experiment
 from mckibben.rigs import load_rig
 from mckibben.signals import triangle
@@ -84,3 +85,8 @@ def test_box_jenkins_finds_a_numerator_of_the_printed_structure() -> None:
     assert isinstance(model, TransferFunction)
     assert model.numerator[1] == 0.0
     assert model.numerator == pytest.approx((0.8, 0.0, -0.3), abs=0.01)
+
+
+def test_runs_of_one_condition_have_rows_of_their_own(recording: Recording) -> None:
+    runs = {(50.0, 1.0, name): recording for name in ("a", "b")}
+    assert [*labelled(runs)] == ["50 N, 1 Hz", "50 N, 1 Hz, b"]

@@ -20,8 +20,8 @@ from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.files.channels import NAME, Folder, describing, description
-from mckibben.files.formats import reason
-from mckibben.files.sources import inside
+from mckibben.files.formats import SOUGHT, reason
+from mckibben.files.sources import inside, is_bag
 from mckibben.recording import Recording
 from mckibben.signals import resample
 
@@ -210,10 +210,8 @@ def sets_in(folder: Path) -> list[Set]:
 
 
 def _has_recordings(place: Path) -> bool:
-    try:
-        return bool(inside(place))
-    except DataError:
-        return False
+    every = (place, *place.iterdir())
+    return any(is_bag(one) or one.suffix.casefold() in SOUGHT for one in every)
 
 
 def _set(place: Path) -> Set:

@@ -37,7 +37,7 @@ MOST = 2000
 """Points of a curve that is drawn."""
 
 
-def _nobody(share: float, text: str) -> None:
+def _no_progress(share: float, text: str) -> None:
     """Take no notice of progress."""
 
 
@@ -181,7 +181,7 @@ class Experiment:
     seed: int = 0
     jobs: int | None = None
     kept: Checkpoints = field(default_factory=lambda: Checkpoints(None))
-    tell: Progress = _nobody
+    tell: Progress = _no_progress
 
     def __post_init__(self) -> None:
         self.paper = paper(self.name)
@@ -435,7 +435,7 @@ def reproduce(
                 )
     kept = Checkpoints(folder, name, quick, seed)
     with one_blas_thread(), telling(progress, name) as tell:
-        experiment = Experiment(name, plant, data, quick, seed, jobs, kept, tell or _nobody)
+        experiment = Experiment(name, plant, data, quick, seed, jobs, kept, tell or _no_progress)
         rerun.run(experiment)
     if clear:
         kept.clear()

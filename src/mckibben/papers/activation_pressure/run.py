@@ -185,10 +185,11 @@ def _profile(study: Study) -> None:
     known = all(abs(force) <= 1.1 * STRONGEST for force, *_ in slow)
     models = {"printed": study.printed} if known else {}
     rows: dict[str, list[float]] = {}
-    for (force, *_), recording in slow.items():
+    for force in dict.fromkeys(force for force, *_ in slow):
+        own = [one for at, one in slow.items() if at[0] == force]
         for whose, model in (models | {"here": study.found}).items():
             cells = np.concatenate([values[ORDER] for values in points(model, force)]).tolist()
-            rows[f"{force:.3g} N, {whose}"] = [*cells, static_rmse(model, [recording])]
+            rows[f"{force:.3g} N, {whose}"] = [*cells, static_rmse(model, own)]
     names = [f"e_{j + 1}" for j in ORDER] + [f"y_{j + 1} [bar]" for j in ORDER]
     experiment.table("points", [*names, "static RMSE [bar]"], rows)
     experiment.says(static=static_rmse(study.found, slow.values()))

@@ -60,7 +60,7 @@ MODELS: Mapping[str, tuple[str, dict[str, Any]]] = {
 }
 """Estimators of the hysteresis and their settings: the paper's sizes, where it gives one."""
 
-AT_ONCE: dict[str, Any] = {"output": HYSTERESIS, "initial": "first_sample"}
+FROM_FIRST_SAMPLE: dict[str, Any] = {"output": HYSTERESIS, "initial": "first_sample"}
 """Settings of models that begin within a motion."""
 
 FRICTIONS = (PAPERS, OURS, EIGHTEEN)
@@ -88,14 +88,12 @@ def run(experiment: Experiment) -> None:
     found = _hysteresis(runs, _static_laws(experiment, isometric))
     experiment.tell(0.45, "friction")
     for model, name in CLOSED.items():
-        fewer = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
         of, settings = MODELS[model]
-        closed, rested = (
-            settings | AT_ONCE | fewer,
-            settings | AT_ONCE | fewer | {"initial": "virgin"},
-        )
+        fewer = {"n_refined": 4} if experiment.quick and model in FRICTIONS else {}
+        closed = settings | FROM_FIRST_SAMPLE | fewer
         found.fitted[name] = experiment.fit(name, of, found.loop, closed)
-        found.fitted[model] = experiment.fit(model, of, found.runs[found.chosen], rested)
+        whole, rested = found.runs[found.chosen], closed | {"initial": "virgin"}
+        found.fitted[model] = experiment.fit(model, of, whole, rested)
     _errors(experiment, found)
     experiment.tell(0.65, "how far parameters are determined")
     for key, model in (("friction", PAPERS), ("friction_ours", OURS))[: 2 - experiment.quick]:
@@ -157,10 +155,10 @@ def _errors(experiment: Experiment, found: Hysteresis) -> None:
         r2, fit = score(found.loop[HYSTERESIS], modelled).r2, found.fitted[name]
         rows[model] = [fit.n_free, fit.rmse, r2]
         free = {title: experiment.simulate(model, one) for title, one in found.runs.items()}
-        lost = {
-            title: one[HYSTERESIS] - found.runs[title][HYSTERESIS] for title, one in free.items()
+        errors[model] = {
+            title: rms(free[title][HYSTERESIS] - one[HYSTERESIS])
+            for title, one in found.runs.items()
         }
-        errors[model] = {title: rms(values) for title, values in lost.items()}
     experiment.table("closed", ["parameters", "RMSE [N]", "r²"], rows, at=found.chosen)
     left = {model: found.fitted[name].rmse for model, name in CLOSED.items()}
     closer = sum(own < min(left[PAPERS], left[OURS]) for own in left.values())
@@ -191,20 +189,18 @@ def _parameters(experiment: Experiment, key: str, model: str, found: Hysteresis)
     """Add the parameters of a friction, and how far the closed loop determines them."""
     fits, (of, settings) = [first := found.fitted[CLOSED[model]]], MODELS[model]
     for seed in range(experiment.seed + 1, experiment.seed + (2 if experiment.quick else 5)):
-        own = settings | AT_ONCE | {"seed": seed}
+        own = settings | FROM_FIRST_SAMPLE | {"seed": seed}
         fits.append(experiment.fit(f"{model}, seed {seed}", of, found.loop, own))
     ranked = [one.block.by_strength() for one in fits if isinstance(one.block, MultistateFriction)]
     friction, order = ranked[0]
     ranges = parameter_ranges(friction, found.loop, others=[other for other, _ in ranked[1:]])
     errors = np.array(first.standard_errors)[order]
-    theirs = {PAPERS: experiment.paper.printed("multistate-friction").values}.get(
-        model, (None,) * len(order)
-    )
+    printed = experiment.paper.printed("multistate-friction").values
+    theirs = printed if model == PAPERS else [math.nan] * len(order)
+    each = zip(theirs, friction.values, errors.tolist(), ranges.tolist(), strict=True)
     rows: dict[str, list[Cell]] = {}
-    for name, *three, (low, high) in zip(
-        friction.parameter_names, theirs, friction.values, errors, ranges.tolist(), strict=True
-    ):
-        cells = [None if x is None or math.isnan(x) else float(x) for x in three]
+    for name, (*three, (low, high)) in zip(friction.parameter_names, each, strict=True):
+        cells = [None if math.isnan(x) else x for x in three]
         ends: list[Cell] = [low, high if math.isfinite(high) else "any larger"]
         rows[name] = [*cells, *ends, "" if high < WIDE * low else "not determined"]
     columns = ["printed", "here", "standard error", "from", "to", "determined?"]

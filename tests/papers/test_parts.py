@@ -13,8 +13,8 @@ from mckibben import GPI, Recording, registry
 from mckibben.blocks.dynamics.transfer_function import TransferFunction
 from mckibben.checkpoints import Checkpoints
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.papers.activation_pressure.run import labelled
-from mckibben.papers.experiment import Experiment
+from mckibben.papers.activation_pressure.run import by_condition
+from mckibben.papers.experiment import Experiment, Labels, Runs
 from mckibben.rigs import load_rig
 from mckibben.signals import triangle
 from mckibben.signals.protocol import protocol
@@ -88,5 +88,6 @@ def test_box_jenkins_finds_a_numerator_of_the_printed_structure() -> None:
 
 
 def test_runs_of_one_condition_have_rows_of_their_own(recording: Recording) -> None:
-    runs = {(50.0, 1.0, name): recording for name in ("a", "b")}
-    assert [*labelled(runs)] == ["50 N, 1 Hz", "50 N, 1 Hz, b"]
+    labels = Labels("train", {"stage": "static", "force": 50.0, "frequency": 1.0})
+    runs = Runs({"a": recording, "b": recording}, {"a": labels, "b": labels})
+    assert [row for *_, row in by_condition(runs, "static")] == ["50 N, 1 Hz", "50 N, 1 Hz, b"]

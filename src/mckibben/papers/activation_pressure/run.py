@@ -24,6 +24,7 @@ from mckibben.papers.experiment import (
     Experiment,
     Labels,
     Rerun,
+    Runs,
     demand_rise,
     rms,
 )
@@ -70,16 +71,7 @@ def run(experiment: Experiment) -> None:
         names = [run.name for run in planned if run.labels["force"] in forces]
     runs = experiment.record(names=names, until=0.8)
 
-    def by_condition(stage: str) -> Recordings:
-        found: dict[tuple[float, float, str], Recording] = {}
-        for name in runs.names(stage=stage):
-            force, frequency = float(runs.of(name, "force")), float(runs.of(name, "frequency"))
-            row = label(force, frequency)
-            row = f"{row}, {name}" if any(row == key[2] for key in found) else row
-            found[force, frequency, row] = runs[name].with_derived(["contraction"])
-        return dict(sorted(found.items()))
-
-    slow, sines, waves = map(by_condition, ("static", "hysteresis", "random"))
+    slow, sines, waves = (by_condition(runs, s) for s in ("static", "hysteresis", "random"))
     train = [*slow.values(), *sines.values()]
     experiment.tell(0.82, "the paper's model")
     theirs: Any = experiment.fit(THEIRS, "activation-pressure", train).block
@@ -91,6 +83,17 @@ def run(experiment: Experiment) -> None:
     _scores(study, "waves", waves)
     for part in (_profile, _constants, _rates, _extremes, _loops):
         part(study)
+
+
+def by_condition(runs: Runs, stage: str) -> Recordings:
+    """Return the recordings of a stage; those of one condition have the run in the name of their row."""
+    found: dict[tuple[float, float, str], Recording] = {}
+    for name in runs.names(stage=stage):
+        force, frequency = float(runs.of(name, "force")), float(runs.of(name, "frequency"))
+        row = f"{abs(force) if abs(force) < 1 else force:.3g} N, {frequency:.2g} Hz"
+        row = f"{row}, {name}" if any(row == key[2] for key in found) else row
+        found[force, frequency, row] = runs[name].with_derived(["contraction"])
+    return dict(sorted(found.items()))
 
 
 REPEATS = 0.1
@@ -126,11 +129,6 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
                 remedy=f"record {what}, at every force held",
             )
     return found
-
-
-def label(force: float, frequency: float) -> str:
-    """Return the name of a condition's row."""
-    return f"{abs(force) if abs(force) < 1 else force:.3g} N, {frequency:.2g} Hz"
 
 
 def static(model: ActivationPressure, recording: Recording) -> Array:

@@ -61,7 +61,9 @@ def inside(path: Path) -> list[Path]:
     bags = [each for each in _listed(path) if is_bag(each)]
     found = _files(path) + bags
     if not found:
-        raise DataError("there is no recording in the folder", file=path, remedy="name files")
+        raise DataError(
+            "there is no recording in the folder", file=path, remedy="put recordings in it"
+        )
     if os.path.lexists(path / PROTOCOL):
         return found
     settings = described(path)

@@ -228,6 +228,7 @@ class Rig(DrawsItself, Section, ABC):
         # A held command is seen from the next sample on.
         seen = np.vstack([self.resting, given[:-1]]) if held else given
         readings = self._readings(traces, seen)
+        self._refuse_divergence(readings)
         if ideal:
             readings |= _inside(traces)
         else:
@@ -252,6 +253,17 @@ class Rig(DrawsItself, Section, ABC):
                 **({"saturated": saturated} if saturated else {}),
             },
         )
+
+    def _refuse_divergence(self, readings: Mapping[str, Array]) -> None:
+        """Refuse what no muscle does: pressure far above the supply, or no number at all."""
+        for name, samples in readings.items():
+            high = 2 * self.air.supply if quantity(name) == "pressure" else np.inf
+            if not (np.abs(samples) < high).all():
+                raise DataError(
+                    f"the simulation of {self.name!r} diverges: its steps are too long for it",
+                    channel=name,
+                    remedy=f"set integration_step to {self.integration_step / 5:g}, or more moved_mass",
+                )
 
     def reset(self, seed: int = 0) -> Array:
         """Bring the rig to rest and return its first measurement, in the order of ``outputs``.

@@ -358,7 +358,8 @@ class Experiment:
         """Return all that came out; a sentence without its facts is left out."""
         sentences = []
         for text in self.paper.summary.values():
-            if {name for _, name, _, _ in string.Formatter().parse(text) if name} <= {*self.facts}:
+            fields = (name for _, name, _, _ in string.Formatter().parse(text) if name)
+            if {name.partition("[")[0] for name in fields} <= {*self.facts}:
                 sentences.append(text.format(**self.facts))
         own = [] if self.data is None else [OWN]
         return Reproduction(

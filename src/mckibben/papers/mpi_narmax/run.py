@@ -35,7 +35,7 @@ AS_PRINTED, ALL_RATES, PLAIN = "MPI-NARMAX", "MPI-NARMAX, all rates", "MPI-NARMA
 MORE, OURS, PRESSURE = "MPI-NARMAX, more records", "balance", "balance, on recorded pressure"
 HEADLINE = (AS_PRINTED, ALL_RATES, PLAIN, OURS)
 
-FREE, CONSTANT, STILL, REPEATS = 0.1, 0.25, 0.1, 0.1
+FREE, CONSTANT, STILL, REPEATS = 0.1, 0.5, 0.1, 0.1
 """Shares: of the largest force, below which there is none, and by which loads differ; of a run's own,
 by which a constant one moves; of the input's range, by which a held one, and repeated peaks, differ."""
 

@@ -281,7 +281,7 @@ def _feedforward(experiment: Experiment, found: Hysteresis) -> None:
     experiment.says(tracked={str(row[1]): row[2] for row in rows[: len(ways)]})
 
 
-HELD, STROKES = 0.2, 0.1
+HELD, STROKES = 0.5, 0.1
 """Of what is driven, what is held moves less; a stroke of this share is as much as the top pressure."""
 
 

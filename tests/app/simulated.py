@@ -31,10 +31,10 @@ def quiet(share: float, cost: float) -> None:
 
 
 def swung(period: float) -> Recording:
-    """Return a minute of a virtual muscle under triangles that decay."""
+    """Return a minute of a virtual muscle under triangles that decay, with noise of its own."""
     time = np.arange(600) * 0.1
     pressure = decaying_triangle(time, period=period, high=5.0, low=1.0)
-    return load_rig("mas20-hanging").run(Recording({"pressure": pressure}, 0.1))
+    return load_rig("mas20-hanging").run(Recording({"pressure": pressure}, 0.1), round(10 * period))
 
 
 def wave() -> Recording:

@@ -129,7 +129,7 @@ def check_shared(
             )
         raise DataError(sentences[0], file=listed[found[0].second][1].source, remedy=remedy)
     for (role, one), (other_role, other) in combinations(listed, 2):
-        if role != other_role and (again := _seeded(one, other)):
+        if not found and role != other_role and (again := _seeded(one, other)):
             warnings.warn(
                 f"{one.name} and {other.name} have the same sensor noise, as both were run with seed "
                 f"{one.meta['seed']}. Remedy: {again}",

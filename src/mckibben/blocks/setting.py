@@ -61,7 +61,7 @@ def with_fields(model: Block, values: Mapping[str, Any]) -> Block:
 
 
 def _within(value: float, low: float, high: float) -> bool:
-    return (1 - BEYOND) * low <= value <= (1 + BEYOND) * high
+    return low - BEYOND * abs(low) <= value <= high + BEYOND * abs(high)
 
 
 def _parts(value: Any) -> Iterator[Block]:

@@ -456,7 +456,7 @@ def demand_rise(recordings: Sequence[Recording], by: str, channel: str) -> None:
                 f"it falls as the {by} rises",
                 file=one.source,
                 channel=channel,
-                remedy=f"turn its sign: --calibrate {channel}=COLUMN:-1:0:{one.units[channel]}",
+                remedy=f"turn its sign: --calibrate {channel}=COLUMN:-1:0:{one.units[channel] or 1}",
             )
 
 

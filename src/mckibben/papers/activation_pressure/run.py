@@ -102,7 +102,8 @@ REPEATS = 0.1
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     """Tell slow cycles, sines and random waves apart, by the pressure, and under which force each is."""
-    demand_rise(recordings, "pressure", "contraction")
+    moved = all("displacement" in one for one in recordings)
+    demand_rise(recordings, "pressure", "displacement" if moved else "contraction")
     runs = training_data(recordings, "pressure", "contraction", None, ("force",)).runs
     forces = {i: force for force, own in by_force(runs).items() for i in own}
     at = [dominant_frequency(run) for run in runs]

@@ -444,6 +444,21 @@ def reproduce(
     return experiment.done(on)
 
 
+def demand_one_sign(recordings: Sequence[Recording], channel: str) -> None:
+    """Refuse recordings of which some are far below 0 and others far above: signs are turned."""
+    peaks = np.array([one[channel][np.argmax(np.abs(one[channel]))] for one in recordings])
+    strong = np.abs(peaks) > 0.1 * np.abs(peaks).max()
+    usual = np.sign(np.sum(np.sign(peaks[strong]))) or 1.0
+    for place in np.flatnonzero(strong & (np.sign(peaks) != usual)):
+        one = recordings[place]
+        raise DataError(
+            "it has another sign than in the other recordings",
+            file=one.source,
+            channel=channel,
+            remedy=f"turn its sign: --calibrate {channel}=COLUMN:-1:0:{one.units[channel] or 1}",
+        )
+
+
 def demand_rise(recordings: Sequence[Recording], by: str, channel: str) -> None:
     """Refuse recordings in which a channel does not move, or falls as another rises."""
     for one in recordings:

@@ -255,9 +255,11 @@ class Rig(DrawsItself, Section, ABC):
         )
 
     def _refuse_divergence(self, readings: Mapping[str, Array]) -> None:
-        """Refuse what no muscle does: pressure far above the supply, or no number at all."""
+        """Refuse what no muscle does: to move by far more than its length, or exceed the supply."""
         for name, samples in readings.items():
             high = 2 * self.air.supply if quantity(name) == "pressure" else np.inf
+            if quantity(name) == "displacement":
+                high = 10 * (self.rest_length or np.inf)  # what is thrown flies some way
             if not (np.abs(samples) < high).all():
                 raise DataError(
                     f"the simulation of {self.name!r} diverges: its steps are too long for it",

@@ -134,6 +134,9 @@ class ActivationMemoryEstimator(SeparableEstimator):
 
 # -- as published ----------------------------------------------------------------------------
 
+HELD = 0.05
+"""Share of the largest range of any run's input, below which that of a run is noise: it is held."""
+
 STATIC_SHARE = 0.1
 """A run below this share of the fastest run's frequency is static: it bounds low and high pressure,
 and nothing of the rate is found from it."""
@@ -181,7 +184,7 @@ class ActivationPressureEstimator(SearchEstimator):
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the model found, set to the first moving run's frequency, and the data."""
         step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency
-        at = np.array([dominant_frequency(run) if given is None else given for run in data.runs])
+        at = frequencies(data.runs) if given is None else np.full(len(data.runs), given)
         moving = at >= STATIC_SHARE * at.max()
         loops = replace(data, runs=tuple(data.runs[i] for i in np.flatnonzero(moving)))
         contractions, pressures = characteristic_points(data.runs, moving)
@@ -229,6 +232,13 @@ class ActivationPressureEstimator(SearchEstimator):
         phi = found[:4] / largest ** np.array([3, 2, 1, 0])
         slope = float(found[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)
+
+
+def frequencies(runs: Sequence[Run]) -> Array:
+    """Return the strongest frequency of each run's input [Hz]; 0 of one that is held."""
+    spans = np.array([float(np.ptp(run.u)) for run in runs])
+    found = np.array([dominant_frequency(run) for run in runs])
+    return np.where(spans < HELD * spans.max(), 0.0, found)
 
 
 def dominant_frequency(run: Run) -> float:

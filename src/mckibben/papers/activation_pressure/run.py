@@ -16,7 +16,7 @@ from mckibben.estimators.core.data import training_data
 from mckibben.estimators.force.activation import (
     STATIC_SHARE,
     by_force,
-    dominant_frequency,
+    frequencies,
     outermost,
 )
 from mckibben.papers.experiment import (
@@ -25,12 +25,13 @@ from mckibben.papers.experiment import (
     Labels,
     Rerun,
     Runs,
+    demand_one_sign,
     demand_rise,
     rms,
 )
 from mckibben.recording import Recording
 from mckibben.signals import reversals
-from mckibben.signals.protocol import protocol
+from mckibben.signals.protocol import Role, protocol
 
 THEIRS, OURS = "the paper's", "ours"
 QUALITIES = ("RMSE [% of range]", "correlation")
@@ -102,11 +103,13 @@ REPEATS = 0.1
 
 def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     """Tell slow cycles, sines and random waves apart, by the pressure, and under which force each is."""
-    moved = all("displacement" in one for one in recordings)
-    demand_rise(recordings, "pressure", "displacement" if moved else "contraction")
+    demand_one_sign(recordings, "force")
     runs = training_data(recordings, "pressure", "contraction", None, ("force",)).runs
     forces = {i: force for force, own in by_force(runs).items() for i in own}
-    at = [dominant_frequency(run) for run in runs]
+    at = frequencies(runs).tolist()
+    moving = [one for one, frequency in zip(recordings, at, strict=True) if frequency > 0]
+    moved = all("displacement" in one for one in moving)
+    demand_rise(moving, "pressure", "displacement" if moved else "contraction")
     found: list[Labels | None] = []
     for place, recording in enumerate(recordings):
         pressure = recording["pressure"]
@@ -120,7 +123,8 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
             "force": forces[place],
             "frequency": 0.0 if slow else float(f"{at[place]:.2g}"),
         }
-        found.append(Labels("test" if stage == "random" else "train", labels))
+        role: Role = "test" if stage == "random" else "train"
+        found.append(Labels(role, labels) if at[place] > 0 else None)
     stages = {one.labels["stage"] for one in found if one}
     for stage, what in (("hysteresis", "sines"), ("static", "a slow cycle over its whole range")):
         if stage not in stages:
@@ -181,7 +185,7 @@ ORDER = [2, 0, 1, 3]
 def _profile(study: Study) -> None:
     """Add the characteristic points at every force, and how far the static pressure is off."""
     experiment, slow = study.experiment, study.slow
-    known = all(abs(force) <= 1.1 * STRONGEST for force, *_ in slow)
+    known = all(-0.1 * STRONGEST <= force <= 1.1 * STRONGEST for force, *_ in slow)
     models = {"printed": study.printed} if known else {}
     rows: dict[str, list[float]] = {}
     for force in dict.fromkeys(force for force, *_ in slow):

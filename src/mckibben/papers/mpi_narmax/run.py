@@ -22,6 +22,7 @@ from mckibben.papers.experiment import (
     Labels,
     Rerun,
     Runs,
+    demand_one_sign,
     demand_rise,
 )
 from mckibben.papers.mpi_narmax import protocol
@@ -111,8 +112,10 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     for runs, what in ((by["free"], "without load"), (varying, "moved under a varying force")):
         if not runs:
             raise DataError(f"no recording is {what}", channel="force", remedy="record one, too")
-    free = [one for one, label in zip(recordings, labels, strict=True) if label in by["free"]]
-    demand_rise(free, drive, "displacement")
+    demand_one_sign(recordings, "force")
+    cycled = ("free", "weight", "pulls")
+    both = zip(recordings, labels, strict=True)
+    demand_rise([one for one, label in both if label["stage"] in cycled], drive, "displacement")
     if len(by["weight"] + by["pulls"] + by["random"]) == 1:
         remedy = "record another load: the strongest that varies is tested on"
         raise DataError("there is one recording under a load", channel="force", remedy=remedy)

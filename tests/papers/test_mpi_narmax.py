@@ -135,8 +135,8 @@ def test_what_is_needed_is_named(slim: Rig) -> None:
         sort([pulled])
     with pytest.raises(DataError, match="varying force"):
         sort([alone])
-    with pytest.raises(DataError, match="add a column force"):
-        sort([alone.select(["voltage", "displacement"]), pulled])
+    with pytest.raises(DataError, match=r"force.*--column force"):
+        reproduce("mpi-narmax", data=[alone.select(["voltage", "displacement"]), pulled])
     with pytest.raises(DataError, match="pressure"):
         sort([alone.select(["voltage", "displacement", "force"]), pulled.select(OTHERS)])
     with pytest.raises(DataError, match="another load"):

@@ -450,12 +450,8 @@ def demand_one_sign(recordings: Sequence[Recording], channel: str) -> None:
     strong = np.abs(peaks) > 0.1 * np.abs(peaks).max()
     usual = np.sign(np.sum(np.sign(peaks[strong]))) or 1.0
     for place in np.flatnonzero(strong & (np.sign(peaks) != usual)):
-        one = recordings[place]
-        raise DataError(
-            "it has another sign than in the other recordings",
-            file=one.source,
-            channel=channel,
-            remedy=f"turn its sign: --calibrate {channel}=COLUMN:-1:0:{one.units[channel] or 1}",
+        raise _turned(
+            "it has another sign than in the other recordings", recordings[place], channel
         )
 
 
@@ -467,12 +463,12 @@ def demand_rise(recordings: Sequence[Recording], by: str, channel: str) -> None:
                 remedy = "take the file out, or name another column"
                 raise DataError("it does not move", file=one.source, channel=name, remedy=remedy)
         if np.corrcoef(one[by], one[channel])[0, 1] < 0:
-            raise DataError(
-                f"it falls as the {by} rises",
-                file=one.source,
-                channel=channel,
-                remedy=f"turn its sign: --calibrate {channel}=COLUMN:-1:0:{one.units[channel] or 1}",
-            )
+            raise _turned(f"it falls as the {by} rises", one, channel)
+
+
+def _turned(problem: str, one: Recording, channel: str) -> DataError:
+    remedy = f"turn its sign: --calibrate {channel}=COLUMN:-1:0:{one.units[channel] or 1}"
+    return DataError(problem, file=one.source, channel=channel, remedy=remedy)
 
 
 def rms(errors: Array) -> float:

@@ -88,10 +88,6 @@ def run(experiment: Experiment) -> None:
 
 def driven(recordings: Sequence[Recording]) -> str:
     """Return the input that all recordings have, beside displacement and force."""
-    for channel in ("displacement", "force"):
-        for name in (one.name for one in recordings if channel not in one):
-            remedy = f"add a column {channel}; a force is 0 N where nothing pulls"
-            raise DataError(f"{name} is without it", channel=channel, remedy=remedy)
     shared = [x for x in ("voltage", "pressure") if all(x in one for one in recordings)]
     if not shared:
         remedy = "add the voltage of the valve to all of them, or the pressure"

@@ -356,12 +356,12 @@ def _made_inputs(
 
 def _starts(rig: Rig, given: Recording) -> dict[str, float]:
     """Return the settings by which a rig rests at the first commands, unless it says where it rests."""
-    firsts = {name: float(given[name][0]) for name in rig.inputs if name in given}
-    limits = {name: rig.limits(name) for name in firsts}
+    if rig.start:
+        return {}
+    limits = {name: rig.limits(name) for name in rig.inputs if name in given}
     return {
-        f"start.{name}": min(max(first, limits[name].low), limits[name].high)
-        for name, first in firsts.items()
-        if not rig.start
+        f"start.{name}": min(max(float(given[name][0]), limit.low), limit.high)
+        for name, limit in limits.items()
     }
 
 

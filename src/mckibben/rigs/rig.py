@@ -256,11 +256,13 @@ class Rig(DrawsItself, Section, ABC):
 
     def _refuse_divergence(self, readings: Mapping[str, Array]) -> None:
         """Refuse what no muscle does: to move by far more than its length, or exceed the supply."""
+        # what is thrown flies some way
+        highest = {
+            "pressure": 2 * self.air.supply,
+            "displacement": 10 * (self.rest_length or np.inf),
+        }
         for name, samples in readings.items():
-            high = 2 * self.air.supply if quantity(name) == "pressure" else np.inf
-            if quantity(name) == "displacement":
-                high = 10 * (self.rest_length or np.inf)  # what is thrown flies some way
-            if not (np.abs(samples) < high).all():
+            if not (np.abs(samples) < highest.get(quantity(name), np.inf)).all():
                 raise DataError(
                     f"the simulation of {self.name!r} diverges: its steps are too long for it",
                     channel=name,

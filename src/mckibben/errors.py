@@ -1,26 +1,42 @@
-"""Errors that a person can act on: what is wrong, where, and what to do about it."""
+"""Errors that a person can act on: what is wrong, where, and what to do about it.
+
+A remedy names parameters and operations in backquotes, and whoever shows it renders them in its own
+terms: Python as arguments, the command line as options, the workbench as controls.
+
+=========================== ======================== =====================
+in a remedy                 Python                   command line
+=========================== ======================== =====================
+```gaps```                  gaps                     --gaps
+```gaps=split```            gaps='split'             --gaps split
+```columns[force]=F```      columns={'force': 'F'}   --column force=F
+```track()```               track()                  mckibben track
+=========================== ======================== =====================
+"""
 
 from __future__ import annotations
 
-from functools import partial
+import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+_NAMED = re.compile(r"`(\w+)(\(\)|\[([^`\]]*)\])?(?:=([^`]*))?`")
+"""A parameter or an operation in a remedy."""
+
+Parameter = Callable[[str, str | None, str | None], str]
+"""Renders a parameter by its name, the key in it and its value, where there are any."""
 
 
 class MckibbenError(Exception):
     """Base of every error that this package raises on purpose.
 
-    The command line prints it as one paragraph and leaves with exit code 2.
-    """
-
-
-class DataError(MckibbenError):
-    """A recording, or a file with one, that cannot be used as it is.
-
     Parameters
     ----------
     problem : str
         What is wrong, as a phrase without a final stop.
+    remedy : str
+        What to do about it, as a phrase without a final stop. Parameters and operations stand in
+        backquotes, see `mckibben.errors`.
     file : path, optional
         The file it was found in.
     channel : str, optional
@@ -28,41 +44,91 @@ class DataError(MckibbenError):
     row : int, optional
         The row it was found in: the line of a text file as an editor counts it, or the
         sample counted from 1 where there is no text.
-    remedy : str
-        What to do about it, as a phrase without a final stop.
+    parameter : str, optional
+        The argument or setting that is wrong.
     """
 
     def __init__(
         self,
         problem: str,
         *,
-        remedy: str,
+        remedy: str = "",
         file: str | Path | None = None,
         channel: str | None = None,
         row: int | None = None,
+        parameter: str | None = None,
     ) -> None:
         self.problem = problem
         self.remedy = remedy
         self.file = None if file is None else Path(file)
         self.channel = channel
         self.row = row
+        self.parameter = parameter
         super().__init__(problem)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Tell how it is made again in another process."""
-        made = partial(
-            type(self), remedy=self.remedy, file=self.file, channel=self.channel, row=self.row
-        )
-        return made, (self.problem,)
+        """Return how it is made again in another process."""
+        return type(self), (self.problem,), self.__dict__
 
     def __str__(self) -> str:
-        where = [] if self.file is None else [str(self.file)]
-        if self.channel is not None:
-            where.append(f"channel {_short(self.channel, 100)!r}")
-        if self.row is not None:
-            where.append(f"row {self.row}")
-        place = f"{', '.join(where)}: " if where else ""
-        return f"{place}{_short(self.problem)}. Remedy: {_short(self.remedy)}."
+        return rendered(self)
+
+
+def python_parameter(name: str, key: str | None = None, value: str | None = None) -> str:
+    """Return a parameter as a Python argument.
+
+    >>> python_parameter("gaps", None, "split"), python_parameter("columns", "force", "F1")
+    ("gaps='split'", "columns={'force': 'F1'}")
+    """
+    if value is None:
+        return name
+    plain = value.isupper() or not re.fullmatch(r"[A-Za-z_][\w.-]*", value)
+    plain = plain or value in ("True", "False", "None")
+    if key is not None:
+        return f"{name}={{{key!r}: {value!r}}}"
+    return f"{name}={value if plain else repr(value)}"
+
+
+def python_operation(name: str) -> str:
+    """Return an operation as a call."""
+    return f"{name}()"
+
+
+def in_terms_of(
+    text: str,
+    parameter: Parameter = python_parameter,
+    operation: Callable[[str], str] = python_operation,
+) -> str:
+    """Return a remedy with its parameters and operations in the terms of one face.
+
+    >>> in_terms_of("give `gaps=split`, or use `track()`")
+    "give gaps='split', or use track()"
+    """
+
+    def render(found: re.Match[str]) -> str:
+        name, call, key, value = found.groups()
+        return operation(name) if call == "()" else parameter(name, key, value)
+
+    return _NAMED.sub(render, text)
+
+
+def rendered(
+    error: MckibbenError,
+    parameter: Parameter = python_parameter,
+    operation: Callable[[str], str] = python_operation,
+) -> str:
+    """Return an error as one paragraph: place, problem and remedy, in the terms of one face."""
+    where = [] if error.file is None else [str(error.file)]
+    if error.parameter is not None:
+        where.append(parameter(error.parameter, None, None))
+    if error.channel is not None:
+        where.append(f"channel {_short(error.channel, 100)!r}")
+    if error.row is not None:
+        where.append(f"row {error.row}")
+    place = f"{', '.join(where)}: " if where else ""
+    remedy = in_terms_of(_short(error.remedy), parameter, operation)
+    problem = in_terms_of(_short(error.problem), parameter, operation)
+    return f"{place}{problem}" + (f". Remedy: {remedy}." if remedy else "")
 
 
 def _short(given: object, most: int = 1000) -> str:
@@ -72,16 +138,38 @@ def _short(given: object, most: int = 1000) -> str:
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
 
 
+class DataError(MckibbenError):
+    """A recording, or a file with one, that cannot be used as it is."""
+
+
 class TooLargeError(DataError):
     """A file that holds more than is read: however it is read, that does not help."""
 
 
 class ModelError(MckibbenError):
-    """A model, or a file with one, that cannot do what was asked; the text ends with a remedy."""
+    """A model, or a file with one, that cannot do what was asked."""
 
 
 class ContractError(ModelError):
     """A block or a rig that breaks a law of its contract."""
+
+
+class KernelError(ModelError):
+    """A kernel that is not written in the kernel language.
+
+    Attributes
+    ----------
+    construct, instead : str
+        What it has, and what to write instead.
+    """
+
+    def __init__(self, file: str, line: int, construct: str, instead: str) -> None:
+        super().__init__(f"kernels cannot have {construct}", remedy=instead, file=file, row=line)
+        self.construct, self.instead = construct, instead
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how it is made again in another process."""
+        return type(self), (str(self.file), self.row, self.construct, self.instead)
 
 
 class DataWarning(UserWarning):
@@ -92,27 +180,9 @@ class ModelWarning(UserWarning):
     """Something a model did that its user should know, such as clipping a reference."""
 
 
-def unforeseen(error: Exception) -> str:
-    """Return in words what nobody has foreseen: it is a fault of the program."""
-    return (
-        f"this is a fault of the program, not of the data ({type(error).__name__}: {error}). "
-        "Remedy: try other settings or another model, and report it."
+def unforeseen(error: Exception) -> MckibbenError:
+    """Return what nobody has foreseen, as an error: it is a fault of the program."""
+    return MckibbenError(
+        f"this is a fault of the program, not of the data ({type(error).__name__}: {error})",
+        remedy="try other settings or another model, and report it",
     )
-
-
-class KernelError(ModelError):
-    """A kernel that is not written in the kernel language.
-
-    Attributes
-    ----------
-    file, line : str, int
-        Where it is.
-    construct, instead : str
-        What it has, and what to write instead.
-    """
-
-    def __init__(self, file: str, line: int, construct: str, instead: str) -> None:
-        self.file, self.line, self.construct, self.instead = file, line, construct, instead
-        super().__init__(
-            f"{file}, line {line}: kernels cannot have {construct}. Remedy: {instead}."
-        )

@@ -216,17 +216,18 @@ def load(group: str, name: str) -> Any:
         kind = group.removesuffix("s")
         successor = REPLACED.get(group, {}).get(name)
         if successor is not None:
-            raise ModelError(f"the {kind} {name!r} is gone. Remedy: use {successor!r} instead.")
+            raise ModelError(f"the {kind} {name!r} is gone", remedy=f"use {successor!r} instead")
         raise ModelError(
-            f"there is no {kind} named {name!r}. Remedy: use one of {', '.join(sorted(locations))}."
+            f"there is no {kind} named {name!r}",
+            remedy=f"use one of {', '.join(sorted(locations))}",
         )
     module, _, attribute = locations[name].partition(":")
     try:
         found: Any = getattr(import_module(module), attribute)
     except (ImportError, AttributeError, SyntaxError) as error:
         raise ModelError(
-            f"{name!r} of the {group} cannot be imported: {error}. Remedy: mend "
-            f"{locations[name]}, or take it out of the registry."
+            f"{name!r} of the {group} cannot be imported: {error}",
+            remedy=f"mend {locations[name]}, or take it out of the registry",
         ) from error
     return Chosen(name, found) if isinstance(found, Preset) else found
 

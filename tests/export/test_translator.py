@@ -135,7 +135,7 @@ def refused(kernel: Any, line: int) -> bool:
     lines, first = getsourcelines(kernel.py_func)
     start = next(k for k, text in enumerate(lines) if text.startswith("def "))
     found = error.value
-    assert (found.file, found.line) == (programs.__file__, first + start + line)
+    assert (str(found.file), found.row) == (programs.__file__, first + start + line)
     return bool(found.construct and found.instead) and "docs/" not in found.instead
 
 

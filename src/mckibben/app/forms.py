@@ -50,7 +50,7 @@ def inverse_of(block: Block) -> Block:
     from mckibben.blocks.inverse import drives
 
     if drives(block.outputs[0]) or (block.undoing and not drives(block.inputs[0])):
-        raise ModelError("it is a compensator already. Remedy: choose the model that it undoes.")
+        raise ModelError("it is a compensator already", remedy="choose the model that it undoes")
     return compensator(block)
 
 
@@ -103,12 +103,12 @@ def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]
 
             time = given["time"]
             if not 0 < time <= 1e6:
-                raise ModelError(f"it cannot learn in {time:g} s. Remedy: give 1 to 1000 s.")
+                raise ModelError(f"it cannot learn in {time:g} s", remedy="give 1 to 1000 s")
             return adaptive(block, time)
         case "predictive":
             return _predictive(inverse_of(block), given)
     raise ModelError(
-        f"{form!r:.40} is no use of a model. Remedy: choose one of {', '.join(FORMS)}."
+        f"{form!r:.40} is no use of a model", remedy=f"choose one of {', '.join(FORMS)}"
     )
 
 
@@ -117,10 +117,10 @@ def _predictive(inverse: Block, given: Mapping[str, float]) -> Block:
 
     horizon, rate = int(given["horizon"]), given.get("rate_limit")
     if not 1 <= horizon <= 200:
-        raise ModelError(f"it cannot look {horizon} samples ahead. Remedy: give 1 to 200.")
+        raise ModelError(f"it cannot look {horizon} samples ahead", remedy="give 1 to 200")
     if rate is not None and not 0 < rate <= MOST:
         raise ModelError(
-            f"pressure cannot change by {rate:g} bar/s. Remedy: give what the valve can."
+            f"pressure cannot change by {rate:g} bar/s", remedy="give what the valve can"
         )
     return Predictive(inverse, horizon=horizon, rate_limit=rate)
 

@@ -334,7 +334,7 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     except MckibbenError as error:
         message, state = str(error), FAILED
     except Exception as error:  # a job that fails must say so, whatever it did
-        message, state = unforeseen(error), FAILED
+        message, state = str(unforeseen(error)), FAILED
     try:
         note(workspace, name, kind, given, state, by_name(workspace, message)[: kept.LONGEST])
     except DataError:

@@ -166,8 +166,8 @@ def learning_part(model: Block) -> tuple[tuple[Block, ...], Block, tuple[Block, 
     places = [k for k, part in enumerate(parts) if learnable_of(part) is not None]
     if len(places) != 1:
         raise ModelError(
-            f"{len(places)} parts of {model.title!r} can learn while it runs. Remedy: adapt a pi, gpi, "
-            "mpi, cpi or balance model, of one part that learns."
+            f"{len(places)} parts of {model.title!r} can learn while it runs",
+            remedy="adapt a pi, gpi, mpi, cpi or balance model, of one part that learns",
         )
     return parts[: places[0]], parts[places[0]], parts[places[0] + 1 :]
 
@@ -275,8 +275,9 @@ class Adaptive(Block):
         if self.memory is not None:
             if len(self.memory) not in (self.n_states, self.n_learnt):
                 raise ModelError(
-                    f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
-                    f"{self.n_states}. Remedy: resume what was saved with the same model."
+                    f"the memory of {self.kind!r} has {len(self.memory)} numbers, its "
+                    f"state {self.n_states}",
+                    remedy="resume what was saved with the same model",
                 )
             self._check_memory(np.array(self.memory))
 
@@ -284,16 +285,17 @@ class Adaptive(Block):
         """Refuse a time and a noise that nothing is measured with."""
         if not TIMES[0] <= self.time <= TIMES[1]:
             raise ModelError(
-                f"{self.kind!r} cannot learn in a time of {self.time:g} s. Remedy: give {TIMES[0]:g} "
-                f"to {TIMES[1]:g} s."
+                f"{self.kind!r} cannot learn in a time of {self.time:g} s",
+                remedy=f"give {TIMES[0]:g} to {TIMES[1]:g} s",
             )
         _, part, behind = learning_part(self.forward)
         width = width_of((part, *behind))
         low, high = (bound * width for bound in NOISES) if 0 < width < np.inf else NOISES
         if not low <= self.noise <= high:
             raise ModelError(
-                f"a noise of {self.noise:g} is none that {self.kind!r} is measured with. Remedy: give "
-                f"the standard deviation of what is measured, {low:.3g} to {high:.3g} in its unit."
+                f"a noise of {self.noise:g} is none that {self.kind!r} is measured with",
+                remedy=f"give the standard deviation of what is measured, {low:.3g} to "
+                f"{high:.3g} in its unit",
             )
 
     def _check_memory(self, state: Array) -> None:
@@ -324,8 +326,8 @@ class Adaptive(Block):
         for name, found in wrong.items():
             if found:
                 raise ModelError(
-                    f"the {name} in the memory of {self.kind!r} cannot have come from running it. "
-                    "Remedy: save the model afresh, or resume what was saved unchanged."
+                    f"the {name} in the memory of {self.kind!r} cannot have come from running it",
+                    remedy="save the model afresh, or resume what was saved unchanged",
                 )
         for parameters in (theta, used):
             learnable.with_parameters(parameters).inverse()
@@ -615,13 +617,14 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
     """
     if isinstance(model, Adaptive):
         raise ModelError(
-            f"{model.title!r} learns already. Remedy: use it as it is, or adapt the model it undoes."
+            f"{model.title!r} learns already",
+            remedy="use it as it is, or adapt the model it undoes",
         )
     _, part, behind = learning_part(model)
     width = width_of((part, *behind))
     if noise is None and not 0 < width < np.inf:
         raise ModelError(
-            f"what {model.title!r} reaches does not tell how exactly it is measured. "
-            "Remedy: give the noise."
+            f"what {model.title!r} reaches does not tell how exactly it is measured",
+            remedy="give the noise",
         )
     return Adaptive(model, float(time), float(width / 1000 if noise is None else noise))

@@ -106,14 +106,14 @@ class Band(Block):
         lengths = {len(self.widening), len(self.scores)}
         if [len(row) for row in self.ends] != [len(self.driving) + n] * 2 or lengths != {n}:
             raise ModelError(
-                "the numbers of a band do not fit its channels. Remedy: calibrate again."
+                "the numbers of a band do not fit its channels", remedy="calibrate again"
             )
         if any(low > high for low, high in zip(*self.ends, strict=True)) or min(self.widening) < 0:
             raise ModelError(
-                "a range or a widening of a band is negative. Remedy: calibrate again."
+                "a range or a widening of a band is negative", remedy="calibrate again"
             )
         if any(len(row) < 2 or list(row) != sorted(row) or row[0] < 0 for row in self.scores):
-            raise ModelError("the scores of a band do not rise. Remedy: calibrate again.")
+            raise ModelError("the scores of a band do not rise", remedy="calibrate again")
         check_level(self.level, self.units, self.unit)
 
     @property
@@ -160,13 +160,13 @@ def check_level(level: float, units: int, unit: str) -> None:
     A new one is as likely as each of them to be missed most, and nothing bounds by how much.
     """
     if not 0.0 < level < 1.0:
-        raise ModelError(f"the level is {level:g}. Remedy: give one above 0 and below 1, as 0.9.")
+        raise ModelError(f"the level is {level:g}", remedy="give one above 0 and below 1, as 0.9")
     if level > units / (units + 1) + 1e-12:
         most, needed = 100 * units / (units + 1), int(np.ceil(level / (1.0 - level) - 1e-9))
         raise ModelError(
-            f"a band calibrated on {units} {unit}(s) holds at most {numeral(most, 3)} %, and "
-            f"{numeral(100 * level, 4)} % are asked for. Remedy: ask for less, or calibrate on at least "
-            f"{needed} {unit}s."
+            f"a band calibrated on {units} {unit}(s) holds at most {numeral(most, 3)} %, "
+            f"and {numeral(100 * level, 4)} % are asked for",
+            remedy=f"ask for less, or calibrate on at least {needed} {unit}s",
         )
 
 
@@ -211,7 +211,8 @@ class Banded(Composition):
         self.check_parts()
         if (self.band.driving, self.band.given) != (self.forward.inputs, self.forward.outputs):
             raise ModelError(
-                f"the band is of other channels than {self.forward.title!r}. Remedy: calibrate it again."
+                f"the band is of other channels than {self.forward.title!r}",
+                remedy="calibrate it again",
             )
 
     def at(self, level: float) -> Self:

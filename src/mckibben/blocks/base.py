@@ -173,8 +173,8 @@ class Block(DrawsItself, Parametrised):
             names = [channel.name for channel in channels]
             if not names or len(set(names)) < len(names):
                 raise ModelError(
-                    f"channels of {self.kind!r} are: {', '.join(names) or 'none'}. "
-                    "Remedy: give each a name of its own."
+                    f"channels of {self.kind!r} are: {', '.join(names) or 'none'}",
+                    remedy="give each a name of its own",
                 )
 
     @property
@@ -265,8 +265,8 @@ class Block(DrawsItself, Parametrised):
         del sample_time
         if getattr(self, "kernel", None) is None:
             raise ModelError(
-                f"{self.kind!r} is neither one kernel nor a composition, so it cannot be exported. "
-                "Remedy: compose it of blocks."
+                f"{self.kind!r} is neither one kernel nor a composition, so it cannot be exported",
+                remedy="compose it of blocks",
             )
         return gathered(self, self.layout) if self.layout else self.pack()
 
@@ -339,8 +339,8 @@ class Block(DrawsItself, Parametrised):
         The time between samples [s] is needed by blocks that are continuous in time.
         """
         raise ModelError(
-            f"{self.kind!r} is not linear, so it has no transfer function. Remedy: hand over a linear "
-            "model (oe, arx, armax, bj, p1 to p3)."
+            f"{self.kind!r} is not linear, so it has no transfer function",
+            remedy="hand over a linear model (oe, arx, armax, bj, p1 to p3)",
         )
 
     def continuous(self) -> Polynomials | None:
@@ -403,8 +403,8 @@ class Block(DrawsItself, Parametrised):
             outputs = self._run(inputs, data.sample_time, self.start_on(data, initial))
             if not np.isfinite(outputs).all():
                 raise ModelError(
-                    f"the output of {self.kind!r} is not finite on {data.name}. "
-                    "Remedy: this model does not suit these data; identify it again."
+                    f"the output of {self.kind!r} is not finite on {data.name}",
+                    remedy="this model does not suit these data; identify it again",
                 )
             units = {channel.name: channel.unit for channel in self.outputs}
             modelled = dict(zip(units, outputs.T, strict=True))
@@ -538,14 +538,15 @@ def explicit_state(block: Block, initial: Initial) -> Array:
     """Return an explicit initial state after checking its length."""
     if isinstance(initial, str):
         raise ModelError(
-            f"{block.kind!r} knows no start {initial!r}. Remedy: give 'first_sample', 'virgin', or "
-            f"{block.n_states} numbers."
+            f"{block.kind!r} knows no start {initial!r}",
+            remedy=f"give 'first_sample', 'virgin', or {block.n_states} numbers",
         )
     state = np.array(initial, dtype=np.float64)
     if state.shape != (block.n_states,) or not np.isfinite(state).all():
         raise ModelError(
-            f"{block.kind!r} has {block.n_states} states, the initial state given has shape "
-            f"{state.shape}. Remedy: give {block.n_states} finite numbers, or 'first_sample'."
+            f"{block.kind!r} has {block.n_states} states, the initial state given has "
+            f"shape {state.shape}",
+            remedy=f"give {block.n_states} finite numbers, or 'first_sample'",
         )
     return state
 
@@ -559,8 +560,8 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
     """Return the sample time, or say that a rate-dependent block cannot do without."""
     if sample_time is None or not sample_time > 0:
         raise ModelError(
-            f"{kind!r} depends on rate and needs a sample time, but the data have no time. "
-            "Remedy: read the recording with a time column or --rate, or give sample_time."
+            f"{kind!r} depends on rate and needs a sample time, but the data have no time",
+            remedy="read the recording with a time column or --rate, or give sample_time",
         )
     return sample_time
 
@@ -576,7 +577,7 @@ def own_sample_time(kind: str, own: float, sample_time: float | None) -> float:
     step = needs_sample_time(kind, sample_time)
     if abs(step - own) > 1e-3 * own:
         raise ModelError(
-            f"{kind!r} holds for a sample time of {own:g} s, but the data have {step:g} s. Remedy: "
-            f"resample them to {own:g} s, or identify the model again."
+            f"{kind!r} holds for a sample time of {own:g} s, but the data have {step:g} s",
+            remedy=f"resample them to {own:g} s, or identify the model again",
         )
     return own

@@ -150,7 +150,8 @@ class _Rewriting(ast.NodeTransformer):
         elif name != ast.unparse(node.func):
             known = ", ".join(sorted({*HELPERS, *BY_REAL_PART} - {"over"}))
             raise ModelError(
-                f"kernels have no derivative of {ast.unparse(node.func)}. Remedy: use one of {known}."
+                f"kernels have no derivative of {ast.unparse(node.func)}",
+                remedy=f"use one of {known}",
             )
         return node
 

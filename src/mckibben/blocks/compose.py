@@ -210,11 +210,11 @@ class Composition(Block):
     def check_parts(self) -> None:
         """Refuse no parts at all, and more, or more deeply nested ones, than a model is made of."""
         if not self.parts:
-            raise ModelError(f"{self.kind!r} has no parts. Remedy: give at least one block.")
+            raise ModelError(f"{self.kind!r} has no parts", remedy="give at least one block")
         if self.depth > DEEPEST or self.n_blocks > MOST_BLOCKS:
             raise ModelError(
-                f"{self.kind!r} is nested {self.depth} deep and made of {self.n_blocks} blocks. "
-                f"Remedy: compose at most {MOST_BLOCKS} blocks, at most {DEEPEST} deep."
+                f"{self.kind!r} is nested {self.depth} deep and made of {self.n_blocks} blocks",
+                remedy=f"compose at most {MOST_BLOCKS} blocks, at most {DEEPEST} deep",
             )
 
     @cached_property
@@ -252,8 +252,9 @@ class Series(Composition):
             driven = after.n_driven
             if len(before.outputs) != driven:
                 raise ModelError(
-                    f"{before.kind!r} gives {len(before.outputs)} output(s), {after.kind!r} behind it "
-                    f"wants {driven}. Remedy: connect blocks that fit."
+                    f"{before.kind!r} gives {len(before.outputs)} output(s), "
+                    f"{after.kind!r} behind it wants {driven}",
+                    remedy="connect blocks that fit",
                 )
 
     @cached_property  # asked for at every level of a nested model
@@ -283,9 +284,10 @@ class Series(Composition):
             at_rest = not part.rate_dependent or part.start in AT_REST
             if board.from_rest and number < len(self.parts) - 1 and not at_rest:
                 raise ModelError(
-                    f"{part.kind!r} starts from a memory of its own and depends on the rate, so parts "
-                    "behind it would start from another sample than in Python. Remedy: start it from "
-                    "'first_sample'."
+                    f"{part.kind!r} starts from a memory of its own and depends on the "
+                    "rate, so parts behind it would start from another sample than in "
+                    "Python",
+                    remedy="start it from 'first_sample'",
                 )
             driven = signals[: part.n_driven]
             signals = part.wired(board, [*driven, *(by_name[name] for name in part.scheduling)])
@@ -338,8 +340,9 @@ class Parallel(Composition):
             for channel in (c for part in self.parts for c in getattr(part, side)):
                 if units.setdefault(channel.name, channel.unit) != channel.unit:
                     raise ModelError(
-                        f"parts of {self.kind!r} have {channel.name} in {units[channel.name]!r} and "
-                        f"{channel.unit!r}. Remedy: put blocks in parallel whose units agree."
+                        f"parts of {self.kind!r} have {channel.name} in "
+                        f"{units[channel.name]!r} and {channel.unit!r}",
+                        remedy="put blocks in parallel whose units agree",
                     )
 
     @cached_property
@@ -414,8 +417,9 @@ class PerChannel(Composition):
         for part in self.parts:
             if len(part.inputs) != 1 or len(part.outputs) != 1:
                 raise ModelError(
-                    f"{part.kind!r} has {len(part.inputs)} input(s) and {len(part.outputs)} "
-                    "output(s). Remedy: give blocks with one of each."
+                    f"{part.kind!r} has {len(part.inputs)} input(s) and "
+                    f"{len(part.outputs)} output(s)",
+                    remedy="give blocks with one of each",
                 )
         self.check_channels()
 

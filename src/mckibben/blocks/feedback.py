@@ -136,11 +136,12 @@ class PIDFeedback(Block):
         if set(sizes) != {n} or len(self.scheduled) not in (n, 2 * n):
             raise ModelError(
                 f"{self.kind!r} of {n} references has {sizes} kp, ki, kd and outputs, and "
-                f"{len(self.scheduled)} measurements and bases. Remedy: give {n} of each."
+                f"{len(self.scheduled)} measurements and bases",
+                remedy=f"give {n} of each",
             )
         if not self.limits[0] < self.limits[1]:
             raise ModelError(
-                f"limits of {self.kind!r} are {self.limits}. Remedy: give lowest, then highest."
+                f"limits of {self.kind!r} are {self.limits}", remedy="give lowest, then highest"
             )
 
     @property
@@ -195,8 +196,9 @@ class PIDFeedback(Block):
                 for ins, outs in ((self.driven, self.given), (references, outputs))
             )
             raise ModelError(
-                f"feedback goes from {own}, and the compensator from {theirs}. Remedy: tune it for the "
-                "compensator's (tune_pid(..., references=compensator.inputs))."
+                f"feedback goes from {own}, and the compensator from {theirs}",
+                remedy="tune it for the compensator's (tune_pid(..., "
+                "references=compensator.inputs))",
             )
         order = [pairs[channel] for channel in references]
         named = {_sent(channel): channel for channel in outputs}
@@ -261,8 +263,9 @@ class FeedforwardFeedback(Composition):
         made = self.feedback.behind(self.compensator)
         if made.inputs != self.feedback.inputs:
             raise ModelError(
-                f"feedback takes {_listed(self.feedback.inputs)}, and behind the compensator "
-                f"{_listed(made.inputs)}. Remedy: make both one with FeedforwardFeedback.of."
+                f"feedback takes {_listed(self.feedback.inputs)}, and behind the "
+                f"compensator {_listed(made.inputs)}",
+                remedy="make both one with FeedforwardFeedback.of",
             )
         self.check_channels()
 

@@ -76,8 +76,8 @@ def wide(ends: tuple[float, float]) -> tuple[float, float]:
     if NARROWEST <= width < np.inf and width >= NARROWEST_SHARE * (abs(low) + abs(high)):
         return ends
     raise ModelError(
-        f"the input range {ends} is empty, or too narrow or wide to compute with. "
-        "Remedy: give (lowest, highest)."
+        f"the input range {ends} is empty, or too narrow or wide to compute with",
+        remedy="give (lowest, highest)",
     )
 
 

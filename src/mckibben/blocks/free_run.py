@@ -83,9 +83,10 @@ def refuse_runaway(block: Block, recording: Recording, modelled: Array, measured
     if not (np.abs(modelled - measured) <= AWAY * np.ptp(measured, axis=0)).all():
         far, wide = float(np.abs(modelled).max()), float(np.ptp(measured, axis=0).max())
         raise ModelError(
-            f"the output of {block.kind!r} runs away on {recording.name}: to {far:.4g}, where what is "
-            f"measured spans {wide:.4g}. Remedy: see whether units are those that it was identified "
-            "in; if so, this model does not suit these data: identify it again."
+            f"the output of {block.kind!r} runs away on {recording.name}: to {far:.4g}, "
+            f"where what is measured spans {wide:.4g}",
+            remedy="see whether units are those that it was identified in; if so, this "
+            "model does not suit these data: identify it again",
         )
 
 

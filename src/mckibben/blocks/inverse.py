@@ -78,14 +78,15 @@ class Invertible(Block):
             return
         if self.input_range is None:
             raise ModelError(
-                f"{self.kind!r} has no inverse without an input range. Remedy: give input_range."
+                f"{self.kind!r} has no inverse without an input range", remedy="give input_range"
             )
         steepness = self.least_slope()
         if not steepness > 0:
             raise ModelError(
-                f"{self.kind!r} has no inverse: its output may fall while its input rises (least "
-                f"slope {steepness:.3g}). Remedy: identify it with nonnegative=true where it has that "
-                "setting, or invert another model."
+                f"{self.kind!r} has no inverse: its output may fall while its input rises "
+                f"(least slope {steepness:.3g})",
+                remedy="identify it with nonnegative=true where it has that setting, or "
+                "invert another model",
             )
 
     def least_slope(self) -> float:
@@ -111,8 +112,8 @@ class Invertible(Block):
         found = np.array([*state, *self.remembered(state), *([0.0] if self.counts_clipped else [])])
         if found.size != self.n_inverse_states:
             raise ModelError(
-                f"{len(state)} states of {self.kind!r} do not tell those of its inverse. "
-                f"Remedy: give {self.n_inverse_states}, or 'first_sample'."
+                f"{len(state)} states of {self.kind!r} do not tell those of its inverse",
+                remedy=f"give {self.n_inverse_states}, or 'first_sample'",
             )
         return found
 

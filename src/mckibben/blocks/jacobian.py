@@ -46,8 +46,8 @@ def _laid_out(block: Block) -> Layout:
     for _, each in layout.calls():
         if not each.c_kernels:
             raise ModelError(
-                f"{each.title!r} has no derivatives: it is not one kernel with a start kernel. "
-                "Remedy: declare a start_kernel beside its kernel, or compose it of such blocks."
+                f"{each.title!r} has no derivatives: it is not one kernel with a start kernel",
+                remedy="declare a start_kernel beside its kernel, or compose it of such blocks",
             )
     return layout
 

@@ -117,8 +117,8 @@ class Trial:
         """Raise a `ContractError` that names the law, unless it holds."""
         if not holds:
             raise ContractError(
-                f"{self.block.kind!r} breaks the contract of blocks: {law}. "
-                "Remedy: mend the block; docs/templates/README.md has a table of where to look."
+                f"{self.block.kind!r} breaks the contract of blocks: {law}",
+                remedy="mend the block; docs/templates/README.md has a table of where to look",
             )
 
     def same(self, outputs: Array, references: Array, law: str) -> None:

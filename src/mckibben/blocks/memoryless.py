@@ -62,7 +62,7 @@ class Affine(Block):
     def inverse(self) -> Affine:
         if self.gain == 0:
             raise ModelError(
-                "'affine' of gain 0 has no inverse. Remedy: give a gain that is not 0."
+                "'affine' of gain 0 has no inverse", remedy="give a gain that is not 0"
             )
         return Affine(1 / self.gain, -self.offset / self.gain, self.output, self.input)
 
@@ -128,13 +128,13 @@ def check_increasing(what: str, knots: Sequence[float], values: Sequence[float])
     """Refuse fewer than two knots, and knots or values that do not increase."""
     if len(knots) < 2 or len(knots) != len(values):
         raise ModelError(
-            f"a {what} has {len(knots)} knots and {len(values)} values. "
-            "Remedy: give at least two knots and one value to each."
+            f"a {what} has {len(knots)} knots and {len(values)} values",
+            remedy="give at least two knots and one value to each",
         )
     for name, numbers in (("knots", knots), ("values", values)):
         if np.any(np.diff(numbers) <= 0):
             raise ModelError(
-                f"the {name} of a {what} do not increase. Remedy: give increasing {name}."
+                f"the {name} of a {what} do not increase", remedy=f"give increasing {name}"
             )
 
 
@@ -302,13 +302,13 @@ class Polynomial(Invertible):
     def check_invertible(self) -> None:
         if self.input_range is None:
             raise ModelError(
-                "'polynomial' has no inverse without an input range. Remedy: give input_range."
+                "'polynomial' has no inverse without an input range", remedy="give input_range"
             )
         slopes = slopes_at(self.polynomial, *self._arguments())
         if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:
             raise ModelError(
-                "'polynomial' has no inverse: it does not increase over its whole input range. Remedy: "
-                "identify it with --set output_map=piecewise-linear or monotone=true."
+                "'polynomial' has no inverse: it does not increase over its whole input range",
+                remedy="identify it with --set output_map=piecewise-linear or monotone=true",
             )
 
     def inverse_numbers(self, own: Array) -> Array:

@@ -41,8 +41,8 @@ def _computing(method: Callable[..., Any]) -> Callable[..., Any]:
 
 def _beyond_sense(cls: type, error: Exception) -> ModelError:
     return ModelError(
-        f"the numbers of {getattr(cls, 'kind', cls.__name__)!r} cannot be computed with ({error}). "
-        "Remedy: identify the model again; numbers so large or small mean nothing."
+        f"the numbers of {getattr(cls, 'kind', cls.__name__)!r} cannot be computed with ({error})",
+        remedy="identify the model again; numbers so large or small mean nothing",
     )
 
 
@@ -74,8 +74,8 @@ class Checked(ABCMeta):
             kind = getattr(cls, "kind", cls.__name__)
             given = "" if first["type"] == "missing" else f", but it is {first['input']!r:.60}"
             raise ModelError(
-                f"{where} of {kind!r}: {first['msg']}{given}. "
-                f"Remedy: give what {cls.__name__} documents."
+                f"{where} of {kind!r}: {first['msg']}{given}",
+                remedy=f"give what {cls.__name__} documents",
             ) from None
 
 
@@ -171,8 +171,9 @@ def parameter_vector(part: Parametrised, parameters: ArrayLike) -> Array:
     vector = np.asarray(parameters, dtype=np.float64)
     if vector.shape != (part.n_parameters,):
         raise ModelError(
-            f"{part.kind!r} of this structure has {part.n_parameters} parameters, got shape "
-            f"{vector.shape}. Remedy: give a vector as pack() returns it."
+            f"{part.kind!r} of this structure has {part.n_parameters} parameters, got "
+            f"shape {vector.shape}",
+            remedy="give a vector as pack() returns it",
         )
     return vector
 

@@ -84,8 +84,8 @@ def model_state(compensator: Block, state: Array) -> Array:
     if isinstance(compensator, Balance) or compensator.n_states == 0:
         return state.copy()
     raise ModelError(
-        f"{compensator.title!r} is no exact inverse whose memory could be foreseen. Remedy: invert a "
-        "model such as pi, gpi, mpi or balance (mckibben invert), and give that."
+        f"{compensator.title!r} is no exact inverse whose memory could be foreseen",
+        remedy="invert a model such as pi, gpi, mpi or balance (mckibben invert), and give that",
     )
 
 
@@ -396,23 +396,26 @@ class Predictive(Block):
         n = len(self.outputs)
         if strange := [c.name for c in self.outputs if not drives(c)]:
             raise ModelError(
-                f"{self.kind!r} plans what drives muscles, and {self.compensator.title!r} gives "
-                f"{', '.join(strange)}. Remedy: give the compensator, from references to pressures."
+                f"{self.kind!r} plans what drives muscles, and {self.compensator.title!r} "
+                f"gives {', '.join(strange)}",
+                remedy="give the compensator, from references to pressures",
             )
         if self.volumes and (len(self.volumes) != n or min(self.volumes) <= 0):
             raise ModelError(
-                f"volumes of {self.kind!r} are {self.volumes}. Remedy: give {n} positive ones, or none."
+                f"volumes of {self.kind!r} are {self.volumes}",
+                remedy=f"give {n} positive ones, or none",
             )
         low, high = self.pressures
         if not (np.isfinite([*low, *high]).all() and (low < high).all()):
             raise ModelError(
-                f"{self.kind!r} plans pressures between {low.tolist()} and {high.tolist()} bar. "
-                "Remedy: give pressure_range, the lower end first."
+                f"{self.kind!r} plans pressures between {low.tolist()} and {high.tolist()} bar",
+                remedy="give pressure_range, the lower end first",
             )
         if self.total_limit is not None and self.total_limit <= low.sum():
             raise ModelError(
-                f"all pressures at their lowest come to {low.sum():g} bar, but total_limit is "
-                f"{self.total_limit:g}. Remedy: give a higher one."
+                f"all pressures at their lowest come to {low.sum():g} bar, but "
+                f"total_limit is {self.total_limit:g}",
+                remedy="give a higher one",
             )
 
     @cached_property
@@ -503,8 +506,9 @@ class Predictive(Block):
     def coefficients(self, sample_time: float | None) -> Array:
         if self._kernels is None:
             raise ModelError(
-                f"{self.compensator.title!r} cannot be run ahead in C. Remedy: export pi, gpi or "
-                "balance that starts at its first sample, or stream this one from Python."
+                f"{self.compensator.title!r} cannot be run ahead in C",
+                remedy="export pi, gpi or balance that starts at its first sample, or "
+                "stream this one from Python",
             )
         blocks = (self._planned, self._undoing)
         return self._numbers(sample_time, [block.coefficients(sample_time) for block in blocks])

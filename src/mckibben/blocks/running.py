@@ -118,7 +118,7 @@ def refuse_time(sample_time: float | None) -> None:
     """Refuse what cannot be the time between two samples: no finite number of seconds above 0."""
     if sample_time is not None and not (isfinite(sample_time) and sample_time > 0):
         raise ModelError(
-            f"the time between samples cannot be {sample_time:g} s. Remedy: give seconds, above 0."
+            f"the time between samples cannot be {sample_time:g} s", remedy="give seconds, above 0"
         )
 
 

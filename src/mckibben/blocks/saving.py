@@ -37,20 +37,20 @@ def from_dict(content: Mapping[str, Any]) -> Block:
     """Return the block that `to_dict` described; refuse anything that is not as it should be."""
     if not isinstance(content, Mapping) or content.get("format") != FORMAT:
         raise ModelError(
-            f'this is not a saved model (no "format": "{FORMAT}"). '
-            "Remedy: give a file written by 'mckibben fit' or Block.save."
+            f'this is not a saved model (no "format": "{FORMAT}")',
+            remedy="give a file written by 'mckibben fit' or Block.save",
         )
     version = content.get("version")
     if type(version) is not int or version != VERSION:
         raise ModelError(
-            f"the model has format version {version!r:.60}, this package reads version {VERSION}. "
-            "Remedy: save it again with a matching release of mckibben."
+            f"the model has format version {version!r:.60}, this package reads version {VERSION}",
+            remedy="save it again with a matching release of mckibben",
         )
     described = {key: value for key, value in content.items() if key not in ("format", "version")}
     try:
         block: Block = part_from_dict(described)
     except RecursionError:
-        raise ModelError("nested too deeply. Remedy: compose fewer blocks in each other.") from None
+        raise ModelError("nested too deeply", remedy="compose fewer blocks in each other") from None
     return block
 
 
@@ -67,7 +67,7 @@ def part_to_dict(part: Any) -> Any:
 def part_from_dict(content: Any, group: str = "blocks") -> Any:
     """Return the block (or other plug-in of ``group``) that `part_to_dict` described."""
     if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
-        raise ModelError('a block without a "kind". Remedy: save the model again.')
+        raise ModelError('a block without a "kind"', remedy="save the model again")
     kind = content["kind"]
     if group == "blocks" and kind not in names(group):  # of older files: every inverse had its own
         older = {"adaptive-series": "adaptive"}
@@ -78,7 +78,7 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
     if unknown:
         again = getattr(cls, "made_again", "save the model again")
-        raise ModelError(f"{kind!r} has no field {unknown[0]!r}. Remedy: {again}.")
+        raise ModelError(f"{kind!r} has no field {unknown[0]!r}", remedy=f"{again}")
     return cls(**values)
 
 
@@ -120,7 +120,7 @@ def load(path: str | Path) -> Block:
         if told := _recording(path):
             raise ModelError(told) from None
         raise ModelError(
-            f"{path}: not readable as a model ({str(error)[:200]}). Remedy: save the model again."
+            f"{path}: not readable as a model ({str(error)[:200]})", remedy="save the model again"
         ) from None
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from None
@@ -141,12 +141,12 @@ def _tuples(value: Any) -> Any:
 
 def _refuse(constant: str) -> None:
     raise ModelError(
-        f"the file holds {constant}, which no model has. Remedy: save the model again."
+        f"the file holds {constant}, which no model has", remedy="save the model again"
     )
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content = dict(pairs)
     if len(content) < len(pairs):
-        raise ModelError("a field stands twice in the file. Remedy: save the model again.")
+        raise ModelError("a field stands twice in the file", remedy="save the model again")
     return content

@@ -40,8 +40,8 @@ def with_fields(model: Block, values: Mapping[str, Any]) -> Block:
         if name not in known:
             listed = f"set one of {', '.join(known)}" if known else "leave it out"
             raise ModelError(
-                f"{name!r} of {model.title!r} cannot be set: it is identified, or no such field. "
-                f"Remedy: {listed}."
+                f"{name!r} of {model.title!r} cannot be set: it is identified, or no such field",
+                remedy=f"{listed}",
             )
     changed: Block = _changed(model, values)
     for part in _parts(changed):

@@ -54,7 +54,7 @@ def _emulated(block: Block, sample_time: float | None) -> str:
     found = run(block, sample_time=sample_time)
     if not found.difference <= float(TOLERANCES[True]):
         raise ModelError(
-            f"{found}: these are not Python's numbers. Remedy: use double precision, or report it."
+            f"{found}: these are not Python's numbers", remedy="use double precision, or report it"
         )
     return str(found)
 
@@ -72,7 +72,7 @@ def _serving(
     if not link:
         if limit or safe or watchdog is not None:
             raise ModelError(
-                "--limit, --safe and --watchdog are of a served model. Remedy: add --link."
+                "--limit, --safe and --watchdog are of a served model", remedy="add --link"
             )
         return None
     limits = {}
@@ -97,8 +97,8 @@ def _number(text: str, said: str) -> float:
         found = math.nan
     if not math.isfinite(found):
         raise ModelError(
-            f"{said[:60]!r} says no limits. Remedy: give --limit NAME=LOW:HIGH or "
-            "--safe NAME=VALUE, such as pressure=0:6."
+            f"{said[:60]!r} says no limits",
+            remedy="give --limit NAME=LOW:HIGH or --safe NAME=VALUE, such as pressure=0:6",
         )
     return found
 

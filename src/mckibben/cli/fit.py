@@ -94,7 +94,7 @@ def fit(
     given = {key: value for key, value in named.items() if value is not None} | given
     known = {field.name for field in fields(estimator_class)}
     if "prior" in given and "prior" not in known:
-        raise ModelError(f"{model!r} has no setting 'prior'. Remedy: leave --prior out.")
+        raise ModelError(f"{model!r} has no setting 'prior'", remedy="leave --prior out")
     estimator = estimator_class(**{"seed": seed} | given)
     if validation and not estimator.stops_early:
         raise DataError(f"{model!r} does not stop early", remedy="leave --validation out")
@@ -200,8 +200,9 @@ def _residuals(base: Block, estimator: Any, recordings: list[Recording]) -> list
     names = [channel.name for channel in base.outputs]
     if names != [estimator.output]:
         raise ModelError(
-            f"the model of --residual-of gives {', '.join(names)}, and {estimator.output} is fitted. "
-            "Remedy: name a model of the same output, or the output with --output."
+            f"the model of --residual-of gives {', '.join(names)}, and {estimator.output} "
+            "is fitted",
+            remedy="name a model of the same output, or the output with --output",
         )
     return extract_hysteresis(recordings, base, output=estimator.output)
 

@@ -108,23 +108,25 @@ def invert(
     from mckibben.outputs import claim_model
 
     if not adaptive and (time is not None or noise is not None):
-        raise ModelError("--time and --noise are of what learns. Remedy: give --adaptive too.")
+        raise ModelError("--time and --noise are of what learns", remedy="give --adaptive too")
     if adaptive and wanted is Wanted.force:
         raise ModelError(
-            "--adaptive learns an inverse, not a force. Remedy: leave out one of them."
+            "--adaptive learns an inverse, not a force", remedy="leave out one of them"
         )
     if predictive and (adaptive or wanted is Wanted.force):
         raise ModelError(
-            "--predictive plans a fixed model's inputs. Remedy: leave out --adaptive or --for force."
+            "--predictive plans a fixed model's inputs",
+            remedy="leave out --adaptive or --for force",
         )
     limits = (horizon, rate_limit, pressures, total_limit, flow_limit)
     if not predictive and any(limit is not None for limit in limits):
         raise ModelError(
-            "a horizon and limits are for compensators that look ahead. Remedy: add --predictive."
+            "a horizon and limits are for compensators that look ahead", remedy="add --predictive"
         )
     if learned and (adaptive or predictive or wanted is Wanted.force):
         raise ModelError(
-            "--learned is an inverse of its own. Remedy: leave out --adaptive, --predictive or --for."
+            "--learned is an inverse of its own",
+            remedy="leave out --adaptive, --predictive or --for",
         )
     claim_model(out, inputs=[model, *(learned or [])], force=force)
     block = loaded(model, fields)

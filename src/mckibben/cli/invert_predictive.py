@@ -28,11 +28,13 @@ def write_predictive(
 
     for name, value in (("rate-limit", rate), ("total-limit", total), ("flow-limit", flow)):
         if value is not None and not 0 < value <= MOST:
-            raise ModelError(f"--{name} is {value}. Remedy: give a positive number up to {MOST:g}.")
+            raise ModelError(
+                f"--{name} is {value}", remedy=f"give a positive number up to {MOST:g}"
+            )
     if not 1 <= horizon <= 200:
-        raise ModelError(f"--horizon is {horizon}. Remedy: give 1 to 200 samples.")
+        raise ModelError(f"--horizon is {horizon}", remedy="give 1 to 200 samples")
     if pressures is not None and not float("-inf") < pressures[0] < pressures[1] < float("inf"):
-        raise ModelError(f"--pressures are {pressures}. Remedy: give the lowest, then the highest.")
+        raise ModelError(f"--pressures are {pressures}", remedy="give the lowest, then the highest")
     block = Predictive(
         inverse,
         horizon=horizon,

@@ -449,7 +449,7 @@ def loaded(model: Path, given: list[str] | None) -> Block:
 def chosen_models(given: str, quick: bool = False) -> str | list[str]:
     """Return ``"all"``, ``"quick"`` or the list of names."""
     if quick and given != "all":
-        raise ModelError("--quick and --models exclude each other. Remedy: leave one out.")
+        raise ModelError("--quick and --models exclude each other", remedy="leave one out")
     if given in ("all", "quick"):
         return "quick" if quick else given
     return [name.strip() for name in given.split(",") if name.strip()]

@@ -67,8 +67,8 @@ def _to_output() -> Iterator[None]:
         raise
     except OSError as error:
         raise MckibbenError(
-            f"Standard output cannot be written to ({error.strerror or error}). "
-            "Remedy: send it to a file on a disk that is not full."
+            f"Standard output cannot be written to ({error.strerror or error})",
+            remedy="send it to a file on a disk that is not full",
         ) from None
 
 

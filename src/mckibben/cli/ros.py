@@ -79,8 +79,8 @@ def ros(
     if save is not None:
         if not isinstance(block, Adaptive):
             raise ModelError(
-                f"{block.title!r} does not learn, so there is nothing to save. Remedy: leave out "
-                "--save, or give what mckibben invert --adaptive writes."
+                f"{block.title!r} does not learn, so there is nothing to save",
+                remedy="leave out --save, or give what mckibben invert --adaptive writes",
             )
         claim_model(save, inputs=[model], force=force)
     node = Node(

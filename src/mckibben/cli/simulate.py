@@ -59,7 +59,7 @@ def simulate(
     claim_recording(out, inputs=[model, file], force=force)
     banded, block = _parted(loaded(model, fields), interval)
     if banded is not None and horizon is not None:
-        raise ModelError("bands are of free runs. Remedy: leave --horizon or --interval out.")
+        raise ModelError("bands are of free runs", remedy="leave --horizon or --interval out")
     wanted = [channel.name for channel in block.inputs]
     whole = list(dict.fromkeys((*wanted, *(channel.name for channel in block.outputs))))
     try:
@@ -161,8 +161,9 @@ def _parted(block: Any, interval: float | None) -> tuple[Any, Any]:
         return None, block.forward if isinstance(block, Banded) else block
     if not isinstance(block, Banded):
         raise ModelError(
-            "this model has no band. Remedy: calibrate it on recordings that it was not fitted to: "
-            "mckibben calibrate model.json FILES -o banded.json."
+            "this model has no band",
+            remedy="calibrate it on recordings that it was not fitted to: mckibben "
+            "calibrate model.json FILES -o banded.json",
         )
     return block.at(interval), block.forward
 
@@ -172,8 +173,8 @@ def _predicted(block: Any, recording: Any, horizon: int) -> Any:
 
     if not isinstance(block, TransferFunction):
         raise ModelError(
-            f"{block.kind!r} has no noise model, so it cannot predict from measured outputs. "
-            "Remedy: leave --horizon out, or fit arx, armax, oe or bj."
+            f"{block.kind!r} has no noise model, so it cannot predict from measured outputs",
+            remedy="leave --horizon out, or fit arx, armax, oe or bj",
         )
     return block.predict(recording, horizon)
 

@@ -140,15 +140,15 @@ def track(
         )
         if controller_out is not None and not isinstance(chosen, Block):
             raise ModelError(
-                f"{controller!r} is no block that could be saved or exported. "
-                "Remedy: leave out --controller-out, or use a compensator, PID, or both together."
+                f"{controller!r} is no block that could be saved or exported",
+                remedy="leave out --controller-out, or use a compensator, PID, or both together",
             )
         ahead = dead_time_undone(block) if preview is None else preview
         ahead += block.samples_ahead * step
         if controller_out is not None and isinstance(chosen, FeedforwardFeedback) and ahead > step:
             raise ModelError(
-                f"a block has one reference, but compensator and feedback get it {ahead:g} s apart. "
-                "Remedy: leave out --controller-out, or say --preview 0."
+                f"a block has one reference, but compensator and feedback get it {ahead:g} s apart",
+                remedy="leave out --controller-out, or say --preview 0",
             )
         found = close(
             chosen,

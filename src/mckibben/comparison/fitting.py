@@ -169,7 +169,7 @@ def fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:
     except MckibbenError as error:
         return FitResult(reason=str(error))
     except Exception as error:  # one model must not end the comparison, whatever it does
-        return FitResult(reason=unforeseen(error))
+        return FitResult(reason=str(unforeseen(error)))
 
 
 def _fit(data: Data, task: Task, tell: Callable[..., None]) -> FitResult:

@@ -92,8 +92,8 @@ def identify(
     grid = orders or estimator_class.param_grid
     if not grid:
         raise ModelError(
-            f"there are no usual orders of {family!r}. Remedy: give orders, settings with the values "
-            "to try."
+            f"there are no usual orders of {family!r}",
+            remedy="give orders, settings with the values to try",
         )
     runs = listed(recordings)
     channels = _channels(estimator_class(**settings), runs)

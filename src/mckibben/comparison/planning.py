@@ -83,7 +83,7 @@ def plan_of(
     """Return what a comparison is to do; see `compare`."""
     recordings, tests, checks = listed(train), listed(test), listed(validation)
     if not isinstance(n_folds, int) or n_folds < 0:
-        raise ModelError(f"there cannot be {n_folds!r:.60} folds. Remedy: give 0, 1, 2 or more.")
+        raise ModelError(f"there cannot be {n_folds!r:.60} folds", remedy="give 0, 1, 2 or more")
     if not recordings:
         raise DataError("there are no recordings to fit", remedy="give at least one")
     every = [*recordings, *tests, *checks]
@@ -120,8 +120,8 @@ def plan_of(
     named = {*given, *(registry.names("estimators") if models in ("all", "quick") else ())}
     if lost := sorted({*(settings or {})} - named):
         raise ModelError(
-            f"settings are given for {', '.join(lost)}, and no such model is compared. "
-            "Remedy: add it to the models, or leave its settings out."
+            f"settings are given for {', '.join(lost)}, and no such model is compared",
+            remedy="add it to the models, or leave its settings out",
         )
     # that a model is not given the load is no reason against it
     refused = objections(objections(names, split.train, channels), split.train, unloaded)
@@ -220,13 +220,13 @@ def _chosen(
         named = models.split(",") if isinstance(models, str) else models
         if not (isinstance(named, Iterable) and all(isinstance(name, str) for name in named)):
             raise ModelError(
-                f"models cannot be {models!r:.60}. Remedy: give 'all', 'quick', or a list of names."
+                f"models cannot be {models!r:.60}", remedy="give 'all', 'quick', or a list of names"
             )
         names = list(dict.fromkeys(name.strip() for name in named))
     if not names:
         raise ModelError(
-            "there are no models to compare. "
-            f"Remedy: name some of {', '.join(registry.names('estimators'))}, or all."
+            "there are no models to compare",
+            remedy=f"name some of {', '.join(registry.names('estimators'))}, or all",
         )
     return tuple(names), left_out
 

@@ -53,12 +53,12 @@ class Drift:
 
     def __post_init__(self) -> None:
         if self.group not in GROUPS:
-            raise ModelError(f"there is no group {self.group!r}. Remedy: {', '.join(GROUPS)}.")
+            raise ModelError(f"there is no group {self.group!r}", remedy=f"{', '.join(GROUPS)}")
         if not 0.1 <= self.factor <= 10.0:
-            raise ModelError(f"a factor of {self.factor:g} is no drift. Remedy: give 0.1 to 10.")
+            raise ModelError(f"a factor of {self.factor:g} is no drift", remedy="give 0.1 to 10")
         if not (0.0 <= self.start < np.inf and 0.0 <= self.over < np.inf):
             raise ModelError(
-                f"a drift from {self.start:g} s over {self.over:g} s. Remedy: give times from 0 up."
+                f"a drift from {self.start:g} s over {self.over:g} s", remedy="give times from 0 up"
             )
 
     def at(self, time: float) -> float:

@@ -34,7 +34,7 @@ class EstimatedLoad(Controller):
     def __post_init__(self) -> None:
         if not self.filter_time > 0:
             raise ModelError(
-                f"filter_time is {self.filter_time}. Remedy: give a positive time in seconds."
+                f"filter_time is {self.filter_time}", remedy="give a positive time in seconds"
             )
         inner = self.controller
         self.preview, self.forward_model = inner.preview, inner.forward_model

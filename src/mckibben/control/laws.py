@@ -70,8 +70,8 @@ def observer(compensator: Block, tuned: Tuned) -> Controller:
     del tuned
     if compensator.samples_ahead:
         raise ModelError(
-            "an observer corrects references that a plan has long known. Remedy: use feedforward or "
-            "feedforward-pid with a compensator that looks ahead."
+            "an observer corrects references that a plan has long known",
+            remedy="use feedforward or feedforward-pid with a compensator that looks ahead",
         )
     return DisturbanceObserver(compensator)
 

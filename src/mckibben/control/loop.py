@@ -185,7 +185,7 @@ def track(
     scored = slice(lead + round(settle / step), n)
     if scored.start >= n:
         raise ModelError(
-            "nothing is left to score. Remedy: give a longer reference, or less settle."
+            "nothing is left to score", remedy="give a longer reference, or less settle"
         )
     scheduled = reference.matrix(beside) if beside else np.empty((len(reference), 0))
     scheduled = np.concatenate([np.tile(scheduled[:1], (lead, 1)), scheduled])
@@ -220,8 +220,8 @@ def track(
             times[t] = time.perf_counter() - started
             if wanted.shape != low.shape or not np.isfinite(wanted).all():
                 raise ModelError(
-                    f"the controller gave {wanted} for {len(driven)} muscles at {t * step:g} s. "
-                    "Remedy: use a compensator made for this plant."
+                    f"the controller gave {wanted} for {len(driven)} muscles at {t * step:g} s",
+                    remedy="use a compensator made for this plant",
                 )
             allowed = np.clip(wanted, low, high)
             if slew is not None and last is not None:
@@ -277,9 +277,9 @@ def _check(
     }
     for name, (value, most, unit) in ranges.items():
         if not 0 <= value <= most:
-            raise ModelError(f"{name} is {value}. Remedy: give 0 to {most:g} {unit}.")
+            raise ModelError(f"{name} is {value}", remedy=f"give 0 to {most:g} {unit}")
     if slew is not None and not 0 < slew < np.inf:
-        raise ModelError(f"slew is {slew}. Remedy: give a positive number, in bar/s.")
+        raise ModelError(f"slew is {slew}", remedy="give a positive number, in bar/s")
 
 
 def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:

@@ -37,7 +37,7 @@ class DisturbanceObserver(Controller):
     def __post_init__(self) -> None:
         if not self.filter_time > 0:
             raise ModelError(
-                f"filter_time is {self.filter_time}. Remedy: give a positive time in seconds."
+                f"filter_time is {self.filter_time}", remedy="give a positive time in seconds"
             )
         self._model = self.compensator.inverse()
         self.forward_model = self._model

@@ -36,7 +36,7 @@ def dead_time_undone(compensator: Block) -> float:
 def samples_ahead(preview: float, sample_time: float) -> int:
     """Return a preview in whole samples, rounded, or refuse one that is out of range."""
     if not 0 <= preview <= MOST_PREVIEW:
-        raise ModelError(f"preview is {preview}. Remedy: give 0 to {MOST_PREVIEW:g} s.")
+        raise ModelError(f"preview is {preview}", remedy=f"give 0 to {MOST_PREVIEW:g} s")
     return round(preview / sample_time)
 
 

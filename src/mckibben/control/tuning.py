@@ -144,9 +144,10 @@ def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
         found = [one for one in rig.outputs if not one.startswith((*COMMANDS, "force"))]
     if len(found) != 1:
         raise ModelError(
-            "PID follows a displacement or an angle for every pressure or voltage, each moved by its "
-            f"own; {rig.name} is driven by {', '.join(driven)} and gives {', '.join(rig.outputs)}. "
-            "Remedy: use the compensator alone, or another rig."
+            "PID follows a displacement or an angle for every pressure or voltage, each "
+            f"moved by its own; {rig.name} is driven by {', '.join(driven)} and gives "
+            f"{', '.join(rig.outputs)}",
+            remedy="use the compensator alone, or another rig",
         )
     return found[0]
 
@@ -180,7 +181,8 @@ def _simc(
     final = float(_settled(response).mean())
     if not _moves(response):
         raise ModelError(
-            f"{name} moves nothing. Remedy: check the plant, or its middle {name.partition('_')[0]}."
+            f"{name} moves nothing",
+            remedy=f"check the plant, or its middle {name.partition('_')[0]}",
         )
     way = np.sign(final)  # a displacement that counts stretching falls as pressure rises
     final, response = way * final, way * response

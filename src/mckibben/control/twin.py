@@ -107,8 +107,9 @@ class Twin:
         outputs = tuple(channel.name for channel in self.forward.outputs)
         if commands(self.forward) or any(map(drives, self.forward.outputs)):
             raise ModelError(
-                f"{self.forward.title!r} gives {', '.join(outputs)}, and loops follow motions or a "
-                "force. Remedy: give the model of a muscle, not its inverse."
+                f"{self.forward.title!r} gives {', '.join(outputs)}, and loops follow "
+                "motions or a force",
+                remedy="give the model of a muscle, not its inverse",
             )
         self.outputs = outputs
         self.inputs = tuple(plain(c.name) for c in self.forward.inputs)
@@ -119,8 +120,8 @@ class Twin:
         if own is not None and abs(self.sample_time - own) > 1e-9 * own:
             raise ModelError(
                 f"{self.forward.title!r} is a model of steps of {own:g} s, and a loop of "
-                f"{self.sample_time:g} s is closed on it. Remedy: resample the reference to that, "
-                "or take a model of any sample time."
+                f"{self.sample_time:g} s is closed on it",
+                remedy="resample the reference to that, or take a model of any sample time",
             )
         self.held = dict(held or {})
         given = {name: Ends(*map(float, ends)) for name, ends in (limits or {}).items()}
@@ -169,8 +170,8 @@ class Twin:
         """
         if name not in self._limits:
             raise ModelError(
-                f"{self.forward.title!r} does not say how far its {name} may go. Remedy: say it "
-                f"(--limits {name}=LOW:HIGH, or limits of a twin), or calibrate it."
+                f"{self.forward.title!r} does not say how far its {name} may go",
+                remedy=f"say it (--limits {name}=LOW:HIGH, or limits of a twin), or calibrate it",
             )
         return self._limits[name]
 
@@ -304,8 +305,9 @@ class Twin:
         found = self._stream.step(np.minimum(np.maximum(row, low), high))
         if self._stream.status != Stream.GOOD:
             raise ModelError(
-                f"{self.forward.title!r} gives no finite output at {', '.join(f'{x:g}' for x in row)}. "
-                "Remedy: stay where it was identified, or identify it again."
+                f"{self.forward.title!r} gives no finite output at "
+                f"{', '.join(f'{x:g}' for x in row)}",
+                remedy="stay where it was identified, or identify it again",
             )
         return found.copy() if self._scatter is None else self._scatter.on(found)
 

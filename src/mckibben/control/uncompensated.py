@@ -183,7 +183,7 @@ def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
     places, of = np.unique(smooth, return_inverse=True)
     if places.size < 2:
         raise ModelError(
-            f"{name} does not move with the command. Remedy: check the plant and its limits."
+            f"{name} does not move with the command", remedy="check the plant and its limits"
         )
     at = np.bincount(of, command) / np.bincount(of)  # of a stretch that is flat, its middle
     knots = np.linspace(places[0], places[-1], KNOTS)

@@ -170,8 +170,8 @@ def calibration(
     model = inside(model)
     if commands(model):
         raise ModelError(
-            f"{model.title!r} gives inputs, and bands are of outputs. Remedy: calibrate the model that "
-            "was inverted."
+            f"{model.title!r} gives inputs, and bands are of outputs",
+            remedy="calibrate the model that was inverted",
         )
     if not recordings:
         raise DataError("there is nothing to calibrate on", remedy="give at least one recording")

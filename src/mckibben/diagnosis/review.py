@@ -200,7 +200,7 @@ def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block |
         model = compensator.forward_model
     if model is None:
         raise ModelError(
-            "it is not known which model was in the loop. Remedy: give the model too, with --model."
+            "it is not known which model was in the loop", remedy="give the model too, with --model"
         )
     model = inside(model)
     if compensator is None:
@@ -211,9 +211,9 @@ def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block |
     driven = {c.name for c in model.inputs}.difference(model.scheduling)
     if {c.name for c in compensator.outputs} != driven:
         raise ModelError(
-            f"the compensator gives {', '.join(c.name for c in compensator.outputs)}, but the model "
-            f"takes {', '.join(sorted(driven))}. Remedy: give a compensator and the model that it "
-            "undoes."
+            f"the compensator gives {', '.join(c.name for c in compensator.outputs)}, "
+            f"but the model takes {', '.join(sorted(driven))}",
+            remedy="give a compensator and the model that it undoes",
         )
     return model, compensator
 

@@ -159,8 +159,8 @@ def settings_of_all(models: Iterable[str], written: Sequence[str]) -> dict[str, 
         if not (equals and takers):
             every = sorted({setting for some in known.values() for setting in some})
             raise ModelError(
-                f"{item!r}: {', '.join(estimators)} has no setting {name!r}. Remedy: give NAME=VALUE, "
-                f"or MODEL.NAME=VALUE, of {', '.join(every)}."
+                f"{item!r}: {', '.join(estimators)} has no setting {name!r}",
+                remedy=f"give NAME=VALUE, or MODEL.NAME=VALUE, of {', '.join(every)}",
             )
         for model in takers:
             found[model][name] = setting_value(text.strip())

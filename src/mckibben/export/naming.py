@@ -75,9 +75,10 @@ def identifier(name: str) -> str:
         or name.lower().startswith("mck")
     ):
         raise ModelError(
-            f"{name!r:.60} cannot name C functions. Remedy: give --name a letter and then letters, "
-            f"digits or underscores, at most {LONGEST}, no word of C or name of its headers, and not "
-            "starting with mck."
+            f"{name!r:.60} cannot name C functions",
+            remedy="give --name a letter and then letters, digits or underscores, at most "
+            f"{LONGEST}, no word of C or name of its headers, and not starting with "
+            "mck",
         )
     return name
 

@@ -49,7 +49,7 @@ def run(command: Sequence[str], failed: str, *, folder: Path | None = None) -> s
     )
     if found.returncode != 0:
         complaint = found.stderr.strip() or found.stdout.strip()
-        raise ModelError(f"{failed}: {complaint[:500]} Remedy: report it, with the model.")
+        raise ModelError(f"{failed}: {complaint[:500]}", remedy="report it, with the model")
     return found.stdout
 
 
@@ -64,8 +64,8 @@ def compile_c(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()
     compiler = own_compiler()
     if compiler is None:
         raise ModelError(
-            "there is no C compiler on this machine. Remedy: install gcc or clang, or leave --check "
-            "out and compile the folder elsewhere."
+            "there is no C compiler on this machine",
+            remedy="install gcc or clang, or leave --check out and compile the folder elsewhere",
         )
     command = [compiler, *FLAGS, *options, "-o", str(out), *map(str, sources), "-lm"]
     run(command, "the exported C does not compile")

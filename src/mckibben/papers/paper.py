@@ -136,5 +136,5 @@ def printed(name: str) -> Any:
         if name in each.models:
             return each.printed(name)
     raise ModelError(
-        f"there is no printed model {name!r}. Remedy: use one of {', '.join(printed_models())}."
+        f"there is no printed model {name!r}", remedy=f"use one of {', '.join(printed_models())}"
     )

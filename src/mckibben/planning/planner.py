@@ -295,8 +295,8 @@ def _of_muscle(given: str | Path, rig: Rig | None) -> tuple[Block, Limits]:
             limits[channel.name] = Limit(0.0, high, high / CROSSING, 0.0)
         elif channel.name not in limits:
             raise ModelError(
-                f"{like.name!r} is driven by {channel.name}, which is unknown here. "
-                "Remedy: plan from recordings."
+                f"{like.name!r} is driven by {channel.name}, which is unknown here",
+                remedy="plan from recordings",
             )
     return block, limits
 
@@ -326,8 +326,8 @@ def _parameters(
             flat = sensitivities(block, places, sizes, run)
         if not (np.abs(flat) < LARGEST).all():
             raise ModelError(
-                f"{block.kind!r} does not run free within these limits. "
-                "Remedy: identify it again, or plan with another --model."
+                f"{block.kind!r} does not run free within these limits",
+                remedy="identify it again, or plan with another --model",
             )
         return flat.reshape(len(recording), len(outputs), -1)
 

@@ -72,7 +72,7 @@ def inverse(study: Study) -> Drawing:
     """Wished-for and modelled output, error, and the input that the inverse gives."""
     if study.inverse is None or study.inverse.reachable is None:
         raise ModelError(
-            "no model of this study has an inverse. Remedy: compare pi, mpi and gpi, which can."
+            "no model of this study has an inverse", remedy="compare pi, mpi and gpi, which can"
         )
     return model_subjects.inverse_check(study.inverse, study.train[0].sample_time is not None)
 
@@ -203,7 +203,7 @@ def _pair(study: Study) -> tuple[str, str]:
 def _chosen(one: Shown) -> dict[str, Array]:
     if not one.outputs:
         raise ModelError(
-            "no model of this study worked. Remedy: read the reasons in its leaderboard."
+            "no model of this study worked", remedy="read the reasons in its leaderboard"
         )
     return dict(list(one.outputs.items())[:1])
 
@@ -217,5 +217,5 @@ def _driving(block: Block, recording: Recording) -> tuple[str, ...]:
 
 def _known(name: str, names: tuple[str, ...]) -> str:
     if name not in names:
-        raise ModelError(f"there is no figure {name!r}. Remedy: use one of {', '.join(names)}.")
+        raise ModelError(f"there is no figure {name!r}", remedy=f"use one of {', '.join(names)}")
     return name

@@ -46,7 +46,7 @@ def leaderboard(board: Leaderboard) -> Drawing:
     """
     ranked = [row for row in board.rows if row.train is not None and row.test is not None]
     if not ranked:
-        raise ModelError("no model worked, so there is nothing to rank. Remedy: read the reasons.")
+        raise ModelError("no model worked, so there is nothing to rank", remedy="read the reasons")
     place = np.arange(len(ranked), dtype=float)
     tested = np.array([row.test.rmse for row in ranked if row.test is not None])
     fitted = np.array([row.train.rmse for row in ranked if row.train is not None])
@@ -93,8 +93,8 @@ def weights(blocks: Mapping[str, Block]) -> Drawing:
                 panels.append(Panel(x_label, "weight", (stems,), heading, zero=True))
     if not panels:
         raise ModelError(
-            "no model here is a weighted sum of play operators, so it has no weights to draw. "
-            "Remedy: draw the fit or the loops."
+            "no model here is a weighted sum of play operators, so it has no weights to draw",
+            remedy="draw the fit or the loops",
         )
     note = "" if len(panels) <= N_COLOURS else f"{len(panels) - N_COLOURS} more are not shown."
     return Drawing(tuple(panels[:N_COLOURS]), note=note)

@@ -55,7 +55,8 @@ def check_rig(rig: Rig, *, seed: int = 0) -> None:
 def _demand(rig: Rig, holds: bool, law: str) -> None:
     if not holds:
         raise ContractError(
-            f"the rig {rig.name!r} breaks the contract: {law}. Remedy: mend its parameters or set-up."
+            f"the rig {rig.name!r} breaks the contract: {law}",
+            remedy="mend its parameters or set-up",
         )
 
 

@@ -140,8 +140,8 @@ class Node:
             )
         if any(channel.unit != "bar" for channel in block.outputs):
             raise ModelError(
-                f"{block.title!r} gives {block.outputs[0].name}, not pressures. Remedy: give the "
-                "compensator, from mckibben invert."
+                f"{block.title!r} gives {block.outputs[0].name}, not pressures",
+                remedy="give the compensator, from mckibben invert",
             )
         n = len(block.inputs) - len(block.scheduling)
         wanted, others = block.inputs[:n], block.inputs[n:]

@@ -88,7 +88,8 @@ class CompiledMuscle:
         )
         if not _library().mck_muscle(number, ctypes.byref(told)):
             raise ModelError(
-                f"there are more than {MOST} different muscles in C. Remedy: start a process for others."
+                f"there are more than {MOST} different muscles in C",
+                remedy="start a process for others",
             )
         _kept.append(self)
         return number
@@ -105,7 +106,7 @@ def _library() -> ctypes.CDLL:
         engine = next(iter(sorted(package.glob("libmujoco*"))), None)
         if engine is None:
             raise ModelError(
-                "MuJoCo's library is not in its package. Remedy: use muscles in Python."
+                "MuJoCo's library is not in its package", remedy="use muscles in Python"
             )
         with tempfile.TemporaryDirectory() as place:
             library = Path(place) / "actuator.so"
@@ -140,7 +141,8 @@ def install(ours: Any) -> None:
     now = mujoco.get_mjcb_act_bias()
     if now is not None and now is not ours:
         raise ModelError(
-            "actuators of this process have another callback already. Remedy: have all muscles in C or "
-            "all in Python; or mujoco.set_mjcb_act_bias(None), where the others are done with."
+            "actuators of this process have another callback already",
+            remedy="have all muscles in C or all in Python; or "
+            "mujoco.set_mjcb_act_bias(None), where the others are done with",
         )
     mujoco.set_mjcb_act_bias(ours)

@@ -207,8 +207,8 @@ def _bias(m: mujoco.MjModel, d: mujoco.MjData, actuator: int) -> float:
     muscle = _attached[int(number) - 1]
     if m.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         raise ModelError(
-            "muscles that remember step once a sample, RK4 four times. Remedy: choose the integrator "
-            "Euler, implicit or implicitfast."
+            "muscles that remember step once a sample, RK4 four times",
+            remedy="choose the integrator Euler, implicit or implicitfast",
         )
     act = m.actuator_actadr[actuator]
     pressure = float(d.act[act] if act >= 0 else d.ctrl[actuator])

@@ -61,17 +61,18 @@ def pulling(model: Block) -> Pulling:
     if len(units) != 2 or len(along) != 1 or len(pressure) != 1 or gives != ["N"]:
         told = ", ".join(f"{channel.name} [{channel.unit or 1}]" for channel in block.inputs)
         raise ModelError(
-            f"{model.title!r} does not tell a muscle's force by its place and pressure: it takes "
-            f"{told}. Remedy: identify 'balance' on recordings with a measured force, 'multistate' or "
-            "a force law."
+            f"{model.title!r} does not tell a muscle's force by its place and pressure: "
+            f"it takes {told}",
+            remedy="identify 'balance' on recordings with a measured force, 'multistate' or "
+            "a force law",
         )
     estimate = _estimate_in(block)
     share = 1.0
     if estimate is not None:
         if any(estimate.forward.mass):
             raise ModelError(
-                "the balance has a mass of its own, which belongs to the simulator's bodies. Remedy: "
-                "identify it without mass."
+                "the balance has a mass of its own, which belongs to the simulator's bodies",
+                remedy="identify it without mass",
             )
         share = estimate.forward.loads[0][0]
     return Pulling(block, share, along[0], pressure[0], stems[along[0]] == "displacement")

@@ -96,8 +96,8 @@ class FixedRate:
     def __post_init__(self) -> None:
         if not 0 < self.period < math.inf or not self.duration > 0:
             raise ModelError(
-                f"a period of {self.period} s and a duration of {self.duration} s. "
-                "Remedy: give positive times."
+                f"a period of {self.period} s and a duration of {self.duration} s",
+                remedy="give positive times",
             )
 
     @property

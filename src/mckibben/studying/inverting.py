@@ -142,8 +142,8 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
             )
         else:
             raise ModelError(
-                f"{model!r} has no output that it can reach whatever happened before. "
-                "Remedy: identify it on a recording that covers the range of interest."
+                f"{model!r} has no output that it can reach whatever happened before",
+                remedy="identify it on a recording that covers the range of interest",
             )
     reference = wished.matrix(channel.name for channel in block.outputs)
     span = np.ptp(reference, axis=0) if reachable is None else np.array([high - low])
@@ -157,8 +157,8 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
     error = float((np.abs(output_of - reference) / span).max())
     if not error <= most:
         raise ModelError(
-            f"the inverse of {model!r} misses a reachable reference by {error:.1e} of its range. "
-            "Remedy: invert another model."
+            f"the inverse of {model!r} misses a reachable reference by {error:.1e} of its range",
+            remedy="invert another model",
         )
     commanded = inverse.outputs == block.inputs[: len(inverse.outputs)]
     plain = _without(block, recording, reference, step) if commanded else None

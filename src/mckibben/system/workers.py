@@ -187,8 +187,8 @@ class Workers:
         process.join()
         link.close()
         return WorkerError(
-            f"its process ended without a word (exit code {process.exitcode}). "
-            "Remedy: see whether memory is short; give fewer processes with --jobs."
+            f"its process ended without a word (exit code {process.exitcode})",
+            remedy="see whether memory is short; give fewer processes with --jobs",
         )
 
 
@@ -362,7 +362,7 @@ def understood(given: object) -> tuple[str, Any]:
         words = "its process gave no answer that is understood"
     except Exception as error:
         words = f"what its process gave cannot be read: {said(error)}"
-    return "raised", WorkerError(f"{words}. Remedy: use the same versions everywhere.")
+    return "raised", WorkerError(f"{words}", remedy="use the same versions everywhere")
 
 
 def _packed(kind: str, what: Any) -> bytes:

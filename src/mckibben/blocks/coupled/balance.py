@@ -255,13 +255,15 @@ class Balance(Invertible):
         n, m, n_x = len(self.given), len(self.driven), self.n_schedules
         if n_x < 0:
             raise ModelError(
-                f"{self.kind!r} has {self.n_loads} loads, and {len(self.scheduled)} channels that "
-                "schedule or load it. Remedy: give every load a channel, behind what schedules."
+                f"{self.kind!r} has {self.n_loads} loads, and {len(self.scheduled)} "
+                "channels that schedule or load it",
+                remedy="give every load a channel, behind what schedules",
             )
         if m > n or (m < n and not self.directions):
             raise ModelError(
-                f"given of {self.kind!r} are {n} pressures of {m} coordinates. Remedy: give a pressure "
-                "for every coordinate, or, of more muscles, their directions."
+                f"given of {self.kind!r} are {n} pressures of {m} coordinates",
+                remedy="give a pressure for every coordinate, or, of more muscles, their "
+                "directions",
             )
         widths = {
             "springs": (m, (1 + n_x * self.degree) * (1 + m)),
@@ -282,8 +284,8 @@ class Balance(Invertible):
             table = getattr(self, name)
             if len(table) != count or any(len(row) != width for row in table):
                 raise ModelError(
-                    f"{name} of {self.kind!r} has rows of {[len(row) for row in table]}. "
-                    f"Remedy: give {count} rows of {width}."
+                    f"{name} of {self.kind!r} has rows of {[len(row) for row in table]}",
+                    remedy=f"give {count} rows of {width}",
                 )
         optional = ("lines", "bladders", "pushes", "mass")
         lengths = dict.fromkeys(("damping", "walls", *optional), n) | {"grips": n_x}
@@ -291,14 +293,15 @@ class Balance(Invertible):
             values = getattr(self, name)
             if len(values) != count and (values or name in ("damping", "walls")):
                 raise ModelError(
-                    f"{name} of {self.kind!r} has {len(values)} entries. Remedy: give {count}."
+                    f"{name} of {self.kind!r} has {len(values)} entries", remedy=f"give {count}"
                 )
 
     def _check_physics(self) -> None:
         """Refuse numbers that would make energy, or mean nothing."""
         if self.pressure_range is not None and not self.pressure_range[0] < self.pressure_range[1]:
             raise ModelError(
-                f"pressure_range of {self.kind!r} is {self.pressure_range}. Remedy: the lower end first."
+                f"pressure_range of {self.kind!r} is {self.pressure_range}",
+                remedy="the lower end first",
             )
         at_rest = [row[0] for row in self.areas]
         positive = {"limits": self.limits, "lags": self.lags, "areas at rest": at_rest}
@@ -306,23 +309,24 @@ class Balance(Invertible):
             rises = name != "limits" or all(a < b for a, b in pairwise(values))
             if any(not value > 0 for value in values) or not rises:
                 raise ModelError(
-                    f"{name} of {self.kind!r} are {values}. Remedy: give positive ones"
-                    f"{', in increasing order' if name == 'limits' else ''}."
+                    f"{name} of {self.kind!r} are {values}",
+                    remedy=f"give positive ones{', in increasing order' if name == 'limits' else ''}",
                 )
         stiffnesses = np.reshape(self.obstacles, (-1, 3 + self.n_schedules))[:, 2:]
         named = {name: getattr(self, name) for name in NOT_NEGATIVE} | {"obstacles": stiffnesses}
         for name, values in named.items():
             if any(value < 0 for value in np.ravel(values)):
                 raise ModelError(
-                    f"{name} of {self.kind!r} has a number below 0, which would make energy. "
-                    "Remedy: give none below 0."
+                    f"{name} of {self.kind!r} has a number below 0, which would make energy",
+                    remedy="give none below 0",
                 )
         if self.mass and self.pushes:
             raise ModelError(
-                f"{self.kind!r} has mass and muscles that go slack. Remedy: give one of mass and pushes."
+                f"{self.kind!r} has mass and muscles that go slack",
+                remedy="give one of mass and pushes",
             )
         if any(not low < high for low, high in self.hull):
-            raise ModelError(f"hull of {self.kind!r} is {self.hull}. Remedy: lower ends first.")
+            raise ModelError(f"hull of {self.kind!r} is {self.hull}", remedy="lower ends first")
 
     def equations(self) -> tuple[str, ...]:
         """Return the balance of forces, without what this one lacks; then area and elasticity."""

@@ -145,18 +145,20 @@ class CoupledMemory(Block):
         n = len(self.inputs)
         if not self.lags or min(self.lags) < 0:
             raise ModelError(
-                f"lags of {self.kind!r} are {self.lags}. Remedy: give time constants, none negative."
+                f"lags of {self.kind!r} are {self.lags}",
+                remedy="give time constants, none negative",
             )
         if len(self.thresholds) != n or len({len(row) for row in self.thresholds}) > 1:
             raise ModelError(
                 f"{self.kind!r} of {n} inputs has thresholds of "
-                f"{[len(row) for row in self.thresholds]}. Remedy: give as many for each input."
+                f"{[len(row) for row in self.thresholds]}",
+                remedy="give as many for each input",
             )
         width = readout_width(n, len(self.lags), len(self.thresholds[0]), self.degree, self.crossed)
         if len(self.readout) != len(self.given) or any(len(row) != width for row in self.readout):
             raise ModelError(
-                f"readout of {self.kind!r} has rows of {[len(row) for row in self.readout]}. "
-                f"Remedy: give {len(self.given)} rows of {width}."
+                f"readout of {self.kind!r} has rows of {[len(row) for row in self.readout]}",
+                remedy=f"give {len(self.given)} rows of {width}",
             )
 
     @property

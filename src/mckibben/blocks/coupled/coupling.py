@@ -69,8 +69,8 @@ class Coupling(Block):
         n, m = len(self.driven), len(self.given)
         if min(n, m) == 0 or widths != [m] * n:
             raise ModelError(
-                f"gains of {self.kind!r} have rows of {widths}, and it {n} inputs and {m} outputs. "
-                "Remedy: give a row an input, of one number an output."
+                f"gains of {self.kind!r} have rows of {widths}, and it {n} inputs and {m} outputs",
+                remedy="give a row an input, of one number an output",
             )
 
     @property
@@ -88,7 +88,7 @@ class Coupling(Block):
         n, m = self.matrix.shape
         if n != m:
             raise ModelError(
-                f"{n} inputs and {m} outputs have no such radius. Remedy: use inverse()."
+                f"{n} inputs and {m} outputs have no such radius", remedy="use inverse()"
             )
         return float(np.abs(np.linalg.eigvals(np.eye(n) - self.matrix.T)).max())
 
@@ -103,8 +103,9 @@ class Coupling(Block):
         condition = float(np.linalg.cond(self.matrix))
         if not condition < WORST_CONDITION:
             raise ModelError(
-                f"the coupling cannot be undone: its gains are singular (condition {condition:.1e}). "
-                "Remedy: identify it from runs in which each muscle is driven alone."
+                "the coupling cannot be undone: its gains are singular (condition "
+                f"{condition:.1e})",
+                remedy="identify it from runs in which each muscle is driven alone",
             )
         undone = np.linalg.inv if len(self.driven) == len(self.given) else np.linalg.pinv
         return Coupling(rows(undone(self.matrix)), self.given, self.driven)

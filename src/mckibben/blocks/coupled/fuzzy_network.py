@@ -321,22 +321,24 @@ class FuzzyNetwork(Invertible):
         sets = [len(row) for row in self.centres]
         if len(sets) != len(self.inputs) or sets != [len(row) for row in self.widths] or 0 in sets:
             raise ModelError(
-                f"{self.kind!r} of {len(self.inputs)} inputs has centres of {sets} and widths of "
-                f"{[len(row) for row in self.widths]} sets. Remedy: give each input as many of both."
+                f"{self.kind!r} of {len(self.inputs)} inputs has centres of {sets} and "
+                f"widths of {[len(row) for row in self.widths]} sets",
+                remedy="give each input as many of both",
             )
         wanted = int(np.prod(sets)) * len(self.given) * (len(sets) + self.constants)
         if len(self.consequents) != wanted:
             raise ModelError(
                 f"{self.kind!r} of this structure has {wanted} consequents, got "
-                f"{len(self.consequents)}. Remedy: give {wanted}."
+                f"{len(self.consequents)}",
+                remedy=f"give {wanted}",
             )
         if self.limits is not None and (
             len(self.limits) != len(self.driven)
             or any(len(pair) != 2 or not pair[0] < pair[1] for pair in self.limits)
         ):
             raise ModelError(
-                f"limits of {self.kind!r} are {self.limits}. "
-                "Remedy: give the lowest and highest of every driven input."
+                f"limits of {self.kind!r} are {self.limits}",
+                remedy="give the lowest and highest of every driven input",
             )
 
     @property
@@ -371,8 +373,9 @@ class FuzzyNetwork(Invertible):
         """Demand as many outputs as driven inputs, and limits."""
         if len(self.given) != len(self.driven) or self.limits is None:
             raise ModelError(
-                f"{self.kind!r} with {len(self.driven)} driven inputs, {len(self.given)} outputs and "
-                f"limits {self.limits} has no inverse. Remedy: give as many of both, and limits."
+                f"{self.kind!r} with {len(self.driven)} driven inputs, {len(self.given)} "
+                f"outputs and limits {self.limits} has no inverse",
+                remedy="give as many of both, and limits",
             )
 
     @property

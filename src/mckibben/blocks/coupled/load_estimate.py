@@ -132,19 +132,20 @@ class LoadEstimate(Block):
         n, n_loads = loads.shape
         if n_loads == 0:
             raise ModelError(
-                "a balance that knows no load tells none. Remedy: identify it on recordings with a "
-                "measured force."
+                "a balance that knows no load tells none",
+                remedy="identify it on recordings with a measured force",
             )
         if any(channel.unit != "bar" for channel in self.forward.given):
             raise ModelError(
                 "a load is told by measured pressures, and this balance knows "
-                f"{self.forward.given[0].name} in {self.forward.given[0].unit}. Remedy: identify it "
-                "from the pressure (--input pressure)."
+                f"{self.forward.given[0].name} in {self.forward.given[0].unit}",
+                remedy="identify it from the pressure (--input pressure)",
             )
         if np.linalg.matrix_rank(loads) < n_loads:
             raise ModelError(
-                f"{n_loads} load(s) pull at {n} muscle(s) in the shares {self.forward.loads}, which "
-                "do not tell them apart. Remedy: identify a balance with fewer loads."
+                f"{n_loads} load(s) pull at {n} muscle(s) in the shares "
+                f"{self.forward.loads}, which do not tell them apart",
+                remedy="identify a balance with fewer loads",
             )
 
     @property
@@ -181,14 +182,14 @@ def load_of(model: Block) -> Block:
         If the model knows no load, or its coordinates are not measured one by one.
     """
     if isinstance(model, LoadEstimate):
-        raise ModelError("this is an estimate of loads already. Remedy: simulate it.")
+        raise ModelError("this is an estimate of loads already", remedy="simulate it")
     if isinstance(model, Balance):
         return LoadEstimate(model)
     placed = balance_in(model)
     if placed is None or not placed.solved or len(placed.behind) > 1:
         raise ModelError(
-            f"{model.title!r} does not tell loads by displacements and pressures. Remedy: identify "
-            "'balance', on recordings with a measured force."
+            f"{model.title!r} does not tell loads by displacements and pressures",
+            remedy="identify 'balance', on recordings with a measured force",
         )
     balance, before = placed.balance, placed.before
     measured = [_each(block.inverse(), balance.driven) for block in placed.behind]

@@ -191,21 +191,23 @@ class RecurrentFuzzyNetwork(Block):
         self.check_channels()
         if len(self.driven) != 1 or len(self.given) != 1:
             raise ModelError(
-                f"{self.kind!r} has {len(self.driven)} driven inputs and {len(self.given)} outputs. "
-                "Remedy: give one of each."
+                f"{self.kind!r} has {len(self.driven)} driven inputs and {len(self.given)} outputs",
+                remedy="give one of each",
             )
         sets = {len(row) for rows in (self.centres, self.widths, self.feedbacks) for row in rows}
         rows = {len(self.centres), len(self.widths), len(self.feedbacks)}
         if rows != {self.n_regressors} or len(sets) != 1 or sets == {0}:
             raise ModelError(
-                f"{self.kind!r} wants centres, widths and feedbacks of {self.n_regressors} inputs, as "
-                "many sets for each. Remedy: give them."
+                f"{self.kind!r} wants centres, widths and feedbacks of {self.n_regressors} "
+                "inputs, as many sets for each",
+                remedy="give them",
             )
         wanted = self.n_sets**self.n_regressors * (self.n_regressors + self.constants)
         if len(self.consequents) != wanted:
             raise ModelError(
                 f"{self.kind!r} of this structure has {wanted} consequents, got "
-                f"{len(self.consequents)}. Remedy: give {wanted}."
+                f"{len(self.consequents)}",
+                remedy=f"give {wanted}",
             )
 
     @property

@@ -196,8 +196,9 @@ class Air(Invertible):
         lowest, highest = self.pressures
         if not lowest < highest:
             raise ModelError(
-                f"{self.kind!r} has an ambient pressure of {lowest:g} and a supply of {highest:g} "
-                f"{self.output.unit}. Remedy: give a supply above the ambient pressure, or None."
+                f"{self.kind!r} has an ambient pressure of {lowest:g} and a supply of "
+                f"{highest:g} {self.output.unit}",
+                remedy="give a supply above the ambient pressure, or None",
             )
 
     @property
@@ -240,8 +241,9 @@ class Air(Invertible):
         late = self.dead_time / step
         if not late <= fields.LONGEST_DELAY + 0.5:
             raise ModelError(
-                f"a dead time of {self.dead_time:g} s is {late:.0f} samples. Remedy: a dead time "
-                f"of at most {fields.LONGEST_DELAY} samples, or a longer sample time."
+                f"a dead time of {self.dead_time:g} s is {late:.0f} samples",
+                remedy=f"a dead time of at most {fields.LONGEST_DELAY} samples, or a longer "
+                "sample time",
             )
         times = (self.filling_time, self.venting_time)
         shares = [-math.expm1(-step / time) if time > 0 else 1.0 for time in times]

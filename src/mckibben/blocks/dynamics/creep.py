@@ -130,11 +130,12 @@ class Creep(Invertible):
         if len(self.compliances) != len(self.time_constants):
             raise ModelError(
                 f"{self.kind!r} has {len(self.compliances)} compliances and "
-                f"{len(self.time_constants)} time constants. Remedy: give one to each."
+                f"{len(self.time_constants)} time constants",
+                remedy="give one to each",
             )
         if min(self.compliances, default=0.0) < 0:
             raise ModelError(
-                f"{self.kind!r} has a negative compliance. Remedy: give compliances of 0 or more."
+                f"{self.kind!r} has a negative compliance", remedy="give compliances of 0 or more"
             )
 
     def coefficients(self, sample_time: float | None) -> Array:

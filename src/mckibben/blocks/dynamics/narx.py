@@ -209,7 +209,7 @@ class Narx(Block):
     def __post_init__(self) -> None:
         check_order(self.kind, self.thresholds)
         if not self.places:
-            raise ModelError(f"{self.kind!r} has no regressors. Remedy: give a lag or an operator.")
+            raise ModelError(f"{self.kind!r} has no regressors", remedy="give a lag or an operator")
 
     @property
     def n_states(self) -> int:
@@ -280,8 +280,8 @@ class NarxPolynomial(Narx):
             not 0 <= factor < most for term in self.terms for factor in term
         ):
             raise ModelError(
-                f"the terms of {self.kind!r} do not fit. Remedy: give one weight a term, and factors "
-                f"between 0 and {most - 1}."
+                f"the terms of {self.kind!r} do not fit",
+                remedy=f"give one weight a term, and factors between 0 and {most - 1}",
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -367,8 +367,8 @@ class NarxNetwork(Narx):
         n = len(self.places)
         if len(self.linear) != n or len(self.hidden) % (n + 2) != 0:
             raise ModelError(
-                f"the weights of {self.kind!r} do not fit {n} regressors. Remedy: give {n} linear ones, "
-                f"and {n + 2} numbers a unit."
+                f"the weights of {self.kind!r} do not fit {n} regressors",
+                remedy=f"give {n} linear ones, and {n + 2} numbers a unit",
             )
 
     def coefficients(self, sample_time: float | None) -> Array:

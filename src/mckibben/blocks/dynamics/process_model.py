@@ -126,8 +126,8 @@ class ProcessModel(Block):
         n = len(self.time_constants)
         if not 1 <= n <= 3 or (self.damping is not None and n != 1):
             raise ModelError(
-                f"{self.kind!r} has the time constants {self.time_constants}. Remedy: give one to three "
-                "[s], and one alone with a damping."
+                f"{self.kind!r} has the time constants {self.time_constants}",
+                remedy="give one to three [s], and one alone with a damping",
             )
 
     @property
@@ -233,8 +233,9 @@ class ProcessModel(Block):
         """
         if self.delay > 0:
             raise ModelError(
-                f"{self.kind!r} has a dead time of {self.delay:g} s, which a continuous transfer "
-                "function has no place for. Remedy: give a sample time."
+                f"{self.kind!r} has a dead time of {self.delay:g} s, which a continuous "
+                "transfer function has no place for",
+                remedy="give a sample time",
             )
         zero = [] if self.zero_time is None else [self.gain * self.zero_time]
         return Polynomials((*zero, self.gain), tuple(self.denominator().tolist()))
@@ -248,8 +249,8 @@ def _discretised(model: ProcessModel, sample_time: float | None) -> Array:
     m = int(np.floor(samples + 1e-9))
     if m > fields.LONGEST_DELAY:
         raise ModelError(
-            f"a delay of {model.delay:g} s is {m} samples. Remedy: a delay of at most "
-            f"{fields.LONGEST_DELAY} samples, or a longer sample time."
+            f"a delay of {model.delay:g} s is {m} samples",
+            remedy=f"a delay of at most {fields.LONGEST_DELAY} samples, or a longer sample time",
         )
     part = min(max(samples - m, 0.0), 1.0)
     a, b, c, through = _state_space(model)

@@ -63,8 +63,9 @@ def steady_state(block: Any, recording: Recording) -> Recording:
         before = now.copy()
     if not change <= REPEATS * np.ptp(now):
         raise ModelError(
-            f"the response of {block.kind!r} to {recording.name} does not come to repeat itself in "
-            f"{PERIODS} periods. Remedy: use simulate, which starts from rest."
+            f"the response of {block.kind!r} to {recording.name} does not come to repeat "
+            f"itself in {PERIODS} periods",
+            remedy="use simulate, which starts from rest",
         )
     units = {block.outputs[0].name: block.outputs[0].unit}
     kept = recording.select([block.inputs[0].name])

@@ -183,9 +183,10 @@ class StateNetwork(Block):
         read = [len(row) for row in self.readout]
         if not n or not units or {*wide} != {n + 2} or read != [units] * n:
             raise ModelError(
-                f"{self.kind!r} has rows of weights of lengths {wide} and {read} for {n} states and "
-                f"{units} units. Remedy: give {n + 2} weights a state, {n + 2} a unit, and for every "
-                f"state {units} weights of units."
+                f"{self.kind!r} has rows of weights of lengths {wide} and {read} for {n} "
+                f"states and {units} units",
+                remedy=f"give {n + 2} weights a state, {n + 2} a unit, and for every state "
+                f"{units} weights of units",
             )
 
     @property
@@ -198,9 +199,10 @@ class StateNetwork(Block):
         step = self.rate * needs_sample_time(self.kind, sample_time) / self.substeps
         if not step <= FASTEST:
             raise ModelError(
-                f"{self.kind!r} of a rate of {self.rate:.3g} 1/s is too fast for {self.substeps} "
-                f"substep(s) of {sample_time:g} s together. Remedy: at least "
-                f"{np.ceil(3 * step * self.substeps):.0f} substeps, or a shorter sample time."
+                f"{self.kind!r} of a rate of {self.rate:.3g} 1/s is too fast for "
+                f"{self.substeps} substep(s) of {sample_time:g} s together",
+                remedy=f"at least {np.ceil(3 * step * self.substeps):.0f} substeps, or a "
+                "shorter sample time",
             )
         head = [step, self.substeps, self.hold == "zero", len(self.linear), len(self.hidden)]
         scales = [self.input_offset, self.input_scale, self.output_offset, self.output_scale]

@@ -183,7 +183,7 @@ class TransferFunction(Block):
 
         if not isinstance(horizon, int) or horizon < 1:
             raise ModelError(
-                f"the horizon is {horizon!r}. Remedy: predict a whole number of samples, 1 or more."
+                f"the horizon is {horizon!r}", remedy="predict a whole number of samples, 1 or more"
             )
         c, d = [1.0, *self.noise_numerator], [1.0, *self.noise_denominator]
         name = self.output.name
@@ -215,14 +215,15 @@ class TransferFunction(Block):
         lead = self.numerator[0]
         if lead == 0:
             raise ModelError(
-                f"{self.kind!r} has no inverse: its output answers a sample late. "
-                "Remedy: identify it with delay=0."
+                f"{self.kind!r} has no inverse: its output answers a sample late",
+                remedy="identify it with delay=0",
             )
         zeros = np.roots(self.numerator)
         if np.any(np.abs(zeros) >= 1 - 1e-9):
             raise ModelError(
-                f"{self.kind!r} has no inverse: a zero at |z| = {np.abs(zeros).max():.3g} would make it "
-                "unstable. Remedy: identify it with fewer coefficients in B, or invert another model."
+                f"{self.kind!r} has no inverse: a zero at |z| = {np.abs(zeros).max():.3g} "
+                "would make it unstable",
+                remedy="identify it with fewer coefficients in B, or invert another model",
             )
         b = np.array(self.numerator)
         return TransferFunction(

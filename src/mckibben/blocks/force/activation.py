@@ -161,8 +161,8 @@ class ActivationPressure(Block):
         sizes = (len(self.contractions), len(self.pressures), len(self.phi))
         if sizes != (4 * POINTS, 4 * POINTS, 4):
             raise ModelError(
-                f"{self.kind!r} has {sizes} coefficients of contractions, pressures and phi. Remedy: "
-                f"give {4 * POINTS}, {4 * POINTS} and 4."
+                f"{self.kind!r} has {sizes} coefficients of contractions, pressures and phi",
+                remedy=f"give {4 * POINTS}, {4 * POINTS} and 4",
             )
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -312,13 +312,15 @@ class ActivationMemory(Block):
         if len(self.surface) != size or len(self.friction) != n:
             raise ModelError(
                 f"{self.kind!r} has {len(self.surface)} numbers in its surface and "
-                f"{len(self.friction)} of friction. Remedy: give {size} and {n}."
+                f"{len(self.friction)} of friction",
+                remedy=f"give {size} and {n}",
             )
         check_order(self.kind, self.thresholds)
         if len(self.relaxation) != 2 * len(self.time_constants):
             raise ModelError(
-                f"{self.kind!r} has {len(self.relaxation)} numbers of relaxation and the time constants "
-                f"{self.time_constants}. Remedy: give two to every time constant."
+                f"{self.kind!r} has {len(self.relaxation)} numbers of relaxation and the "
+                f"time constants {self.time_constants}",
+                remedy="give two to every time constant",
             )
 
     @property

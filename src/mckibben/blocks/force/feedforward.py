@@ -103,8 +103,8 @@ class ForceFeedforward(Block):
         self.law.check_linear()
         if self.friction is not None and self.friction.inputs != self.law.inputs:
             raise ModelError(
-                "law and friction differ in their channels. Remedy: give both the same length and "
-                "pressure."
+                "law and friction differ in their channels",
+                remedy="give both the same length and pressure",
             )
 
     @classmethod

@@ -291,6 +291,6 @@ class TonduLopez(ForceLaw):
     def check_linear(self) -> None:
         if self.kappa[0] != 0:
             raise ModelError(
-                f"{self.kind!r} with kappa_1 = {self.kappa[0]:g} is not linear in pressure. Remedy: use "
-                "a polynomial force law for feedforward."
+                f"{self.kind!r} with kappa_1 = {self.kappa[0]:g} is not linear in pressure",
+                remedy="use a polynomial force law for feedforward",
             )

@@ -203,8 +203,9 @@ class MultistateFriction(Block):
         wanted = sum(SIZES[element] for element in self.elements)
         if not self.elements or len(self.values) != wanted:
             raise ModelError(
-                f"{self.kind!r} with the elements {', '.join(self.elements) or 'none'} has "
-                f"{len(self.values)} values. Remedy: give {wanted} positive ones."
+                f"{self.kind!r} with the elements {', '.join(self.elements) or 'none'} "
+                f"has {len(self.values)} values",
+                remedy=f"give {wanted} positive ones",
             )
 
     @property

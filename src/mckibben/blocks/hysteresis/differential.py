@@ -315,8 +315,8 @@ class GeneralizedBoucWen(Invertible):
     def __post_init__(self) -> None:
         if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
             raise ModelError(
-                f"the shape of {self.kind!r} is {self.shape}. Remedy: give five numbers whose sizes add "
-                "up to less than 1."
+                f"the shape of {self.kind!r} is {self.shape}",
+                remedy="give five numbers whose sizes add up to less than 1",
             )
 
     @property

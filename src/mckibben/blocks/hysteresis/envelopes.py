@@ -183,7 +183,7 @@ class Exponential(Envelope):
     def __post_init__(self) -> None:
         if self.rate == 0:
             raise ModelError(
-                "an exponential envelope of rate 0 is flat. Remedy: give a rate that is not zero."
+                "an exponential envelope of rate 0 is flat", remedy="give a rate that is not zero"
             )
 
 

@@ -164,8 +164,9 @@ class EUPI(Invertible):
         """Demand weights that are not negative, and a part without memory that increases."""
         if min(self.weights) < 0 or self.least_slope() <= 0:
             raise ModelError(
-                "'eupi' has no inverse: a weight is negative, or its part without memory does not "
-                "increase. Remedy: identify it with non-negative weights (nonnegative=True)."
+                "'eupi' has no inverse: a weight is negative, or its part without memory "
+                "does not increase",
+                remedy="identify it with non-negative weights (nonnegative=True)",
             )
 
     def least_slope(self) -> float:

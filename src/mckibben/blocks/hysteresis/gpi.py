@@ -227,9 +227,9 @@ class GPI(Invertible):
         gap, where = smallest_gap(self.rising, self.falling, self.input_range)
         if gap < 0:
             raise ModelError(
-                f"'gpi' has no inverse: at {where:.4g} {self.input.unit} its falling envelope is "
-                f"{-gap:.3g} below the rising one. Remedy: identify it with mckibben fit gpi, which "
-                "keeps them in order."
+                f"'gpi' has no inverse: at {where:.4g} {self.input.unit} its falling "
+                f"envelope is {-gap:.3g} below the rising one",
+                remedy="identify it with mckibben fit gpi, which keeps them in order",
             )
 
     def inverse_numbers(self, own: Array) -> Array:

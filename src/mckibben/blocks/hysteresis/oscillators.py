@@ -184,9 +184,9 @@ class Oscillator(Block):
         angle = self.fastest * step
         if not angle <= STABLE * self.substeps:
             raise ModelError(
-                f"{self.kind!r} oscillates by {angle:.3g} rad in a sample of {step:g} s, too fast for "
-                f"{self.substeps} substep(s). Remedy: at least {np.ceil(10 * angle):.0f} substeps, or a "
-                "shorter sample time."
+                f"{self.kind!r} oscillates by {angle:.3g} rad in a sample of {step:g} s, "
+                f"too fast for {self.substeps} substep(s)",
+                remedy=f"at least {np.ceil(10 * angle):.0f} substeps, or a shorter sample time",
             )
         return super().bind(sample_time, state, inputs, outputs)
 
@@ -328,6 +328,7 @@ class DuhemOscillator(Oscillator):
         ):
             raise ModelError(
                 f"{self.kind!r} has {n} knots, {len(self.rising)} slopes rising and "
-                f"{len(self.falling)} falling. Remedy: give two knots or more, in increasing order, and "
-                "a slope of either kind for each."
+                f"{len(self.falling)} falling",
+                remedy="give two knots or more, in increasing order, and a slope of either "
+                "kind for each",
             )

@@ -27,8 +27,8 @@ def check_thresholds(kind: str, thresholds: Sequence[float], weights: Sequence[f
     """Refuse thresholds that are negative or not increasing, or not one to a weight."""
     if not thresholds or len(thresholds) != len(weights):
         raise ModelError(
-            f"{kind!r} has {len(thresholds)} thresholds and {len(weights)} weights. "
-            "Remedy: give one weight to every threshold, and at least one."
+            f"{kind!r} has {len(thresholds)} thresholds and {len(weights)} weights",
+            remedy="give one weight to every threshold, and at least one",
         )
     check_order(kind, thresholds)
 
@@ -37,8 +37,8 @@ def check_order(kind: str, thresholds: Sequence[float]) -> None:
     """Refuse thresholds that are negative or not increasing."""
     if any(r < 0 for r in thresholds[:1]) or np.any(np.diff(thresholds) <= 0):
         raise ModelError(
-            f"the thresholds of {kind!r} are not 0 <= r_0 < r_1 < ... "
-            "Remedy: sort them and drop repeated ones."
+            f"the thresholds of {kind!r} are not 0 <= r_0 < r_1 < ..",
+            remedy="sort them and drop repeated ones",
         )
 
 
@@ -50,16 +50,17 @@ def check_invertible_sum(kind: str, thresholds: Sequence[float], weights: Sequen
     """
     if thresholds[0] != 0:
         raise ModelError(
-            f"{kind!r} has no inverse: its smallest threshold is {thresholds[0]:g}, so it does not "
-            "move right after a reversal. Remedy: identify it with a first threshold of 0."
+            f"{kind!r} has no inverse: its smallest threshold is {thresholds[0]:g}, so it "
+            "does not move right after a reversal",
+            remedy="identify it with a first threshold of 0",
         )
     partial = np.cumsum(weights)
     if np.any(partial <= 0):
         first = int(np.argmax(partial <= 0))
         raise ModelError(
-            f"{kind!r} has no inverse: its weights 0 to {first} add up to {partial[first]:g}, so its "
-            "output would not rise with its input. Remedy: identify it with non-negative weights "
-            "(nonnegative=True)."
+            f"{kind!r} has no inverse: its weights 0 to {first} add up to "
+            f"{partial[first]:g}, so its output would not rise with its input",
+            remedy="identify it with non-negative weights (nonnegative=True)",
         )
 
 

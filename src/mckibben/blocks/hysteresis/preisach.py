@@ -72,13 +72,13 @@ class Triangle(Parametrised):
         n = len(self.levels) - 1
         if n < 1 or np.any(np.diff(self.levels) <= 0):
             raise ModelError(
-                f"the levels of {self.kind!r} do not increase. Remedy: give two or more, in order."
+                f"the levels of {self.kind!r} do not increase", remedy="give two or more, in order"
             )
         fields.wide(self.input_range)
         if len(self.weights) != n * (n + 1) // 2:
             raise ModelError(
-                f"{self.kind!r} with {n + 1} levels has {len(self.weights)} weights. "
-                f"Remedy: give {n * (n + 1) // 2}."
+                f"{self.kind!r} with {n + 1} levels has {len(self.weights)} weights",
+                remedy=f"give {n * (n + 1) // 2}",
             )
 
     @property
@@ -309,8 +309,8 @@ class Preisach(Triangle, Invertible):
         depth, direction = state[0], state[1]
         if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
             raise ModelError(
-                f"the memory of {self.kind!r} has depth {depth:g} and direction {direction:g}. Remedy: "
-                f"give a depth of 1 to {DEPTH}, a direction of 1 or -1, or 'first_sample'."
+                f"the memory of {self.kind!r} has depth {depth:g} and direction {direction:g}",
+                remedy=f"give a depth of 1 to {DEPTH}, a direction of 1 or -1, or 'first_sample'",
             )
         return state
 
@@ -335,8 +335,9 @@ class Preisach(Triangle, Invertible):
         """Demand weights that are not negative, and positive on the diagonal."""
         if min(self.weights) < 0 or on_diagonal(self.weights).min() <= 0:
             raise ModelError(
-                "'preisach' has no inverse: its weights must not be negative, and positive on the "
-                "diagonal. Remedy: identify it with nonnegative=true."
+                "'preisach' has no inverse: its weights must not be negative, and "
+                "positive on the diagonal",
+                remedy="identify it with nonnegative=true",
             )
 
 

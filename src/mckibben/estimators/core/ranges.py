@@ -67,7 +67,8 @@ def parameter_ranges(
     starts = [one.pack() for one in (block, *others)]
     if not all((values > 0).all() for values in starts) or not share > 0:
         raise ModelError(
-            "ranges are of positive parameters, for a positive share. Remedy: give the friction alone."
+            "ranges are of positive parameters, for a positive share",
+            remedy="give the friction alone",
         )
     driven = block.inputs[0].name
     data = training_data(recordings, driven, block.outputs[0].name, None, block.scheduling)

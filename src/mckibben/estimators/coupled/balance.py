@@ -223,7 +223,8 @@ class BalanceEstimator(CoupledEstimator):
         """Return the balance, solved for coordinates, behind what acts in front of it."""
         if unknown := {*(self.terms or ())} - {*TERMS}:
             raise ModelError(
-                f"terms names {', '.join(sorted(unknown))}. Remedy: choose from {', '.join(TERMS)}"
+                f"terms names {', '.join(sorted(unknown))}",
+                remedy=f"choose from {', '.join(TERMS)}",
             )
         data, names = varying(data)
         tracker.notes += [
@@ -301,9 +302,10 @@ class BalanceEstimator(CoupledEstimator):
             lags = np.array(self.lags)
             if lags[0] < shortest or lags[-1] > longest or (np.diff(np.log(lags)) < 0.69).any():
                 raise ModelError(
-                    f"lags of {np.array2string(lags, precision=3)} s cannot be identified from these "
-                    "recordings. Remedy: give fewer lags, in order, each twice the last or more, from "
-                    f"{shortest:.3g} to {longest:.3g} s"
+                    f"lags of {np.array2string(lags, precision=3)} s cannot be identified "
+                    "from these recordings",
+                    remedy="give fewer lags, in order, each twice the last or more, from "
+                    f"{shortest:.3g} to {longest:.3g} s",
                 )
         sides = [(1, place) for place in PLACES] + [(-1, 1.0 - place) for place in PLACES]
         return Structure(

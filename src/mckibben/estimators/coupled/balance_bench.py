@@ -119,8 +119,8 @@ def check_numbers(data: TrainingData) -> None:
     span = data.travel
     if not (span > STILL * span.max()).all():
         raise ModelError(
-            f"{data.outputs[int(np.argmin(span))].name} never changes, but by {span.min():.3g}. "
-            "Remedy: record muscles that move"
+            f"{data.outputs[int(np.argmin(span))].name} never changes, but by {span.min():.3g}",
+            remedy="record muscles that move",
         )
     for run in data.runs:
         for channels, table in ((data.inputs, run.driven), (data.outputs, run.outputs)):
@@ -133,7 +133,7 @@ def check_numbers(data: TrainingData) -> None:
                 )
     if not data.highest.max() > 0:
         raise ModelError(
-            f"{data.inputs[0].name} never exceeds 0. Remedy: give pressures above the atmosphere's"
+            f"{data.inputs[0].name} never exceeds 0", remedy="give pressures above the atmosphere's"
         )
 
 

@@ -109,8 +109,8 @@ def check_alone(data: TrainingData) -> None:
     """
     if len(data.inputs) != 1 or any(channel.unit not in LOADS for channel in data.scheduled):
         raise ModelError(
-            "a prior is of one muscle under its load alone. Remedy: leave prior out for several "
-            "muscles, or where something schedules them"
+            "a prior is of one muscle under its load alone",
+            remedy="leave prior out for several muscles, or where something schedules them",
         )
 
 

@@ -61,8 +61,8 @@ def constrained_least_squares(
     residual = goal - dual @ pressed
     if rest < FEASIBLE or not residual[p] > 0:
         raise ModelError(
-            "no parameters satisfy all that physics asks of them. Remedy: give recordings of a "
-            "wider range"
+            "no parameters satisfy all that physics asks of them",
+            remedy="give recordings of a wider range",
         )
     shift = -residual[:p] / residual[p] * unit
     x = solve_triangular(upper, right + shift) / size

@@ -373,8 +373,9 @@ def learned_inverse(
     kinds = [type(part) for part in parts]
     if kinds[:3] != [PerChannel, Coupling, FuzzyNetwork]:
         raise ModelError(
-            f"{model.title!r} is no hysteresis, coupling and fuzzy network, of which the last could be "
-            "learned the other way round. Remedy: give a model of sdchm or sdchm-published."
+            f"{model.title!r} is no hysteresis, coupling and fuzzy network, of which the "
+            "last could be learned the other way round",
+            remedy="give a model of sdchm or sdchm-published",
         )
     hysteresis, coupling, network, *friction = parts
     assert isinstance(network, FuzzyNetwork)

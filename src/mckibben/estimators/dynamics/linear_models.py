@@ -136,8 +136,8 @@ class PredictionErrorEstimator(Estimator):
         super().check_settings()
         if self.shared_poles and self.n_noise_poles:
             raise ModelError(
-                f"the noise shares the model's poles, and has {self.n_noise_poles} of its own. "
-                "Remedy: use n_noise_poles=0, or shared_poles=false."
+                f"the noise shares the model's poles, and has {self.n_noise_poles} of its own",
+                remedy="use n_noise_poles=0, or shared_poles=false",
             )
 
     @property
@@ -273,8 +273,8 @@ class PredictionErrorEstimator(Estimator):
             if not block.is_stable:
                 radius = float(np.abs(block.poles).max())
                 raise ModelError(
-                    f"the model found is unstable (a pole at |z| = {radius:.4g}). "
-                    "Remedy: use other orders, or output-error (oe), which is kept stable."
+                    f"the model found is unstable (a pole at |z| = {radius:.4g})",
+                    remedy="use other orders, or output-error (oe), which is kept stable",
                 )
             found.append(block)
         return tuple(found)

@@ -169,8 +169,9 @@ class NarxEstimator(SearchEstimator):
                 settle(path)
         if not tried:
             raise ModelError(
-                "every NARX model found leaves all bounds when it runs free. Remedy: use fewer terms "
-                "or units, n_play=3, or allow_unstable=true to get it nevertheless."
+                "every NARX model found leaves all bounds when it runs free",
+                remedy="use fewer terms or units, n_play=3, or allow_unstable=true to get "
+                "it nevertheless",
             )
         tracker.best_cost, chosen = min(tried, key=lambda item: item[0])
         if not stable(chosen, data):
@@ -209,8 +210,8 @@ class NarxEstimator(SearchEstimator):
         )
         if len(terms) > MOST_CANDIDATES:
             raise ModelError(
-                f"{len(terms)} products of {x.shape[1]} regressors are too many to choose from. "
-                "Remedy: use a lower degree, or fewer lags."
+                f"{len(terms)} products of {x.shape[1]} regressors are too many to choose from",
+                remedy="use a lower degree, or fewer lags",
             )
         columns = products(x, terms)
         order = select(columns, y, self.n_terms)

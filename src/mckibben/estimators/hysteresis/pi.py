@@ -154,9 +154,10 @@ def _segments(data: TrainingData, radii: Array, rule: str) -> tuple[Array, Array
     lengths, rises = cut[1] + cut[-1]
     if not np.all(lengths > SHORTEST * max(longest.values())):
         raise ModelError(
-            f"on no branch do operators with thresholds up to {radii[-1]:.3g} {data.input_unit} begin "
-            f"to move in turn: the longest goes {max(longest.values()):.3g} {data.input_unit}, and "
-            "after a reversal it takes twice a threshold. Remedy: use fewer operators, smaller "
-            "thresholds, or method=ls."
+            f"on no branch do operators with thresholds up to {radii[-1]:.3g} "
+            f"{data.input_unit} begin to move in turn: the longest goes "
+            f"{max(longest.values()):.3g} {data.input_unit}, and after a reversal it "
+            "takes twice a threshold",
+            remedy="use fewer operators, smaller thresholds, or method=ls",
         )
     return lengths, rises

@@ -110,8 +110,8 @@ def built(folder: Path) -> tuple[Path, int]:
     """
     if missing := missing_tools():
         raise ModelError(
-            f"not on this machine: {', '.join(missing)}. Remedy: install gcc-arm-none-eabi, "
-            "libnewlib-arm-none-eabi and qemu-system-arm."
+            f"not on this machine: {', '.join(missing)}",
+            remedy="install gcc-arm-none-eabi, libnewlib-arm-none-eabi and qemu-system-arm",
         )
     objects, program = [], folder / "model.elf"
     for source in sorted((folder / "src").glob("*.c")):

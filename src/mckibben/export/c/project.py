@@ -143,8 +143,8 @@ def vectors(block: Block, sample_time: float | None, *, single: bool = False) ->
         outputs = block.simulate(inputs, sample_time=sample_time)
     if not np.isfinite(outputs).all():
         raise ModelError(
-            f"{block.kind!r} gives outputs that are not finite on inputs within its range. "
-            "Remedy: identify it again, or give it an input range."
+            f"{block.kind!r} gives outputs that are not finite on inputs within its range",
+            remedy="identify it again, or give it an input range",
         )
     # or their size, where they hardly move
     ranges = np.maximum(np.ptp(outputs, axis=0), 1e-4 * np.abs(outputs).max(axis=0) + 1e-9)
@@ -237,13 +237,13 @@ def check_single(block: Block, sample_time: float | None) -> None:
     """
     if block.needs_double:
         raise ModelError(
-            f"{block.title!r} {block.needs_double}. Remedy: export in double precision."
+            f"{block.title!r} {block.needs_double}", remedy="export in double precision"
         )
     for name, places in block.strictly_increasing():
         if np.any(np.diff(np.array(places, dtype=np.float32)) <= 0) and np.all(np.diff(places) > 0):
             raise ModelError(
-                f"{name} of {block.title!r} are too close for single precision. "
-                "Remedy: export in double precision, or identify with fewer of them."
+                f"{name} of {block.title!r} are too close for single precision",
+                remedy="export in double precision, or identify with fewer of them",
             )
     if block.filters and hasattr(block, "kernel"):
         _warn_of_rounding(block, sample_time)
@@ -284,15 +284,15 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
     step = own_time(block) if sample_time is None and block.rate_dependent else sample_time
     if step is not None and not 0 < step <= LONGEST_STEP:
         raise ModelError(
-            f"the sample time is {step}. Remedy: give a positive time in seconds, at most "
-            f"{LONGEST_STEP:g}."
+            f"the sample time is {step}",
+            remedy=f"give a positive time in seconds, at most {LONGEST_STEP:g}",
         )
     if not block.rate_dependent:
         return None
     if step is None:
         raise ModelError(
-            f"{block.kind!r} depends on the rate. Remedy: give the time between steps, "
-            "--sample-time SECONDS."
+            f"{block.kind!r} depends on the rate",
+            remedy="give the time between steps, --sample-time SECONDS",
         )
     block.check_time(step)
     return step

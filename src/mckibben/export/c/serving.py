@@ -62,8 +62,8 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     for given, allowed in ((serving.limits, names), (serving.safe, names[n_in:])):
         if strange := sorted(set(given) - set(allowed)):
             raise ModelError(
-                f"{strange[0]!r:.60} is no channel to say that of. Remedy: name one of "
-                f"{', '.join(allowed)}."
+                f"{strange[0]!r:.60} is no channel to say that of",
+                remedy=f"name one of {', '.join(allowed)}",
             )
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     driven = slice(0, n_in - len(block.scheduling))
@@ -75,21 +75,22 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     unknown = [n for n, a, b in zip(names, low, high, strict=True) if not np.isfinite(b - a)]
     if unknown:
         raise ModelError(
-            f"the model does not know between what limits {', '.join(unknown)} may be. Remedy: say it "
-            f"for each of them, --limit {unknown[0]}=LOW:HIGH."
+            f"the model does not know between what limits {', '.join(unknown)} may be",
+            remedy=f"say it for each of them, --limit {unknown[0]}=LOW:HIGH",
         )
     for name, a, b in zip(names, low, high, strict=True):
         if not a < b:
             raise ModelError(
-                f"the limits of {name} are {a:g} and {b:g}. Remedy: give the lower one first."
+                f"the limits of {name} are {a:g} and {b:g}", remedy="give the lower one first"
             )
     safe = low.copy()
     for place, name in enumerate(names[n_in:], start=n_in):
         safe[place] = serving.safe.get(name, low[place])
         if not low[place] <= safe[place] <= high[place]:
             raise ModelError(
-                f"the safe value of {name} is {safe[place]:g}, beyond its limits {low[place]:g} to "
-                f"{high[place]:g}. Remedy: give one within."
+                f"the safe value of {name} is {safe[place]:g}, beyond its limits "
+                f"{low[place]:g} to {high[place]:g}",
+                remedy="give one within",
             )
     return low, high, safe
 
@@ -120,8 +121,8 @@ def served(
     single, n = content["single"], len(block.inputs) + len(block.outputs)
     if n * content["bytes"] + 6 > ROOM:
         raise ModelError(
-            f"{n} channels do not fit into a frame of the wire. Remedy: export in single precision, "
-            "--float32, or fewer channels."
+            f"{n} channels do not fit into a frame of the wire",
+            remedy="export in single precision, --float32, or fewer channels",
         )
     told = {
         "period": period,
@@ -157,14 +158,14 @@ def _ticks(serving: Serving, period: float | None) -> int:
     """Return after how many silent ticks the watchdog acts."""
     if period is None or not 1 <= 1e6 * period <= MOST_MICROSECONDS:
         raise ModelError(
-            f"a served model ticks, and its time between steps is {period}. Remedy: give --sample-time "
-            f"SECONDS, from 1e-6 to {1e-6 * MOST_MICROSECONDS:.0f}."
+            f"a served model ticks, and its time between steps is {period}",
+            remedy=f"give --sample-time SECONDS, from 1e-6 to {1e-06 * MOST_MICROSECONDS:.0f}",
         )
     ticks = serving.watchdog / period if math.isfinite(serving.watchdog) else math.inf
     if not 1 <= ticks <= MOST_TICKS:
         raise ModelError(
-            f"a watchdog of {serving.watchdog:g} s. Remedy: give a time from one sample time "
-            f"({period:g} s) on."
+            f"a watchdog of {serving.watchdog:g} s",
+            remedy=f"give a time from one sample time ({period:g} s) on",
         )
     return math.floor(ticks + 1e-9)
 

@@ -80,8 +80,8 @@ class Wiring:
             numbers = part.coefficients(sample_time)
             if not part.c_kernels:
                 raise ModelError(
-                    f"{part.title!r} has no C. Remedy: declare a start_kernel beside its kernel, as "
-                    "blocks of the package do."
+                    f"{part.title!r} has no C",
+                    remedy="declare a start_kernel beside its kernel, as blocks of the package do",
                 )
             state = step.state
             if state is None and not isinstance(part.start, str):

@@ -126,12 +126,13 @@ def export_fmu(
     unknown = [each for each in wanted if each not in PLATFORMS]
     if unknown:
         raise ModelError(
-            f"there is no platform {unknown[0]!r}. Remedy: use one of {', '.join(PLATFORMS)}."
+            f"there is no platform {unknown[0]!r}", remedy=f"use one of {', '.join(PLATFORMS)}"
         )
     if platforms is None and not wanted:
         raise ModelError(
-            "there is no C compiler on this machine, so the FMU would hold no library. Remedy: "
-            "install one, or ask for no platforms (--platforms none): importers can build the sources."
+            "there is no C compiler on this machine, so the FMU would hold no library",
+            remedy="install one, or ask for no platforms (--platforms none): importers can "
+            "build the sources",
         )
     files = fmu_files(block, name=name, sample_time=sample_time)
     texts = {path: text.encode() for path, text in files.items()}
@@ -286,8 +287,8 @@ def build_library(name: str, folder: Path, sources: Sequence[str], out: Path) ->
     command = _command(name)
     if command is None:
         raise ModelError(
-            f"this machine cannot build for {name}. Remedy: install a C compiler, or pip install "
-            "'mckibben[cross]' for all platforms."
+            f"this machine cannot build for {name}",
+            remedy="install a C compiler, or pip install 'mckibben[cross]' for all platforms",
         )
     position = [] if PLATFORMS[name].suffix == ".dll" else ["-fPIC"]
     maths = [] if PLATFORMS[name].suffix != ".so" else ["-lm"]

@@ -152,7 +152,7 @@ def matched(model: Block, recording: Recording) -> Series:
     x = model.simulate(recording.select([c.name for c in model.inputs]))[channel.name]
     z = recording["displacement"]
     if np.ptp(x) == 0:
-        raise ModelError("its output does not move. Remedy: give another recording, or model.")
+        raise ModelError("its output does not move", remedy="give another recording, or model")
     gain = float(np.ptp(z) / np.ptp(x))
     return Series((model, Affine(gain, float(z[0] - gain * x[0]), channel, channel)))
 
@@ -189,7 +189,7 @@ def _errors(model: Block, *recordings: Recording) -> list[float]:
             found += [scored.rmse, 100 * scored.r2]
     if not np.isfinite(found).all():
         raise ModelError(
-            "its free run overflows. Remedy: use fewer units or terms, or another seed."
+            "its free run overflows", remedy="use fewer units or terms, or another seed"
         )
     return found
 

@@ -75,7 +75,7 @@ class LeaderboardFace(Face):
         def draw(models: str | Sequence[str] = (), **choices: Any) -> Drawing:
             if "recording" not in choices:
                 raise ModelError(
-                    f"{kind!r} draws models against a measurement. Remedy: give it as recording=."
+                    f"{kind!r} draws models against a measurement", remedy="give it as recording="
                 )
             asked = [models] if isinstance(models, str) else list(models)
             if not asked and self.board.best is not None:
@@ -84,8 +84,10 @@ class LeaderboardFace(Face):
             found = {name: block for name in asked if (block := blocks.get(name)) is not None}
             if not found or len(found) < len(asked):
                 raise ModelError(
-                    f"there is no model {', '.join(asked) or 'chosen'} to draw. Remedy: name some of "
-                    f"{', '.join(blocks) or 'a leaderboard where a model worked'} as models=."
+                    f"there is no model {', '.join(asked) or 'chosen'} to draw",
+                    remedy="name some of "
+                    f"{', '.join(blocks) or 'a leaderboard where a model worked'} as "
+                    "models=",
                 )
             return against(found)[kind](**choices)
 

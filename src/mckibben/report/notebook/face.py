@@ -54,7 +54,7 @@ class Face(ABC):
             kind = next(iter(known))
         if kind not in known:
             raise ModelError(
-                f"there is no figure {kind!r} of it. Remedy: use one of {', '.join(known)}."
+                f"there is no figure {kind!r} of it", remedy=f"use one of {', '.join(known)}"
             )
         return known[kind](**choices)
 

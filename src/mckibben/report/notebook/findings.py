@@ -51,7 +51,8 @@ class CharacterizationFace(Face):
         cycles = self.found.cycles
         if not cycles:
             raise ModelError(
-                "there is no whole cycle to draw. Remedy: record one, from the lowest input and back."
+                "there is no whole cycle to draw",
+                remedy="record one, from the lowest input and back",
             )
         x = np.array([cycle.amplitude for cycle in cycles])
         y = np.array([cycle.width for cycle in cycles])

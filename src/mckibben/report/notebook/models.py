@@ -95,8 +95,8 @@ class BlockFace(Face):
         ranges = known_ranges(block)
         if driven not in ranges and high is None:
             raise ModelError(
-                f"the model does not say on which range of {driven} it was identified. Remedy: give "
-                "high=, or a measured recording=."
+                f"the model does not say on which range of {driven} it was identified",
+                remedy="give high=, or a measured recording=",
             )
         low, top = ranges.get(driven, (0.0, 0.0))
         step = block.sample_time or PERIOD / SAMPLES

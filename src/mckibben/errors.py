@@ -180,6 +180,10 @@ class ModelWarning(UserWarning):
     """Something a model did that its user should know, such as clipping a reference."""
 
 
+class CacheWarning(UserWarning):
+    """Compiled functions cannot be cached, or were damaged and are compiled again."""
+
+
 def unforeseen(error: Exception) -> MckibbenError:
     """Return what nobody has foreseen, as an error: it is a fault of the program."""
     return MckibbenError(

@@ -66,3 +66,14 @@ def percent(value: float | None, digits: int = 2) -> str:
         return "–"
     shown = 0.0 if abs(value) < ROUNDING else value
     return f"{number(100 * shown, digits)} %"
+
+
+def duration(seconds: float) -> str:
+    """Return a time left in words, rounded.
+
+    >>> duration(3.2), duration(41.0), duration(200.0)
+    ('5 s', '40 s', '3 min')
+    """
+    if seconds < 100:
+        return f"{max(5 * round(seconds / 5), 5)} s"
+    return f"{round(seconds / 60)} min"

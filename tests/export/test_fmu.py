@@ -166,7 +166,7 @@ def test_the_same_model_gives_the_same_bytes_and_a_file_stays(tmp_path: Path) ->
         exported(MODELS["pi"], tmp_path, platforms=[])
     assert refused.value.file == path
     assert path.read_bytes() == before
-    exported(MODELS["SDCHM inverse"], tmp_path, platforms=[], overwrite=True)
+    exported(MODELS["SDCHM inverse"], tmp_path, platforms=[], force=True)
     assert path.read_bytes() == before
 
 

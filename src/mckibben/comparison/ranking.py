@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -28,6 +29,7 @@ from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
 from mckibben.diagnosis.bands import tested_band
 from mckibben.errors import MckibbenError
+from mckibben.numerals import duration
 from mckibben.recording import Recording
 from mckibben.statistics import (
     BlockBootstrap,
@@ -41,16 +43,23 @@ from mckibben.system.workers import checked
 
 Watch = Callable[[str, float, float], None]
 
+SURE = 3.0
+"""Time after which the time left is estimated by the pace so far [s]."""
+
 
 @dataclass(frozen=True)
 class Standing:
-    """How far a comparison is: models done, those in work, and the one that would be chosen so far."""
+    """How far a comparison is: models done, those in work, the one that would be chosen so far.
+
+    ``seconds`` is about how long the rest takes.
+    """
 
     done: int
     total: int
     fitting: tuple[str, ...] = ()
     best: Row | None = None
     unit: str = ""
+    seconds: float = 0.0
 
     @property
     def share(self) -> float:
@@ -61,12 +70,13 @@ class Standing:
         """Return it for a progress bar.
 
         >>> str(Standing(12, 28, ("gpi",)))
-        '12 of 28, fitting gpi'
+        '12 of 28 models, fitting gpi'
         """
         fitting = f", fitting {self.fitting[-1]}" if self.fitting else ""
         best = self.best
         so_far = "" if best is None else f"; best {best.model}, {best.chosen_by:.3g} {self.unit}"
-        return f"{self.done} of {self.total}{fitting}{so_far}".rstrip()
+        left = f"; about {duration(self.seconds)} left" if self.seconds >= 1 else ""
+        return f"{self.done} of {self.total} models{fitting}{so_far}{left}".rstrip()
 
 
 def compare(
@@ -239,12 +249,18 @@ def ranked(
     ]
     waiting = {name: [task for task in tasks if task.name == name] for name in remaining}
     begun: list[str] = []
+    started = time.monotonic()
 
     def tell() -> None:
         if progress is not None:
             working = tuple(name for name in begun if name in waiting)
             best = plan.board(table.sorted()).best
-            progress(Standing(len(table.rows), len(plan.items), working, best, plan.empty.unit))
+            rest = sum(efforts[name] for name in waiting)
+            done = sum(efforts.values()) - rest
+            spent = time.monotonic() - started
+            pace = spent / done if done and spent > SURE else 1 / workers
+            counts = len(table.rows), len(plan.items)
+            progress(Standing(*counts, working, best, plan.empty.unit, rest * pace))
 
     def told(index: int, *what: float) -> None:
         name = tasks[index].name
@@ -254,8 +270,8 @@ def ranked(
         if what and watch is not None:
             watch(name, *what)
 
+    tell()
     if table.rows:
-        tell()
         yield table.ranking()
     found: dict[str, list[FitResult]] = {name: [] for name in remaining}
     for outcome in results(data, tasks, workers, told):

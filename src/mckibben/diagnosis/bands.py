@@ -105,6 +105,19 @@ class Calibration:
     widths: tuple[float, ...]
     over_constant: tuple[float, ...]
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the numbers, for JSON."""
+        names, units = [channel.name for channel in self.band.given], self.band.units
+        return {
+            "unit": self.band.unit,
+            "units": units,
+            "highest_level": units / (units + 1),
+            "level": self.band.level,
+            "width": dict(zip(names, self.widths, strict=True)),
+            "width_over_constant": dict(zip(names, self.over_constant, strict=True)),
+            "memory": self.memory,
+        }
+
 
 def calibrate(
     model: Block,

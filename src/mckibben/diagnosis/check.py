@@ -146,6 +146,8 @@ class Validation(DrawsItself):
         Names of recordings too short beside the others to be tested.
     runs : tuple of Run
         The recordings, and what the model makes of them; not in ``to_dict``.
+    description : ModelDescription or None
+        Of the model, where it was asked for.
     """
 
     face: ClassVar[str] = "validation"
@@ -155,6 +157,7 @@ class Validation(DrawsItself):
     outputs: tuple[OutputCheck, ...]
     untested: tuple[str, ...] = ()
     runs: tuple[Run, ...] = field(default=(), repr=False)
+    description: ModelDescription | None = field(default=None, repr=False)
 
     @property
     def right(self) -> bool:
@@ -169,6 +172,7 @@ class Validation(DrawsItself):
             "right": self.right,
             "untested": list(self.untested),
             "outputs": [one.to_dict() for one in self.outputs],
+            **({"description": self.description.to_dict()} if self.description else {}),
         }
 
 

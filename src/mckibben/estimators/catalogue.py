@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
 from mckibben import registry
 from mckibben.errors import ModelError
 from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
-from mckibben.estimators.core.settings import check_settings, setting_value
+from mckibben.estimators.core.settings import check_settings
 
 
 @dataclass(frozen=True)
@@ -124,21 +124,26 @@ def defaults(model: str) -> dict[str, Any]:
     return {field.name: field.default for field in known if field.default is not MISSING}
 
 
-def settings_of(model: str, written: Sequence[str]) -> dict[str, Any]:
+def described() -> dict[str, Any]:
+    """Return what every model is, and its settings."""
+    names = registry.names("estimators")
+    return {name: {"summary": summary(name), "settings": defaults(name)} for name in names}
+
+
+def settings_of(model: str, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of one model's estimator; see `settings_of_all`."""
-    return settings_of_all([model], written)[model]
+    return settings_of_all([model], given)[model]
 
 
-def settings_of_all(models: Iterable[str], written: Sequence[str]) -> dict[str, dict[str, Any]]:
+def settings_of_all(models: Iterable[str], given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the settings of several models, checked against those that they have.
 
     Parameters
     ----------
     models : iterable of str
         Short names.
-    written : sequence of str
-        As ``NAME=VALUE``, of all models that have it, or ``MODEL.NAME=VALUE``; values as JSON where they
-        are that, else as words.
+    given : mapping
+        ``NAME`` -> value, of all models that have it; ``MODEL.NAME`` -> value; or ``MODEL`` -> settings.
 
     Raises
     ------
@@ -148,22 +153,28 @@ def settings_of_all(models: Iterable[str], written: Sequence[str]) -> dict[str, 
     estimators = {name: registry.load("estimators", name) for name in models}
     known = {name: [one.name for one in fields(each)] for name, each in estimators.items()}
     found: dict[str, dict[str, Any]] = {name: {} for name in estimators}
-    for item in written:
-        named, equals, text = item.partition("=")
-        owner, dot, name = named.strip().replace("-", "_").rpartition(".")
+    flat = {
+        name: value
+        for key, one in given.items()
+        for name, value in (
+            {f"{key}.{k}": v for k, v in one.items()} if isinstance(one, Mapping) else {key: one}
+        ).items()
+    }
+    for key, value in flat.items():
+        owner, dot, name = key.replace("-", "_").rpartition(".")
         takers = [
             model
             for model in estimators
             if name in known[model] and (not dot or owner == model.replace("-", "_"))
         ]
-        if not (equals and takers):
+        if not takers:
             every = sorted({setting for some in known.values() for setting in some})
             raise ModelError(
-                f"{item!r}: {', '.join(estimators)} has no setting {name!r}",
-                remedy=f"give NAME=VALUE, or MODEL.NAME=VALUE, of {', '.join(every)}",
+                f"{', '.join(estimators)} has no setting {key!r}",
+                remedy=f"give one, or MODEL.NAME, of {', '.join(every)}",
             )
         for model in takers:
-            found[model][name] = setting_value(text.strip())
+            found[model][name] = value
     for model, settings in found.items():
         if settings:  # now, and not when this model's turn has come
             check_settings(estimators[model](**settings))

@@ -11,8 +11,9 @@ import tempfile
 from itertools import accumulate
 from pathlib import Path
 
-from mckibben.system.atomic import replacing
-from mckibben.system.caches import place
+from mckibben.system.atomic import replacing, written
+from mckibben.system.compiling import cache_folder
+from mckibben.system.results import claim
 
 PACKED = Path(__file__).parent
 
@@ -21,7 +22,7 @@ NAMES = ("decaying-triangle.csv", "irregular-triangle.csv")
 
 def _unpacked() -> Path:
     """Return a folder with the recordings, their descriptions, and ``protocol.json``."""
-    folder = (place() or Path(tempfile.mkdtemp())) / "example"
+    folder = (cache_folder() or Path(tempfile.mkdtemp())) / "example"
     folder.mkdir(mode=0o700, exist_ok=True)
     contents = {path.name: path.read_bytes() for path in PACKED.glob("*.json")}
     for name, content in (contents | _tables()).items():
@@ -54,3 +55,23 @@ TRAIN, TEST = (FOLDER / name for name in NAMES)
 def files() -> list[Path]:
     """Return the recordings, their descriptions, and ``protocol.json`` with their roles."""
     return sorted(path for path in FOLDER.iterdir() if path.suffix in (".csv", ".json"))
+
+
+def copy_to(folder: Path, *, force: bool = False) -> int:
+    """Write all of them into a folder, made where it is missing, and return how many files they are.
+
+    Raises
+    ------
+    DataError
+        Without ``force``, if another file has the name of one.
+    """
+    with written(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    contents = {folder / path.name: path.read_bytes() for path in files()}
+    for path, content in contents.items():
+        same = path.is_file() and not path.is_symlink() and path.read_bytes() == content
+        claim(path, force=force or same)
+    for path, content in contents.items():
+        with replacing(path) as new:
+            new.write_bytes(content)
+    return len(contents)

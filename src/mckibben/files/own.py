@@ -16,7 +16,8 @@ from mckibben.files.formats import READERS, reason, tables, writer
 from mckibben.files.notices import warn
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
-from mckibben.system import manifest, ordinary
+from mckibben.system import ordinary
+from mckibben.system.results import digest
 
 STILL = ("calibration", "pressure_reference")
 """What of a recording's meta applies to samples that were edited since."""
@@ -93,7 +94,7 @@ def describe(recording: Recording, samples: bytes, path: Path) -> str:
             )
     step = recording.sample_time
     stored = Stored.model_construct(
-        sha256=manifest.digest(samples),
+        sha256=digest(samples),
         sample_time=None if step is None else float(step),
         start_time=float(recording.start_time),
         units=dict(recording.units),

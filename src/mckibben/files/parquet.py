@@ -14,7 +14,7 @@ from mckibben.files.tree import without_numbers
 from mckibben.recording import Recording
 from mckibben.system.atomic import replacing
 from mckibben.system.extras import demand
-from mckibben.system.manifest import digest
+from mckibben.system.results import digest
 
 demand("pyarrow", "parquet", "Parquet")
 

@@ -27,7 +27,7 @@ from mckibben.files.sniffing import SEPARATORS, Layout, decoded, sniff
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
 from mckibben.system.atomic import replacing
-from mckibben.system.manifest import digest
+from mckibben.system.results import digest
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
 _SNIFFED = 2**18  # bytes by which the layout of a table is recognised

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.ranking import Standing, compare
 from mckibben.errors import DataError, MckibbenError
-from mckibben.measured.sets import Set, Task, parted
+from mckibben.measured.sets import Set, Task, parted, sets_in
 from mckibben.recording import Recording
 
 
@@ -60,6 +61,12 @@ class Outcome:
     def label(self) -> str:
         """The same, with what is left out."""
         return f"{self.heading}, without {self.left_out}" if self.left_out else self.heading
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the leaderboard, or why there is none, for JSON."""
+        if self.board is None:
+            return {"reason": self.reason}
+        return self.board.to_dict() | {"range": self.span, "seconds": self.seconds}
 
     @property
     def failed(self) -> str:
@@ -136,3 +143,69 @@ def outcomes(
         seconds = time.perf_counter() - started
         notes = tuple(f"{r.name}: {note}" for r in (*train, *test) for note in r.notes)
         yield Outcome(one, task, board, span, seconds, notes=notes)
+
+
+def measure(
+    folder: Path,
+    out: Path,
+    *,
+    only: Sequence[str] = (),
+    models: str | Sequence[str] = "all",
+    seed: int = 0,
+    jobs: int | None = None,
+    force: bool = False,
+    progress: Callable[[float, str], None] | None = None,
+    found: Callable[[Outcome], None] | None = None,
+) -> list[Outcome]:
+    """Compare all models on all sets of a folder, and write one page, ``measured.md``, and a table.
+
+    Parameters
+    ----------
+    folder, out : Path
+        With a folder for every set; where to write, outside of it.
+    only : sequence of str
+        Names of sets; default all.
+    models, seed, jobs
+        As for `outcomes`.
+    force : bool
+        Whether files of the user's may be replaced.
+    progress, found : callable, optional
+        Called with the share done and words; and with every outcome.
+
+    Raises
+    ------
+    DataError
+        On sets that are not there, or an ``out`` that may not be written.
+    """
+    from mckibben.measured.page import page, table
+    from mckibben.system import workers
+    from mckibben.system.results import results_in
+
+    sets = sets_in(folder)
+    if unknown := sorted({*only} - {one.name for one in sets}):
+        listed = ", ".join(one.name for one in sets)
+        problem = f"there is no set {unknown[0]!r} in it"
+        raise DataError(problem, file=folder, remedy=f"use one of {listed}")
+    if out.resolve().is_relative_to(folder.resolve()):
+        problem = f"it is inside {folder}, where the next run would read results as recordings"
+        raise DataError(problem, file=out, remedy="give a folder elsewhere")
+    chosen = [one for one in sets if not only or one.name in only]
+    if jobs != 1:
+        workers.prepare()
+    inputs = [one.folder for one in chosen]
+    with results_in(out, ["measured.md", "measured.csv"], inputs=inputs, force=force) as results:
+        every: list[Outcome] = []
+        for one in outcomes(
+            chosen, models=models, seed=seed, jobs=jobs, folder=out, tell=progress
+        ):
+            every.append(one)
+            if found is not None:
+                found(one)
+        if results is not None:
+            named = models if isinstance(models, str) else ",".join(models)
+            words = "" if named == "all" else f" --models {named}"
+            results.write_text("measured.md", page(every, f"mckibben measured FOLDER{words}"))
+            results.write_text("measured.csv", table(every).to_csv(index=False))
+            results.commit()
+        Checkpoints(out).clear()
+    return every

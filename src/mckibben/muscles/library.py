@@ -98,6 +98,17 @@ class Muscle:
     balance: Balance
     errors: Array
 
+    def summary(self) -> dict[str, Any]:
+        """Return what it is and its data sheet, for JSON."""
+        named = {key: getattr(self, key) for key in ("title", "virtual", "source", "licence")}
+        return named | {"sheet": self.sheet.model_dump(exclude_none=True)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it with its conditions and its balance, for JSON."""
+        conditions = self.conditions.model_dump(exclude_none=True)
+        about = {"name": self.name} | self.summary()
+        return about | {"conditions": conditions, "balance": to_dict(self.balance)}
+
     @property
     def traits(self) -> Array:
         """What its recordings told of it, the rest NaN."""

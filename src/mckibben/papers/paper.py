@@ -94,6 +94,10 @@ class Paper(_Strict):
     figures: dict[str, FigureText]
     models: dict[str, dict[str, Any]] = {}
 
+    def summary(self) -> dict[str, Any]:
+        """Return what it is about, for JSON."""
+        return {key: getattr(self, key) for key in ("number", "title", "question")}
+
     def printed(self, name: str) -> Any:
         """Return the block of a model as printed."""
         return part_from_dict(self.models[name])

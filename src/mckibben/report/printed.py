@@ -17,7 +17,7 @@ from mckibben.errors import DataError
 from mckibben.report.drawing import Curve, Drawing, Panel
 from mckibben.system.atomic import replacing
 from mckibben.system.extras import demand
-from mckibben.system.seals import MAKER, sealed
+from mckibben.system.results import MAKER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -115,7 +115,7 @@ def save(drawing: Drawing, path: str | Path) -> None:
     with rc_context(style):
         drawn(drawing).savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
     with replacing(path) as new:
-        new.write_bytes(sealed(figure.getvalue()))
+        new.write_bytes(figure.getvalue())
 
 
 def format_of(path: Path) -> str:

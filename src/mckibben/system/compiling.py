@@ -1,18 +1,23 @@
 """Functions that numba compiles when they are first run, so that importing them does not load it.
 
-What is compiled is kept for the next process. A compiled function holds those that it calls, wherever
-they stand, and the numbers that it reads by name, so that its file is named after all of them.
+What is compiled is cached for the next process, in the user's cache folder by version of the package, or
+in ``NUMBA_CACHE_DIR``. A compiled function holds those that it calls, wherever they are, and the numbers
+that it reads by name, so that its file is named after all of them. A file that is damaged is made anew.
 """
 
 from __future__ import annotations
 
+import os
 import pickle
 import re
 import sys
+import tempfile
 import threading
+import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import partial, update_wrapper
+from functools import cache, partial, update_wrapper
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
@@ -21,9 +26,9 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from mckibben.errors import DataError
+from mckibben.errors import CacheWarning, DataError
 from mckibben.system.atomic import replacing
-from mckibben.system.caches import place
+from mckibben.version import __version__
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -34,6 +39,43 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """No entry for C: it would hold all the code again, and nothing calls it."""
 
 _lock = threading.Lock()
+
+UNUSED = 60 * 86400.0
+"""Time after which a file that was not used is removed [s]."""
+
+
+@cache
+def cache_folder() -> Path | None:
+    """Return the folder for compiled functions, or None if there is none that is this user's."""
+    from platformdirs import user_cache_path
+
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    folder = (Path(given).absolute() / "mckibben" if given else user_cache_path("mckibben")) / __version__
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+        found = folder.stat()
+        # what is there is run, so that nobody else may put anything there
+        if not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o022):
+            return folder
+    except OSError:
+        pass
+    _note(f"{folder} cannot be used, so that every start compiles anew; set NUMBA_CACHE_DIR to a folder")
+    return None
+
+
+@cache
+def _note(text: str) -> None:
+    warnings.warn(text, CacheWarning, stacklevel=2)
+
+
+@cache
+def _remove_unused(folder: Path) -> None:
+    """Remove files, of this version and of others, that were not used for long."""
+    for path in folder.parent.glob("*/*.nbc"):
+        with suppress(OSError):
+            if time.time() - path.stat().st_mtime > UNUSED:
+                path.unlink()
 
 
 class Deferred:
@@ -71,8 +113,8 @@ class Deferred:
         digest = made_of(self)  # once: it looks at all that is called
         compiled = numba.njit(**self.targetoptions)(_apart(self.py_func, digest))
         _compile_alike(compiled)
-        if folder := place():
-            compiled._cache = _Kept(folder, self.py_func.__qualname__, digest)
+        if folder := cache_folder():
+            compiled._cache = _Cache(folder, self.py_func.__qualname__, digest)
         return cast("Callable[..., Any]", compiled)
 
     @property
@@ -148,7 +190,7 @@ def _compile_alike(compiled: Any) -> None:
     compiled.get_call_template = alike
 
 
-class _Kept:
+class _Cache:
     """What numba compiled of a function: a file for every signature, named after all that it is made of.
 
     So a file is never of anything else, whatever other processes write at the same time. Numba's own
@@ -157,7 +199,6 @@ class _Kept:
     Parameters
     ----------
     folder : Path
-        Of this user's alone.
     name : str
         Of the function.
     digest : str
@@ -177,18 +218,23 @@ class _Kept:
         return self._stem.with_name(f"{self._stem.name}-{digest[:40]}.nbc")
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """Return what was compiled for a signature, None if that is not there, or damaged."""
+        """Return what was compiled for a signature; None if that is not there, or damaged."""
         from numba.core import compiler
 
         result: Any = compiler.CompileResult
         target_context.refresh()
-        # ImportError: of a version in which what it calls stood in another module
-        with suppress(OSError, ImportError):
-            content = self._file(signature, target_context.codegen()).read_bytes()
-            digest, payload = content[:DIGEST], content[DIGEST:]
-            if sha256(payload).digest() == digest:
-                return result._rebuild(target_context, *pickle.loads(payload))
-        return None
+        file = self._file(signature, target_context.codegen())
+        try:
+            content = file.read_bytes()
+            os.utime(file)
+            if sha256(content[DIGEST:]).digest() != content[:DIGEST]:
+                raise ValueError
+            return result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
+        except FileNotFoundError:
+            return None
+        except Exception:  # whatever is wrong with it, it can be compiled again
+            _note("compiled functions in the cache were damaged, and are compiled again")
+            return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Write what was compiled for a signature, done without where that fails, as on a full disk."""
@@ -199,7 +245,8 @@ class _Kept:
             return
         payload = dumps(compiled._reduce())
         file = self._file(signature, compiled.codegen)
-        with suppress(DataError), replacing(file) as new:
+        _remove_unused(file.parent)
+        with suppress(DataError, OSError), replacing(file) as new:
             new.write_bytes(sha256(payload).digest() + payload)
 
 

@@ -91,7 +91,7 @@ def build(desk: Desk, model: Any) -> None:
 
             def write() -> str:
                 block, options = one.block_and_options()
-                export_c(block, folder, name=name, single=only, overwrite=True, **options)
+                export_c(block, folder, name=name, single=only, force=True, **options)
                 return one.exported("c", folder.name, options, " --float32" if only else "")
 
             await _zipped(desk, folder, await asyncio.to_thread(write))
@@ -106,7 +106,7 @@ def build(desk: Desk, model: Any) -> None:
 
             def write() -> str:
                 block, options = one.block_and_options()
-                export_fmu(block, path, name=name, overwrite=True, **options)
+                export_fmu(block, path, name=name, force=True, **options)
                 return one.exported("fmu", path.name, options)
 
             hand_over(desk, path, await asyncio.to_thread(write))
@@ -121,7 +121,7 @@ def build(desk: Desk, model: Any) -> None:
 
             def write() -> str:
                 block, options = one.block_and_options()
-                export_ros2(block, folder, name=name, overwrite=True, **options)
+                export_ros2(block, folder, name=name, force=True, **options)
                 return one.exported("ros2", folder.name, options)
 
             await _zipped(desk, folder, await asyncio.to_thread(write))

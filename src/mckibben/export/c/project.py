@@ -21,7 +21,7 @@ from mckibben.errors import ModelError, ModelWarning
 from mckibben.export.c.serving import Serving, served, served_files
 from mckibben.export.c.translator import Translation
 from mckibben.export.c.wiring import Call, Wiring
-from mckibben.export.folders import refuse_folder, write_folder
+from mckibben.export.folders import write_folder
 from mckibben.export.naming import identifier, macros, said
 from mckibben.export.templating import literals, rows
 from mckibben.export.templating import render as rendered
@@ -55,7 +55,7 @@ def export_c(
     name: str = "model",
     sample_time: float | None = None,
     single: bool = False,
-    overwrite: bool = False,
+    force: bool = False,
     serving: Serving | None = None,
 ) -> Path:
     """Write a model as a folder of C99, with a self-test whose vectors Python computed.
@@ -74,8 +74,8 @@ def export_c(
         Time between steps [s], positive; needed by rate-dependent blocks.
     single : bool
         Single instead of double precision.
-    overwrite : bool
-        Whether a folder that an export wrote before may be replaced.
+    force : bool
+        Whether files of the user's may be replaced; those of an earlier export are anyway.
     serving : Serving, optional
         Add a server that answers over a wire, within these settings; see `mckibben.link`.
 
@@ -92,9 +92,8 @@ def export_c(
         If the folder is in the way or cannot be written.
     """
     folder = Path(folder)
-    refuse_folder(folder, overwrite=overwrite)
     files = c_files(block, name=name, sample_time=sample_time, single=single, serving=serving)
-    write_folder(folder, files, overwrite=overwrite)
+    write_folder(folder, files, force=force)
     return folder
 
 

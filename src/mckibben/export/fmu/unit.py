@@ -33,7 +33,7 @@ from mckibben.export.c.project import described, source_files
 from mckibben.export.folders import write_texts, zipped
 from mckibben.export.programs import own_compiler, run
 from mckibben.export.templating import literals, render
-from mckibben.system import ordinary
+from mckibben.system.results import claim
 from mckibben.system.atomic import replacing
 
 HERE = Path(__file__).parent
@@ -44,9 +44,6 @@ FLAGS = ("-std=c99", "-O2", "-s", "-ffp-contract=off", "-shared")
 
 DEFAULT_STEP = 0.01
 """Communication step suggested where the model has no time of its own [s]."""
-
-LARGEST_FILE = 256 * 2**20
-"""Bytes; a larger FMU is not one by this package."""
 
 BASE_UNITS: dict[str, dict[str, str] | None] = {
     "bar": {"kg": "1", "m": "-1", "s": "-2", "factor": "100000"},
@@ -86,7 +83,7 @@ def export_fmu(
     name: str = "model",
     sample_time: float | None = None,
     platforms: Sequence[str] | None = None,
-    overwrite: bool = False,
+    force: bool = False,
 ) -> Path:
     """Write a model as an FMU for co-simulation, in double precision.
 
@@ -103,8 +100,8 @@ def export_fmu(
     platforms : sequence of str, optional
         Of linux, windows and macos; default all that this machine can build for. Empty for sources
         only.
-    overwrite : bool
-        Whether what an export wrote there before may be replaced.
+    force : bool
+        Whether files of the user's may be replaced; those of an earlier export are anyway.
 
     Returns
     -------
@@ -121,7 +118,7 @@ def export_fmu(
     path = Path(path)
     if path.suffix != ".fmu":
         raise DataError("an FMU is a file that ends in .fmu", file=path, remedy="name it so")
-    refuse_file(path, overwrite=overwrite)
+    claim(path, force=force)
     wanted = buildable() if platforms is None else list(platforms)
     unknown = [each for each in wanted if each not in PLATFORMS]
     if unknown:
@@ -139,34 +136,6 @@ def export_fmu(
     with replacing(path) as new:
         new.write_bytes(zipped(texts | _libraries(files, name, wanted)))
     return path
-
-
-def refuse_file(path: Path, *, overwrite: bool = False) -> None:
-    """Refuse to write over a file; with ``overwrite``, over what is no FMU by this package.
-
-    Raises
-    ------
-    DataError
-        If there is one.
-    """
-    if not (path.exists() or path.is_symlink()):
-        return
-    if not overwrite:
-        raise DataError("the file exists already", file=path, remedy="name another, or --overwrite")
-    if not _is_own(path):
-        raise DataError(
-            "it was not written by an export", file=path, remedy="move it away, or name another"
-        )
-
-
-def _is_own(path: Path) -> bool:
-    if path.is_symlink():
-        return False
-    try:
-        with ordinary.opened(path, most=LARGEST_FILE) as file, zipfile.ZipFile(file) as archive:
-            return {"resources/model.json", "sources/unit_model.h"} <= set(archive.namelist())
-    except (DataError, zipfile.BadZipFile, ValueError, NotImplementedError):
-        return False
 
 
 def fmu_files(

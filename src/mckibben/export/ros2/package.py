@@ -14,7 +14,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, source_files
-from mckibben.export.folders import refuse_folder, write_folder
+from mckibben.export.folders import write_folder
 from mckibben.export.templating import render
 
 
@@ -24,7 +24,7 @@ def export_ros2(
     *,
     name: str = "muscle",
     sample_time: float | None = None,
-    overwrite: bool = False,
+    force: bool = False,
 ) -> Path:
     """Write a compensator as a package of ROS 2, to be built by colcon.
 
@@ -39,8 +39,8 @@ def export_ros2(
         Of the package, and of the C functions: small letters, digits and underscores.
     sample_time : float, optional
         Time between steps [s]; needed by rate-dependent blocks, and then the controller's period.
-    overwrite : bool
-        Whether a folder that an export wrote before may be replaced.
+    force : bool
+        Whether files of the user's may be replaced; those of an earlier export are anyway.
 
     Returns
     -------
@@ -55,9 +55,8 @@ def export_ros2(
         If the folder is in the way or cannot be written.
     """
     folder = Path(folder)
-    refuse_folder(folder, overwrite=overwrite)
     files = ros2_files(block, name=name, sample_time=sample_time)
-    write_folder(folder, files, overwrite=overwrite)
+    write_folder(folder, files, force=force)
     return folder
 
 

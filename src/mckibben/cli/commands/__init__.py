@@ -1,0 +1,1 @@
+"""The commands: a module each, with its help as docstring and a ``command``."""

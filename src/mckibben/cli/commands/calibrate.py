@@ -1,0 +1,48 @@
+"""Find bands of a model on recordings that it was not fitted to.
+
+At a level of 0.9 they hold 90 % of the samples of a new run that is like these, on average.
+simulate model.json FILE --interval 0.9 writes lower and upper ends.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from mckibben.cli.output import show
+from mckibben.cli.parameters import Files, Force, Json, ModelFile, command
+from mckibben.options import Option
+from mckibben.reading import ReadOptions
+
+
+@command
+def calibrate(
+    model: ModelFile,
+    files: Files,
+    reading: ReadOptions,
+    out: Annotated[Path, Option("Model with its band to write (JSON).", "FILE", "-o")],
+    exchangeable: Annotated[
+        Literal["auto", "run", "block"],
+        Option("What a new run is like: runs, or long blocks of runs. auto: runs from 9 on."),
+    ] = "auto",
+    fitted: Annotated[
+        tuple[Path, ...], Option("What the model was fitted to: refused; repeatable.", "FILE")
+    ] = (),
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    from mckibben.blocks.saving import load
+    from mckibben.diagnosis.bands import calibration
+    from mckibben.reading import read_files
+    from mckibben.report import text, words
+    from mckibben.system.results import claim
+
+    claim(out, inputs=[model, *files, *fitted], force=force)
+    block, known = load(model), read_files(fitted, None, reading)
+    banded, found = calibration(block, read_files(files, None, reading), exchangeable, known)
+    banded.save(out)
+    notes = [words.calibrated_on_blocks(found)] if found.band.unit == "block" else []
+    if not known:
+        notes.append("whether the model was fitted to these recordings is checked with --fitted FILE")
+    about = {"file": str(out)} | found.to_dict() | {"notes": notes}
+    show(about, lambda: text.calibration(found), as_json, notes, [out])

@@ -1,0 +1,32 @@
+"""Measure what a muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from mckibben.cli.output import show
+from mckibben.cli.parameters import Files, Json, command
+from mckibben.options import Option
+from mckibben.reading import ReadOptions
+
+
+@command
+def characterize(
+    files: Files,
+    reading: ReadOptions,
+    input: Annotated[str | None, Option("Input. Default: by name.", "CHANNEL")] = None,  # noqa: A002
+    output: Annotated[str | None, Option("Output. Default: by name.", "CHANNEL")] = None,
+    beside: Annotated[
+        tuple[str, ...], Option("Another input: look where it rests; repeatable.", "CHANNEL")
+    ] = (),
+    as_json: Json = False,
+) -> None:
+    from mckibben.diagnosis.characterization import characterize as find
+    from mckibben.reading import read_pair
+    from mckibben.recording import notes_by_file, reading_notes
+    from mckibben.report import text
+
+    recordings, *pair = read_pair(files, input, output, reading, beside)
+    found = find(recordings, *pair, beside=beside)
+    about = found.to_dict() | {"notes": notes_by_file(recordings)}
+    show(about, lambda: text.characterization(found), as_json, reading_notes(recordings))

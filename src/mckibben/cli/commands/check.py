@@ -1,0 +1,36 @@
+"""Test whether a saved model is right on recordings, and what it misses.
+
+The model runs free. Its residual is tested for following a lag, inputs, their branches (hysteresis),
+loads, time (drift), speed, holds (creep) and position. Recordings that the model was not fitted to
+say most. A folder stands for all recordings in it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from mckibben.cli.output import progress_bar, show
+from mckibben.cli.parameters import Files, Force, Json, ModelFile, command
+from mckibben.options import Option
+from mckibben.reading import ReadOptions
+
+
+@command
+def check(
+    model: ModelFile,
+    files: Files,
+    reading: ReadOptions,
+    out: Annotated[Path, Option("Folder for the results.", "DIR", "-o")],
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    from mckibben import workflow
+    from mckibben.report import text, words
+
+    with progress_bar("check:") as tell:
+        found = workflow.check(model, files, reading=reading, out=out, force=force, progress=tell)
+    about = {"folder": str(out), "model_file": str(model)} | found.to_dict()
+    about |= {"verdict": words.check_verdict(found), "sentences": words.check_sentences(found)}
+    written = [out / "report.html", out / "validation.json"]
+    show(about, lambda: text.check(found), as_json, written=written)

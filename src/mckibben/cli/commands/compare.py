@@ -1,0 +1,49 @@
+"""Fit models, choose by cross-validation, test on data used for neither; all free-running.
+
+A folder stands for all recordings in it. Recordings of several muscles (pressure_1 ...,
+displacement_1 ...) get models that couple them, and with --load force models are given the load.
+Ctrl-C stops at once; with -o, the same command goes on from there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from mckibben.cli.output import progress_bar, show
+from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command
+from mckibben.cli.stopping import stop_short, stoppable
+from mckibben.options import CompareOptions, Option
+from mckibben.reading import ReadOptions
+
+NO_MODEL = 1
+"""Exit code where none of the models could be fitted."""
+
+
+@command
+def compare(
+    files: Files,
+    options: CompareOptions,
+    reading: ReadOptions,
+    test: Test = (),
+    quick: Quick = False,
+    out: Annotated[
+        Path | None, Option("Folder for leaderboard.json and .csv.", "DIR", "-o")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> int:
+    from mckibben import workflow
+    from mckibben.report import text
+
+    chosen = replace(options, models="quick") if quick else options
+    with stoppable(out), progress_bar("compare:", plainly=True) as tell:
+        board = workflow.compare(
+            files, test, chosen, reading=reading, out=out, force=force, progress=tell
+        )
+        stop_short(board, out)
+    written = [out / "leaderboard.json", out / "leaderboard.csv"] if out else []
+    show(board, lambda: text.leaderboard(board), as_json, written=written)
+    failed = sum(map(len, board.failures.values()))
+    return NO_MODEL if board.rows and failed == len(board.rows) else 0

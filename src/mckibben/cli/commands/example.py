@@ -1,0 +1,21 @@
+"""Write the bundled recordings into a folder: a virtual muscle, one run to train, one to test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from mckibben.cli.output import say
+from mckibben.cli.parameters import Argument, Force, command
+
+
+@command
+def example(
+    folder: Annotated[Path, Argument("[FOLDER]", "Made where it is missing.")] = Path("examples"),
+    force: Force = False,
+) -> None:
+    from mckibben import example as bundled
+
+    count = bundled.copy_to(folder, force=force)
+    train, test = folder / bundled.TRAIN.name, folder / bundled.TEST.name
+    say(f"Written: {count} files to {folder}. Next: mckibben study {train} --test {test}")

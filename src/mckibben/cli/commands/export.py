@@ -1,0 +1,55 @@
+"""Write a model as code for elsewhere: c, fmu, ros2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import click
+
+from mckibben.cli.output import show
+from mckibben.cli.parameters import Argument, Json, command
+from mckibben.options import COptions, ExportOptions, FMUOptions, Option
+
+Model = Annotated[Path, Argument("MODEL", "Model, inverse or controller (JSON).")]
+Folder = Annotated[Path, Option("Folder to write.", "DIR", "-o")]
+
+
+@command
+def c(model: Model, options: COptions, out: Folder, as_json: Json = False) -> None:
+    """Write C99 that compiles as it is: on a PC, a microcontroller, Arduino, MATLAB."""
+    _export("c", model, options, out, as_json)
+
+
+@command
+def fmu(
+    model: Model,
+    options: FMUOptions,
+    out: Annotated[Path, Option("FMU to write (.fmu).", "FILE", "-o")],
+    as_json: Json = False,
+) -> None:
+    """Write an FMU 2.0 for co-simulation, for Simulink-like tools: C inside, libraries built here."""
+    _export("fmu", model, options, out, as_json)
+
+
+@command
+def ros2(model: Model, options: ExportOptions, out: Folder, as_json: Json = False) -> None:
+    """Write a package of ROS 2: a chainable controller of ros2_control around the model's C."""
+    _export("ros2", model, options, out, as_json)
+
+
+def _export(
+    target: Literal["c", "fmu", "ros2"],
+    model: Path,
+    options: ExportOptions,
+    out: Path,
+    as_json: bool,
+) -> None:
+    from mckibben import workflow
+    from mckibben.report import text
+
+    found = workflow.export(model, out, target, options)
+    show(found, lambda: text.exported(found), as_json, written=[out])
+
+
+command = click.Group("export", help=__doc__, commands={one.name or "": one for one in (c, fmu, ros2)})

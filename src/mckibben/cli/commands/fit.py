@@ -1,0 +1,35 @@
+"""Identify one model from recordings and save it as JSON.
+
+Models of several muscles (balance, coupled-memory, coupled-pi, sdchm, tsfnn) find their
+channels by name: pressure_1 ..., displacement_1 ..., and pressure_extensor where there is one.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from mckibben.cli.output import progress_bar, show
+from mckibben.cli.parameters import Argument, Files, Force, Json, command
+from mckibben.options import FitOptions, Option
+from mckibben.reading import ReadOptions
+
+
+@command
+def fit(
+    model: Annotated[str, Argument("MODEL", "Short name; see info --models.")],
+    files: Files,
+    options: FitOptions,
+    reading: ReadOptions,
+    out: Annotated[Path, Option("Model file to write (JSON).", "FILE", "-o")],
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    from mckibben import workflow
+    from mckibben.report import text
+
+    with progress_bar(f"fitting {model}") as tell:
+        found = workflow.fit(
+            model, files, options, reading=reading, out=out, force=force, progress=tell
+        )
+    show(found, lambda: text.fit(found), as_json, found.notes, [out])

@@ -1,0 +1,51 @@
+"""Show what files contain and what recordings cannot identify, or list the models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from mckibben.cli.output import show
+from mckibben.cli.parameters import Argument, Json, command
+from mckibben.options import Inputs, Option, Outputs
+from mckibben.reading import ReadOptions
+
+
+@command
+def info(
+    reading: ReadOptions,
+    files: Annotated[
+        tuple[Path, ...], Argument("[FILES]...", "Recordings, or a model saved as JSON.")
+    ] = (),
+    models: Annotated[bool, Option("List the models and settings.")] = False,
+    inputs: Inputs = None,
+    outputs: Outputs = None,
+    as_json: Json = False,
+) -> None:
+    from mckibben import registry
+    from mckibben.blocks.saving import is_model
+    from mckibben.errors import DataError
+    from mckibben.estimators.catalogue import described
+    from mckibben.files.look import look
+    from mckibben.report import text
+
+    if models:
+        every: dict[str, Any] = described()
+        show(every, lambda: text.models(every), as_json)
+        return
+    if not files:
+        raise DataError("there is nothing to show", remedy="give a file, or `models`")
+    known = {*registry.names("estimators"), *registry.names("blocks")}
+    if named := [str(one) for one in files if str(one) in known and not one.exists()]:
+        raise DataError(
+            f"{named[0]!r} is a model, and there is no file of that name",
+            remedy="list the models with `models`, or give a file",
+        )
+    if len(files) == 1 and is_model(files[0]):
+        from mckibben.workflow import description
+
+        about = description(files[0])
+        show(about, lambda: text.model(about), as_json)
+        return
+    found = look(files, reading, inputs, outputs)
+    show(found, lambda: text.contents(found), as_json)

@@ -1,0 +1,58 @@
+"""Compare all models on all sets of recordings in a folder, by fixed splits, on one page.
+
+The table [split] in a set's channels.toml states what is fitted and what is tested; without it the
+last quarter is tested. Ctrl-C stops at once, and the same command goes on from there.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from mckibben.cli.output import progress_bar, say, show
+from mckibben.cli.parameters import Argument, Force, Json, Quick, command
+from mckibben.cli.stopping import stoppable
+from mckibben.options import Jobs, Option, Seed, names
+
+if TYPE_CHECKING:
+    from mckibben.measured.running import Outcome
+
+
+@command
+def measured(
+    folder: Annotated[
+        Path, Argument("FOLDER", "A folder for every set of recordings, each with its channels.toml.")
+    ],
+    out: Annotated[Path, Option("Folder for measured.md and measured.csv.", "DIR", "-o")] = Path(
+        "measured"
+    ),
+    only: Annotated[tuple[str, ...], Option("A set's folder; repeatable.", "SET")] = (),
+    models: Annotated[
+        str | tuple[str, ...], Option("Models by short name.", "all|quick|NAME,...", parse=names)
+    ] = "all",
+    quick: Quick = False,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    from mckibben.errors import DataError
+    from mckibben.measured.running import measure
+    from mckibben.report import words
+
+    def done(one: Outcome) -> None:
+        if not as_json:
+            say(f"{one.label}: {one.failed or (words.chosen(one.board) if one.board else '')}")
+
+    chosen = "quick" if quick else models
+    with stoppable(out), progress_bar("measured:", plainly=True) as tell:
+        found = measure(
+            folder, out, only=only, models=chosen, seed=seed, jobs=jobs, force=force, progress=tell,
+            found=done,
+        )  # fmt: skip
+    written = [out / "measured.md", out / "measured.csv"]
+    show({one.label: one.to_dict() for one in found}, list, as_json, written=written)
+    if all(one.failed for one in found):
+        raise DataError(
+            "nothing could be compared", file=folder, remedy=f"see the reasons in {written[0]}"
+        )

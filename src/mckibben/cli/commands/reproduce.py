@@ -1,0 +1,54 @@
+"""Run a paper's protocol on its rig: its methods as published, ours, and its tables beside.
+
+Ctrl-C stops at once; with -o what is recorded and fitted is there, and the same command goes on.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from mckibben.cli.output import progress_bar, show
+from mckibben.cli.parameters import Argument, Force, Json, command
+from mckibben.cli.stopping import stoppable
+from mckibben.options import Jobs, Option, Seed
+from mckibben.reading import ReadOptions
+
+
+@command
+def reproduce(
+    reading: ReadOptions,
+    name: Annotated[str | None, Argument("[PAPER]", "Short name; see --list.")] = None,
+    listed: Annotated[bool, Option("List the papers.", flag="--list")] = False,
+    quick: Annotated[bool, Option("Leave out what takes long.")] = False,
+    data: Annotated[
+        Path | None, Option("Your own recordings instead of the rig's; see docs/papers.", "FOLDER")
+    ] = None,
+    rig: Annotated[
+        str | None, Option("Rig to record, and to close loops on. Default: the paper's.", "RIG")
+    ] = None,
+    out: Annotated[
+        Path | None, Option("Folder for report.html and tables.json.", "DIR", "-o")
+    ] = None,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    from mckibben.errors import DataError
+    from mckibben.papers.experiment import rerun
+    from mckibben.papers.paper import papers
+    from mckibben.report import text
+
+    if listed:
+        show([one.summary() for one in papers().values()], lambda: text.papers(papers()), as_json)
+        return
+    if name is None:
+        raise DataError("there is no paper to run again", remedy="name one, or give `listed`")
+    with stoppable(out), progress_bar(f"{name}:", plainly=True) as tell:
+        found = rerun(
+            name, data, reading, rig=rig, out=out, quick=quick, seed=seed, jobs=jobs, force=force,
+            progress=tell,
+        )  # fmt: skip
+    written = [out / "report.html", out / "tables.json"] if out else []
+    show(found, lambda: text.reproduction(found), as_json, found.notes, written)

@@ -1,0 +1,180 @@
+"""Virtual rigs: list, show, run, record, new."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import click
+
+from mckibben.cli.output import progress_bar, say, show
+from mckibben.cli.parameters import Argument, Force, Json, command
+from mckibben.cli.stopping import stoppable
+from mckibben.options import Jobs, Option, Seed, setting
+
+Name = Annotated[str, Argument("RIG", "Name of a rig, or its file (.toml).")]
+Changes = Annotated[
+    dict[str, Any], Option("Change the rig: payload=10; repeatable.", "NAME=VALUE", "--set", setting)
+]
+
+
+@command
+def list_(as_json: Json = False) -> None:
+    """List the rigs, the protocols made for them, and the signals that can drive them."""
+    from mckibben.report import text
+    from mckibben.rigs.driving import catalogue
+
+    found = catalogue()
+    show(found, lambda: text.rigs(found), as_json)
+
+
+@command
+def show_(
+    name: Name,
+    changes: Changes = {},  # noqa: B006
+    out: Annotated[
+        Path | None, Option("File to write it to (.toml), as your own rig.", "FILE", "-o")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Show every parameter of a rig with its unit, meaning and range, as the text of its file.
+
+    With -o it becomes a rig of your own, which is given by its file wherever a rig is asked for.
+    """
+    from mckibben.rigs import describe, load_rig, save_rig
+    from mckibben.system.results import claim
+
+    if out is not None:
+        claim(out, inputs=[Path(name)], force=force)
+    rig = load_rig(name).changed(changes)
+    if out is not None:
+        save_rig(rig.changed({"name": out.stem}), out)
+        say(f"Written: {out}")
+    elif as_json:
+        show(rig.model_dump(mode="json"), list, True)
+    else:
+        say(describe(rig), end="")
+
+
+@command
+def run(
+    name: Name,
+    out: Annotated[Path, Option("File to write: .csv, .tsv, .parquet.", "FILE", "-o")],
+    signal: Annotated[
+        tuple[str, ...],
+        Option(
+            "What drives a channel, by default the first, over its range; repeatable. See rig list.",
+            "[CHANNEL=]SIGNAL[:SETTING=VALUE,...]",
+        ),
+    ] = (),
+    inputs: Annotated[
+        Path | None, Option("Recording to take the commands from instead.", "FILE")
+    ] = None,
+    duration: Annotated[float, Option("Seconds.")] = 60.0,
+    rate: Annotated[float | None, Option("Samples per second. Default: the rig's.", "HZ")] = None,
+    changes: Changes = {},  # noqa: B006
+    ideal: Annotated[bool, Option("Perfect sensors; adds volume and temperature.")] = False,
+    seed: Seed = 0,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Run one experiment and write the recording.
+
+    The rig begins at rest at the first commands, unless its file or --set has others (start.pressure=1).
+    """
+    from mckibben.errors import DataError
+    from mckibben.files import read, write
+    from mckibben.report import text
+    from mckibben.rigs import load_rig
+    from mckibben.rigs.driving import at_first_commands, commands
+    from mckibben.system.results import claim
+
+    claim(out, inputs=[Path(name), *([] if inputs is None else [inputs])], force=force)
+    rig = load_rig(name).changed(changes)
+    if bool(signal) == (inputs is not None):
+        raise DataError(
+            "a rig is driven by signals or by a recording", remedy="give `signal` or `inputs`"
+        )
+    if inputs is None:
+        given = commands(rig, signal, duration, rate, seed)
+    else:
+        given, *others = read(inputs, channels=[rig.inputs[0]], informative=False)
+        if others:
+            raise DataError("there are several recordings in it", file=inputs, remedy="give one")
+        given = given.select([one for one in rig.inputs if one in given])
+    recording = at_first_commands(rig, given).run(given, seed, ideal=ideal)
+    write(recording.with_meta(name=out.stem), out)
+    spans = {k: [float(v.min()), float(v.max())] for k, v in recording.channels.items()}
+    about = {"file": str(out), "n_samples": len(recording), "ranges": spans}
+    about["saturated"] = dict(recording.meta.get("saturated", {}))
+    show(about, lambda: text.ranges(recording), as_json, written=[out])
+
+
+@command
+def record(
+    protocol: Annotated[str, Argument("PROTOCOL", "Protocol to record; see rig list.")],
+    out: Annotated[Path, Option("Folder to write the recordings to.", "DIR", "-o")],
+    rig: Annotated[
+        str | None, Option("Rig to record on. Default: the protocol's.", "RIG")
+    ] = None,
+    changes: Changes = {},  # noqa: B006
+    file_format: Annotated[
+        Literal["csv", "tsv", "parquet"], Option("Of the files.", flag="--format")
+    ] = "csv",
+    only: Annotated[str | None, Option("Only runs with TEXT in their name.", "TEXT")] = None,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Record a paper's whole protocol: one file a run, and protocol.json with what each is for.
+
+    Files of a recording that was stopped are not made again.
+    """
+    from mckibben.rigs.driving import record_protocol
+
+    with stoppable(out), progress_bar(f"recording {protocol}:") as tell:
+        recorded, earlier = record_protocol(
+            protocol, out, rig=rig, changes=changes, file_format=file_format, only=only, seed=seed,
+            jobs=jobs, force=force, progress=tell,
+        )  # fmt: skip
+    more = f", {len(earlier)} were there already" if earlier else ""
+    lines = [f"Written: {len(recorded)} recordings to {out}{more}; roles are in protocol.json"]
+    about = {"folder": str(out), "recorded": recorded, "earlier": sorted(earlier)}
+    show(about, lambda: lines, as_json)
+
+
+@command
+def new(
+    file: Annotated[Path, Argument("FILE", "File to write (.toml).")],
+    diameter: Annotated[float, Option("Inner diameter [mm].")],
+    length: Annotated[float, Option("Length at rest [mm].")],
+    max_pressure: Annotated[float, Option("Highest pressure [bar].")],
+    max_force: Annotated[float, Option("Force at rest length and that pressure [N].")],
+    max_contraction: Annotated[
+        float, Option("Contraction at that pressure without load, for instance 0.25.")
+    ],
+    payload: Annotated[float, Option("Mass hanging from it [kg].")] = 0.0,
+    loop_width: Annotated[
+        float, Option("Loop width e_w as a share of its stroke, for instance 0.15.")
+    ] = 0.15,
+    force: Force = False,
+) -> None:
+    """Make a rig of your own muscle from the numbers of its data sheet."""
+    from mckibben.rigs import rig_from_data_sheet, save_rig
+    from mckibben.system.results import claim
+
+    claim(file, inputs=[], force=force)
+    name = "".join(c if c.isalnum() else "-" for c in file.stem.lower()).strip("-") or "my-rig"
+    rig = rig_from_data_sheet(
+        name=name, diameter=diameter, length=length, max_pressure=max_pressure, max_force=max_force,
+        max_contraction=max_contraction, payload=payload, loop_width=loop_width,
+    )  # fmt: skip
+    save_rig(rig, file)
+    say(f"Written: {file}. Next: mckibben rig run {file} --signal triangle:period=10 -o run.csv")
+
+
+command = click.Group(
+    "rig", help=__doc__, commands={one.name or "": one for one in (list_, show_, run, record, new)}
+)

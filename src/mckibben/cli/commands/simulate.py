@@ -1,0 +1,60 @@
+"""Run a saved model free over a recording; adds channels named OUTPUT_model.
+
+A linear model whose start is fitted starts from the state that explains the measured output best,
+where the file has it; with --initial first_sample from inputs alone.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from mckibben.cli.output import show
+from mckibben.cli.parameters import Argument, Force, Json, ModelFile, command
+from mckibben.options import Fields, Option
+from mckibben.reading import ReadOptions
+
+
+@command
+def simulate(
+    model: ModelFile,
+    file: Annotated[Path, Argument("FILE", "Recording with the model's inputs.")],
+    reading: ReadOptions,
+    out: Annotated[Path, Option("File to write: .csv, .tsv, .parquet.", "FILE", "-o")],
+    initial: Annotated[
+        str,
+        Option(
+            "Memory before the first sample: model (as saved), first_sample, virgin, or measured "
+            "(the one excursion that explains the first measured output)."
+        ),
+    ] = "model",
+    horizon: Annotated[
+        int | None,
+        Option("Predict so many samples ahead from measured outputs, instead of free.", "N"),
+    ] = None,
+    interval: Annotated[
+        float | None,
+        Option("Of a calibrated model: also ends that hold this share, as 0.9.", "LEVEL"),
+    ] = None,
+    fields: Fields = {},  # noqa: B006
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    from mckibben.files import write
+    from mckibben.reading import read_files
+    from mckibben.report import text
+    from mckibben.studying.simulating import simulated
+    from mckibben.system.results import claim
+    from mckibben.workflow import saved
+
+    claim(out, inputs=[model, file], force=force)
+    found = simulated(
+        saved(model, fields),
+        lambda names: read_files(file, names, reading),
+        initial=initial,
+        horizon=horizon,
+        interval=interval,
+    )
+    write(found.recording.with_meta(model=str(model)), out)
+    about = {"file": str(out)} | found.to_dict()
+    show(about, lambda: text.simulation(found), as_json, found.notes, [out])

@@ -1,0 +1,68 @@
+"""Characterize a muscle, choose a model by cross-validation, test and invert it, and write a report.
+
+A folder stands for all recordings in it. Recordings of several muscles (pressure_1 ...,
+displacement_1 ...) get models that couple them, and a closed loop on a virtual rig. With --load
+force, models that are given the load are ranked against one model for every load.
+
+With --compensator or --model, recordings with a reference (reference_displacement, setpoint, ...)
+are logs of a loop: the report states the predicted and the achieved error, what part is due to model,
+actuator, delay, noise, drift and limits, and the same kind of model refitted (refit.json).
+
+Ctrl-C stops at once, and the same command goes on from there.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from mckibben.cli.output import progress_bar, say, show
+from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command
+from mckibben.cli.stopping import stop_short, stoppable
+from mckibben.options import Option, StudyOptions
+from mckibben.reading import ReadOptions
+
+if TYPE_CHECKING:
+    from mckibben.studying.study import Study
+
+
+@command
+def study(
+    files: Files,
+    options: StudyOptions,
+    reading: ReadOptions,
+    test: Test = (),
+    quick: Quick = False,
+    out: Annotated[Path, Option("Folder for the results.", "DIR", "-o")] = Path("study"),
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    from mckibben import workflow
+    from mckibben.recording import notes_by_file
+    from mckibben.report import text
+
+    def begun(so_far: Study) -> None:
+        if not so_far.leaderboard.rows and not as_json:
+            for line in text.study_begun(so_far):
+                say(line)
+            say(f"Report: {workflow.unfinished(out) / 'report.html'}, updated with every model.\n", flush=True)
+
+    with stoppable(out), progress_bar("study:", plainly=True) as tell:
+        found = workflow.study(
+            files,
+            test,
+            replace(options, models="quick") if quick else options,
+            reading=reading,
+            out=out,
+            force=force,
+            command=shlex.join(["mckibben", *sys.argv[1:]]),
+            progress=tell,
+            found=begun,
+        )
+        stop_short(found.leaderboard, out)
+    about = {"folder": str(out)} | found.to_dict()
+    about["notes"] = notes_by_file([*found.train, *found.test])
+    show(about if as_json else found, lambda: text.study(found), as_json, written=[out / "report.html"])

@@ -1,0 +1,44 @@
+"""Let a compensator, or a controller with it, follow a reference on a virtual rig, or on a model.
+
+Beside it stands what no compensation does: pressures read off one slow rise of the same plant.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from mckibben.cli.output import progress_bar, show
+from mckibben.cli.parameters import Argument, Force, Json, command
+from mckibben.options import Option, TrackOptions
+from mckibben.reading import ReadOptions
+
+
+@command
+def track(
+    compensator: Annotated[Path, Argument("COMPENSATOR", "Inverse, from mckibben invert (JSON).")],
+    reference: Annotated[Path, Option("Displacements, or force, to follow.", "FILE")],
+    options: TrackOptions,
+    reading: ReadOptions,
+    out: Annotated[Path | None, Option("Recording of the run to write.", "FILE", "-o")] = None,
+    controller_out: Annotated[
+        Path | None, Option("Controller to write (JSON), for export.", "FILE")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    from mckibben import workflow
+    from mckibben.report import text
+
+    with progress_bar(f"{options.controller}:") as tell:
+        found = workflow.track(
+            compensator,
+            reference,
+            options,
+            reading=reading,
+            out=out,
+            controller_out=controller_out,
+            force=force,
+            progress=tell,
+        )
+    show(found, lambda: text.tracking(found), as_json, written=[out, controller_out])

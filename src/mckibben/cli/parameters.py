@@ -1,0 +1,191 @@
+"""Flags and arguments of commands, made from the annotations of a function and of its options."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from enum import Enum
+from inspect import Parameter, cleandoc, signature
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import click
+
+from mckibben.errors import python_parameter
+from mckibben.options import Option
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A value that stands without a flag.
+
+    Parameters
+    ----------
+    metavar : str
+        What stands for it in the help.
+    help : str
+        What it is.
+    """
+
+    metavar: str
+    help: str
+
+
+_flags: dict[str, str] = {}
+"""Of the command that runs: its flags by the names of their parameters."""
+
+
+class Command(click.Command):
+    """A command whose flags are what errors call its parameters."""
+
+    def make_context(self, *given: Any, **more: Any) -> click.Context:
+        """Take the words that were typed."""
+        _flags.clear()
+        for param in self.params:
+            if isinstance(param, click.Option) and param.name:
+                _flags[param.name] = max(param.opts, key=len)
+        return super().make_context(*given, **more)
+
+
+def as_flag(name: str, key: str | None = None, value: str | None = None) -> str:
+    """Return a parameter in an error as a flag of the command that runs, or as Python has it."""
+    flag = _flags.get(name)
+    if flag is None:
+        return python_parameter(name, key, value)
+    word = value if key is None else f"{key}={value or 'VALUE'}"
+    return flag if word is None else f"{flag} {shlex.quote(word)}"
+
+
+Files = Annotated[
+    tuple[Path, ...], Argument("FILES...", "Recordings: CSV, TSV, Parquet, MAT, HDF5, TDMS, bags.")
+]
+Test = Annotated[tuple[Path, ...], Option("Recording to test on; repeatable.", "FILE")]
+ModelFile = Annotated[Path, Argument("MODEL", "Saved model (JSON).")]
+Quick = Annotated[bool, Option("Models that take seconds; same as --models quick.")]
+Force = Annotated[bool, Option("Replace files of yours, too; never what is read.")]
+Json = Annotated[bool, Option("Print the result as JSON on standard output.", flag="--json")]
+
+
+def command(run: Callable[..., int | None]) -> click.Command:
+    """Return a command that calls a function: its parameters are arguments and flags.
+
+    Parameters that are dataclasses are asked for field by field. The help is the docstring of the
+    function, or of its module where it has none. What the function returns is the exit code.
+    """
+    groups: dict[str, Any] = {}
+    params: list[click.Parameter] = []
+    hints = get_type_hints(run, include_extras=True)
+    for name, parameter in signature(run).parameters.items():
+        hint = hints[name]
+        if is_dataclass(hint):
+            groups[name] = hint
+            inner = get_type_hints(hint, include_extras=True)
+            params += [made(f.name, inner[f.name], _default(f)) for f in fields(hint)]
+        else:
+            params.append(made(name, hint, parameter.default))
+
+    def call(**given: Any) -> int | None:
+        for name, group in groups.items():
+            given[name] = group(**{f.name: given.pop(f.name) for f in fields(group)})
+        return run(**given)
+
+    text = run.__doc__ or sys.modules[run.__module__].__doc__ or ""
+    name = run.__name__.strip("_").replace("_", "-")
+    return Command(name, callback=call, params=params, help=cleandoc(text))
+
+
+def _default(field: Any) -> Any:
+    if field.default is not MISSING:
+        return field.default
+    return MISSING if field.default_factory is MISSING else field.default_factory()
+
+
+def made(name: str, hint: Any, default: Any) -> click.Parameter:
+    """Return the argument or flag of one parameter."""
+    kind, *extras = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    about = next((one for one in extras if isinstance(one, Option | Argument)), Option(""))
+    required = default is Parameter.empty or default is MISSING
+    kind, several, width = _taken_apart(kind)
+    if isinstance(about, Argument):
+        return click.Argument(
+            [name],
+            type=_click_type(kind),
+            metavar=about.metavar,
+            required=required,
+            nargs=-1 if several else 1,
+            default=None if required or several else default,
+        )
+    flags = [name, *_flags(name, about.flag)]
+    if kind is bool:
+        on = flags[1]
+        both = f"{on}/--no-{on[2:]}" if default is True else on
+        return click.Option([name, both], is_flag=True, default=bool(default), help=about.help)
+    mapping = kind is Mapping
+    return click.Option(
+        flags,
+        type=str if about.parse or mapping else _click_type(kind),
+        metavar=about.metavar or None,
+        help=about.help,
+        required=required,
+        multiple=several or mapping,
+        nargs=width if about.parse is None else 1,
+        default=None,
+        show_default=_shown(default, about),
+        callback=_parsed(about, mapping, several, default),
+    )
+
+
+def _flags(name: str, flag: str) -> list[str]:
+    if flag == "-o":
+        return ["-o", "--out"]
+    return [flag or f"--{name.replace('_', '-')}"]
+
+
+def _taken_apart(kind: Any) -> tuple[Any, bool, int]:
+    """Return the kind of one value, whether there may be several, and of how many words it is."""
+    if get_origin(kind) in (Union, types.UnionType):
+        kind = next(one for one in get_args(kind) if one not in (type(None), Any))
+    if get_origin(kind) in (list, tuple):
+        inside = get_args(kind)
+        if get_origin(kind) is tuple and inside[-1] is not Ellipsis:
+            return inside[0], False, len(inside)
+        return inside[0], True, 1
+    if isinstance(get_origin(kind), type) and issubclass(get_origin(kind), Mapping):
+        return Mapping, False, 1
+    return kind, False, 1
+
+
+def _click_type(kind: Any) -> Any:
+    if get_origin(kind) is Literal:
+        return click.Choice(get_args(kind))
+    if kind is Path:
+        return click.Path(path_type=Path)
+    return kind if kind in (int, float, str) else str
+
+
+def _shown(default: Any, about: Option) -> str | bool:
+    plain = isinstance(default, int | float | str | Enum) and default not in ("", False)
+    return str(default) if plain and about.parse is None else False
+
+
+def _parsed(about: Option, mapping: bool, several: bool, default: Any) -> Callable[..., Any]:
+    """Return what makes the value of an option from the words given for it."""
+
+    def value(context: click.Context, parameter: click.Parameter, given: Any) -> Any:
+        del context
+        if given is None or given == ():
+            return None if default is Parameter.empty else default
+        if about.parse is None:
+            return given
+        try:
+            if mapping:
+                return dict(about.parse(text) for text in given)
+            return tuple(map(about.parse, given)) if several else about.parse(given)
+        except Exception as error:
+            error.parameter = parameter.name  # type: ignore[attr-defined]
+            raise
+
+    return value

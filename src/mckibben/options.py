@@ -1,0 +1,399 @@
+"""What an option of an operation is, for whoever asks a person for it.
+
+The options of an operation are a dataclass. Its fields are annotated with an `Option`; the command line
+makes its flags from them, and forms their controls.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from mckibben.errors import DataError, ModelError
+
+Options = TypeVar("Options")
+
+
+@dataclass(frozen=True)
+class Option:
+    """How a person is asked for a value.
+
+    Parameters
+    ----------
+    help : str
+        What it is, in a line.
+    metavar : str
+        What stands for the value in a help text, such as ``HZ``.
+    flag : str
+        The flag of the command line; default ``--`` and the name of the field.
+    parse : callable, optional
+        Makes a value, or an entry (key, value) of a mapping, of a text.
+    """
+
+    help: str
+    metavar: str = ""
+    flag: str = ""
+    parse: Callable[[str], Any] | None = None
+
+
+def given_options(
+    kind: type[Options], options: Options | None, given: Mapping[str, Any]
+) -> Options:
+    """Return options with some fields given by name.
+
+    Raises
+    ------
+    ModelError
+        On a name that is no field.
+    """
+    base: Any = kind() if options is None else options
+    if strange := [name for name in given if name not in base.__dataclass_fields__]:
+        raise ModelError(
+            f"there is no option {strange[0]!r}",
+            remedy=f"use {', '.join(base.__dataclass_fields__)}",
+        )
+    return replace(base, **given) if given else base
+
+
+def pair(text: str) -> tuple[str, str]:
+    """Return name and value of ``NAME=VALUE``."""
+    name, equals, value = text.partition("=")
+    if not (name and equals and value):
+        raise DataError(f"{text!r} is not of the form NAME=VALUE", remedy="write NAME=VALUE")
+    return name.strip(), value.strip()
+
+
+def setting(text: str) -> tuple[str, Any]:
+    """Return name and value of ``NAME=VALUE``, the value as JSON where it is that.
+
+    >>> setting("n-operators=4"), setting("initial=rest")
+    (('n_operators', 4), ('initial', 'rest'))
+    """
+    from mckibben.estimators.core.settings import setting_value
+
+    name, value = pair(text)
+    return name.replace("-", "_"), setting_value(value)
+
+
+def constant(text: str) -> tuple[str, tuple[float, str]]:
+    """Return channel, value and unit of ``force=200 g``."""
+    found = re.fullmatch(r"([^=]+)=\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)?", text)
+    if found is None:
+        raise DataError(
+            f"{text!r} is not of the form CHANNEL=VALUE UNIT", remedy="write force=200 g"
+        )
+    return found[1].strip(), (float(found[2]), found[3] or "")
+
+
+def calibration(text: str) -> tuple[str, tuple[str, float, float, str]]:
+    """Return channel, and column, gain, offset and unit of ``pressure=A0:2.5:-0.5:bar``."""
+    channel, value = pair(text)
+    try:
+        column, gain, offset, unit = value.rsplit(":", 3)
+        if not (column and unit):
+            raise ValueError
+        return channel, (column, float(gain), float(offset), unit)
+    except ValueError:
+        raise DataError(
+            f"{text!r} is not of the form CHANNEL=COLUMN:GAIN:OFFSET:UNIT",
+            remedy="write for instance pressure=A0:2.5:-0.5:bar",
+        ) from None
+
+
+def span(text: str) -> tuple[float, float]:
+    """Return the two numbers of ``START:END``, infinite where they are left out."""
+    start, colon, end = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return float(start or "-inf"), float(end or "inf")
+    except ValueError:
+        raise DataError(
+            f"{text!r} is not of the form START:END", remedy="write 15: to leave out the first 15 s"
+        ) from None
+
+
+def size(text: str) -> float:
+    """Return a size such as ``2GB``, ``500 MB`` or ``1e9`` in bytes."""
+    found = re.fullmatch(r"\s*([\d.]+(?:[eE]\d+)?)\s*([kMGT]?)i?B?\s*", text, re.IGNORECASE)
+    try:
+        number = float(found[1]) if found else 0.0
+    except ValueError:
+        number = 0.0
+    if found is None or number <= 0:
+        raise DataError(f"{text!r} is no size", remedy="write for instance 2GB")
+    return number * 1024.0 ** " KMGT".index(found[2].upper() or " ")
+
+
+def limits(text: str) -> tuple[str, tuple[float | None, ...]]:
+    """Return channel and limits of ``CHANNEL=LOW:HIGH[:RATE]``, None where they are left out.
+
+    >>> limits("pressure=1:5.5"), limits("force=::20")
+    (('pressure', (1.0, 5.5)), ('force', (None, None, 20.0)))
+    """
+    channel, value = pair(text)
+    parts = value.split(":")
+    try:
+        if not 2 <= len(parts) <= 3:
+            raise ValueError
+        return channel, tuple(float(part) if part else None for part in parts)
+    except ValueError:
+        raise DataError(
+            f"{text!r} is not of the form CHANNEL=LOW:HIGH or CHANNEL=LOW:HIGH:RATE",
+            remedy="write for instance pressure=1:5.5:2, which is bar and bar/s",
+        ) from None
+
+
+def number(text: str) -> tuple[str, float]:
+    """Return name and number of ``NAME=NUMBER``."""
+    name, value = pair(text)
+    try:
+        return name, float(value)
+    except ValueError:
+        raise DataError(
+            f"{text!r} has no number", remedy="write for instance pressure=0.5"
+        ) from None
+
+
+def names(text: str) -> str | tuple[str, ...]:
+    """Return the names in ``all``, ``quick``, ``none`` or ``NAME,NAME``."""
+    if text in ("all", "quick", "none"):
+        return text
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+Names = tuple[str, ...] | None
+Seed = Annotated[int, Option("Seed of everything random.")]
+Jobs = Annotated[int | None, Option("Processes. Default: as many as cores.")]
+Settings = Annotated[
+    Mapping[str, Any],
+    Option("Setting of the estimator; repeatable.", "[MODEL.]NAME=VALUE", "--set", setting),
+]
+Inputs = Annotated[
+    Names, Option("Input channel; repeatable. Default: by name.", "CHANNEL", "--input")
+]
+Outputs = Annotated[
+    Names, Option("Output channel; repeatable. Default: by name.", "CHANNEL", "--output")
+]
+Fields = Annotated[
+    Mapping[str, Any],
+    Option("Field of the model that is not identified, as frequency=1.5; repeatable.",
+           "NAME=VALUE", "--set", setting),
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Options of `fit`."""
+
+    input: Inputs = None
+    output: Outputs = None
+    prior: Annotated[
+        str | None, Option("A similar muscle (muscles list), or a data sheet (.toml).", "NAME|FILE")
+    ] = None
+    residual_of: Annotated[
+        Path | None,
+        Option("Saved model (JSON) that is subtracted first; the sum of both is saved.", "MODEL"),
+    ] = None
+    settings: Settings = field(default_factory=dict)
+    validation: Annotated[
+        tuple[Path, ...], Option("Recording that stops a search; repeatable.", "FILE")
+    ] = ()
+    seed: Seed = 0
+
+
+@dataclass(frozen=True)
+class CompareOptions:
+    """Options of `compare` and `study`: data, models, and how to work."""
+
+    inputs: Inputs = None
+    outputs: Outputs = None
+    load: Annotated[str | None, Option("Load that varies: one model for all loads.", "CHANNEL")] = (
+        None
+    )
+    models: Annotated[
+        str | Sequence[str],
+        Option("Models by short name (info --models), or a quick choice.", "all|quick|NAME,...",
+               parse=names),
+    ] = "all"  # fmt: skip
+    settings: Settings = field(default_factory=dict)
+    seed: Seed = 0
+    jobs: Jobs = None
+    dask: Annotated[str | None, Option("Dask scheduler to fit on.", "ADDRESS")] = None
+    most_samples: Annotated[
+        int | None,
+        Option("Most samples to fit to: longer recordings are thinned.", "N", "--samples"),
+    ] = None
+    allow_shared: Annotated[
+        bool, Option("Test on data fitted to, and state so in every result.")
+    ] = False
+    allow_early: Annotated[bool, Option("Compare although the output moves before its input.")] = (
+        False
+    )
+
+
+@dataclass(frozen=True)
+class StudyOptions(CompareOptions):
+    """Options of `study`: those of `compare`, and what a loop's log and a closed loop need."""
+
+    rig: Annotated[str | None, Option("Several muscles: rig to close a loop on.")] = None
+    compensator: Annotated[
+        Path | Any | None, Option("Of a loop's log: the compensator that ran (JSON).", "MODEL")
+    ] = None
+    model: Annotated[
+        Path | Any | None, Option("Of a loop's log: the model that ran, or its inverse.", "MODEL")
+    ] = None
+    title: Annotated[str, Option("Title of the report. Default: the recording's name.")] = ""
+
+
+@dataclass(frozen=True)
+class TrackOptions:
+    """Options of `track`: the plant, the controller, and imperfections of the loop."""
+
+    rig: Annotated[Any, Option("Virtual rig to try it on; see rig list.", "NAME|FILE")] = None
+    plant: Annotated[
+        Path | Any | None,
+        Option("Model of your own muscle to try it on (JSON); with a band, it scatters.", "MODEL"),
+    ] = None
+    limits: Annotated[
+        Mapping[str, tuple[float | None, ...]],
+        Option(
+            "Of the plant, where its model has none, as pressure=0:6; repeatable.",
+            "CHANNEL=LOW:HIGH",
+            parse=limits,
+        ),
+    ] = field(default_factory=dict)
+    controller: Annotated[
+        str, Option("feedforward, feedforward-pid, observer, or pid (no inverse).", "NAME")
+    ] = "feedforward"
+    approach: Annotated[float, Option("Time to reach the first reference [s].", "S")] = 20.0
+    settle: Annotated[float, Option("Time after that not scored [s].", "S")] = 0.0
+    noise: Annotated[float, Option("Added to what is measured [mm or N].", "X")] = 0.0
+    delay: Annotated[int, Option("Steps by which measurements are late.", "N")] = 0
+    slew: Annotated[float | None, Option("Fastest pressure change [bar/s].", "X")] = None
+    preview: Annotated[
+        float | None,
+        Option("Time by which the reference is known ahead [s].  [default: dead time]", "S"),
+    ] = None
+    pressure_loop: Annotated[
+        bool, Option("Feed measured pressures back inside, as regulators do.")
+    ] = True
+    seed: Seed = 0
+
+
+@dataclass(frozen=True)
+class InvertOptions:
+    """Options of `invert`: what the compensator is for, and whether it learns or looks ahead."""
+
+    wanted: Annotated[
+        Literal["input", "force"],
+        Option("Output: the model's input, or the force from measured displacement and pressure.",
+               flag="--for"),
+    ] = "input"  # fmt: skip
+    adaptive: Annotated[bool, Option("Learn the model's parameters from measurements.")] = False
+    time: Annotated[
+        float | None, Option("Of adaptive: how long it takes to learn [s].  [default: 60]", "S")
+    ] = None
+    noise: Annotated[
+        float | None, Option("Of adaptive: standard deviation of the measured output.", "X")
+    ] = None
+    predictive: Annotated[bool, Option("Look ahead, so that limits cost less.")] = False
+    horizon: Annotated[
+        int | None, Option("Of predictive: samples it looks ahead.  [default: 20]", "N")
+    ] = None
+    rate_limit: Annotated[
+        float | None, Option("Of predictive: fastest change of a pressure [bar/s].", "X")
+    ] = None
+    pressures: Annotated[
+        tuple[float, float] | None,
+        Option("Of predictive: lowest and highest pressure [bar].", "LOW HIGH"),
+    ] = None
+    total_limit: Annotated[
+        float | None, Option("Of predictive: highest sum of pressures [bar].", "X")
+    ] = None
+    flow_limit: Annotated[
+        float | None, Option("Of predictive: fastest rise of all pressures together [bar/s].", "X")
+    ] = None
+    learned: Annotated[
+        tuple[Path, ...],
+        Option(
+            "Of sdchm: train an inverse network on recordings, as the paper; repeatable.", "FILE"
+        ),
+    ] = ()
+    fields: Fields = field(default_factory=dict)
+    seed: Seed = 0
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """Options of `plan`: what is driven, how long, within what limits."""
+
+    rig: Annotated[Any, Option("Rig that is driven: channels and limits.", "NAME|FILE")] = None
+    muscle: Annotated[
+        str | None, Option("Without recordings: a muscle, or a data sheet.", "NAME|FILE")
+    ] = None
+    model: Annotated[
+        Any,
+        Option("Model of the standard errors, to fit, or saved (.json). Default: by the channels.",
+               "NAME|FILE"),
+    ] = None  # fmt: skip
+    minutes: Annotated[float, Option("How long to record.", "X")] = 3.0
+    limits: Annotated[
+        Mapping[str, tuple[float | None, ...]],
+        Option("Commands, and how fast they change a second; repeatable.",
+               "CHANNEL=LOW:HIGH[:RATE]", parse=limits),
+    ] = field(default_factory=dict)  # fmt: skip
+    seed: Seed = 0
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Options of `export` to any target."""
+
+    name: Annotated[
+        str | None, Option("Name of functions and files. Default: the file's name.", "NAME")
+    ] = None
+    sample_time: Annotated[
+        float | None, Option("Time between steps, where it matters.", "SECONDS")
+    ] = None
+    inverse: Annotated[bool, Option("Export the model's inverse.")] = False
+    fields: Fields = field(default_factory=dict)
+    overwrite: Annotated[bool, Option("Replace what an export wrote there before.")] = False
+
+
+@dataclass(frozen=True)
+class COptions(ExportOptions):
+    """Options of `export` to C99."""
+
+    single: Annotated[bool, Option("Single precision.", flag="--float32")] = False
+    check: Annotated[bool, Option("Compile it here and run its self-test.")] = False
+    emulate: Annotated[
+        bool, Option("Run it on an emulated Cortex-M4F too, in single precision (QEMU).")
+    ] = False
+    link: Annotated[bool, Option("Add a server that answers over a serial line.")] = False
+    limits: Annotated[
+        Mapping[str, tuple[float, float]],
+        Option("Of link: limits of a channel; repeatable.", "NAME=LOW:HIGH", "--limit", limits),
+    ] = field(default_factory=dict)
+    safe: Annotated[
+        Mapping[str, float],
+        Option("Of link: an output while no host leads; repeatable.", "NAME=VALUE", parse=number),
+    ] = field(default_factory=dict)
+    watchdog: Annotated[
+        float | None,
+        Option("Of link: silence after which outputs are safe [s]. Default: 0.5.", "S"),
+    ] = None
+
+
+@dataclass(frozen=True)
+class FMUOptions(ExportOptions):
+    """Options of `export` to an FMU."""
+
+    platforms: Annotated[
+        str | tuple[str, ...],
+        Option("linux, windows, macos; all that can be built here, or none.", "all|none|NAME,...",
+               parse=names),
+    ] = "all"  # fmt: skip

@@ -1,0 +1,228 @@
+"""Recordings from files, read and prepared as an operation is asked to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from mckibben import options
+from mckibben.errors import DataError
+from mckibben.options import Option
+from mckibben.recording import Recording
+
+MOST = 2.0 * 1024**3
+"""Largest file that is read by default [bytes]."""
+
+Data = Recording | str | Path | Sequence[Recording | str | Path]
+"""Recordings, or files or folders with some."""
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How files are read; see `mckibben.read` for all but the last three.
+
+    Parameters
+    ----------
+    calibration : mapping of str to (str, float, float, str)
+        Channel -> column, gain, offset and unit.
+    between : (float, float), optional
+        Part of every recording [s].
+    resample : float, optional
+        Sample time to resample to [s].
+    zero : sequence of str
+        Channels that count from where the input is lowest, in each recording.
+    """
+
+    columns: Annotated[
+        Mapping[str, str],
+        Option("Column of a channel.", "CHANNEL=COLUMN", "--column", options.pair),
+    ] = field(default_factory=dict)
+    units: Annotated[
+        Mapping[str, str], Option("Unit of a channel.", "CHANNEL=UNIT", "--unit", options.pair)
+    ] = field(default_factory=dict)
+    constants: Annotated[
+        Mapping[str, tuple[float, str]],
+        Option(
+            "A channel that was held and has no column, as 'force=200 g'.",
+            "CHANNEL=VALUE UNIT",
+            "--constant",
+            options.constant,
+        ),
+    ] = field(default_factory=dict)
+    calibration: Annotated[
+        Mapping[str, tuple[str, float, float, str]],
+        Option(
+            "A channel in raw volts or counts, as pressure=A0:2.5:-0.5:bar.",
+            "CHANNEL=COLUMN:GAIN:OFFSET:UNIT",
+            "--calibrate",
+            options.calibration,
+        ),
+    ] = field(default_factory=dict)
+    most: Annotated[float, Option("Largest file read, as 2GB.", "SIZE", parse=options.size)] = MOST
+    rate: Annotated[float | None, Option("Samples per second, without a time column.", "HZ")] = None
+    gaps: Annotated[
+        Literal["error", "split", "interpolate"],
+        Option("Treatment of gaps in time and missing samples."),
+    ] = "error"
+    raw: Annotated[
+        bool, Option("Read codes for missing samples, and counter wraps, as measured.")
+    ] = False
+    rest_length: Annotated[
+        float | None,
+        Option("Length at displacement 0: converts contraction, displacement, length.", "MM"),
+    ] = None
+    between: Annotated[
+        tuple[float, float] | None,
+        Option(
+            "Part of every recording [s]; either may be left out.", "START:END", "", options.span
+        ),
+    ] = None
+    resample: Annotated[
+        float | None, Option("Sample time to resample to, without aliasing.", "SECONDS")
+    ] = None
+    zero: Annotated[
+        tuple[str, ...],
+        Option("Channel that counts from where the input is lowest; repeatable.", "CHANNEL"),
+    ] = ()
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments of `mckibben.read`."""
+        columns, units = dict(self.columns), dict(self.units)
+        for channel, (column, _, _, unit) in self.calibration.items():
+            columns[channel] = column
+            units.setdefault(channel, unit)
+        return {
+            "columns": columns,
+            "units": units,
+            "calibration": {
+                name: (gain, zero) for name, (_, gain, zero, _) in self.calibration.items()
+            },
+            "constants": dict(self.constants),
+            "rate": self.rate,
+            "gaps": self.gaps,
+            "raw": self.raw,
+            "rest_length": self.rest_length,
+            "most": self.most,
+        }
+
+    def prepare(self, recordings: list[Recording]) -> list[Recording]:
+        """Return recordings cut, resampled and zeroed."""
+        from mckibben.comparison.channels import recognised
+        from mckibben.signals import cut, resample, zeroed
+
+        if self.between is not None:
+            recordings = [cut(one, *self.between) for one in recordings]
+        if self.resample is not None:
+            recordings = [resample(one, self.resample) for one in recordings]
+        if self.zero:
+            drives = [recognised([one], list(one.channels))[0][0] for one in recordings]
+            pairs = zip(recordings, drives, strict=True)
+            recordings = [zeroed(one, list(self.zero), over) for one, over in pairs]
+        return recordings
+
+
+def is_loaded(data: Data) -> bool:
+    """Return whether data are recordings already, rather than files."""
+    return isinstance(data, Recording) or any(isinstance(one, Recording) for one in data)
+
+
+def files_of(data: Data) -> list[Path]:
+    """Return the files among data; none of recordings."""
+    if isinstance(data, Recording):
+        return []
+    listed = [data] if isinstance(data, str | Path) else data
+    return [Path(one) for one in listed if not isinstance(one, Recording)]
+
+
+def read_files(
+    data: Data,
+    channels: Sequence[str] | None,
+    reading: ReadOptions | None = None,
+    *,
+    informative: bool = False,
+) -> list[Recording]:
+    """Return the recordings in files and folders, which must have some channels; recordings as they are.
+
+    Parameters
+    ----------
+    channels, informative
+        As for `mckibben.read`.
+    """
+    from mckibben.files import read
+
+    reading = reading or ReadOptions()
+    listed = [data] if isinstance(data, Recording | str | Path) else data
+    found: list[Recording] = []
+    for one in listed:
+        if isinstance(one, Recording):
+            found.append(one)
+        else:
+            found += read(one, channels=channels, informative=informative, **reading.arguments())
+    return reading.prepare(found)
+
+
+def read_sides(
+    data: Sequence[Data],
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    load: str | None = None,
+    reading: ReadOptions | None = None,
+) -> list[list[Recording]]:
+    """Return the recordings of several lists of files, with the channels that models are fitted to.
+
+    Channels that are not named are recognised, as `compare` does. What is wrong with a column that no
+    model needs is a note.
+
+    Raises
+    ------
+    DataError
+        As `mckibben.read`, of the channels that are needed.
+    """
+    from mckibben.comparison.channels import channels_of
+
+    reading = reading or ReadOptions()
+    named = [*(inputs or ()), *(outputs or ()), *([load] if load else ())]
+    found = [read_files(some, named, reading) for some in data]
+    if reading.rest_length is not None and not named:
+        found = [[one.with_derived(["displacement"]) for one in some] for some in found]
+    sides = channels_of([one for some in found for one in some], inputs, outputs, load)
+    needed = [*sides.inputs, *sides.outputs]
+    for place, (some, runs) in enumerate(zip(data, found, strict=True)):
+        if any(name not in one for one in runs for name in needed):
+            found[place] = read_files(some, needed, reading)  # says what is wrong with it
+    return found
+
+
+def read_pair(
+    data: Data,
+    input: str | None = None,  # noqa: A002
+    output: str | None = None,
+    reading: ReadOptions | None = None,
+    others: Sequence[str] = (),
+) -> tuple[list[Recording], str, str]:
+    """Return recordings of one muscle, its input and its output: as named, the usual, or recognised.
+
+    Raises
+    ------
+    DataError
+        If a channel is missing, or is that of several muscles.
+    """
+    from mckibben.comparison.channels import channels_of
+
+    named = [name for name in (input, output, *others) if name]
+    recordings = read_files(data, named, reading)
+    usual = input or "pressure", output or "displacement"
+    if not all(name in one for one in recordings for name in usual):
+        found = channels_of(recordings, input, output, None)
+        if len(found.inputs) > 1 or len(found.outputs) > 1:
+            raise DataError(
+                f"there are several: {', '.join((*found.inputs, *found.outputs))}",
+                file=recordings[0].source,
+                remedy="name one with `input=NAME` and one with `output=NAME`; balance models all",
+            )
+        usual = found.inputs[0], found.outputs[0]
+    if not all(name in one for one in recordings for name in usual):
+        recordings = read_files(data, [*usual, *others], reading)  # says what is wrong with it
+    return recordings, *usual

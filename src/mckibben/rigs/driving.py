@@ -1,0 +1,187 @@
+"""What drives a rig from a command's words, and whole protocols recorded into a folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mckibben import registry
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+from mckibben.rigs.files import load_rig, rig_names
+from mckibben.rigs.recording import record
+from mckibben.rigs.rig import Rig
+from mckibben.signals import build, settings_of
+from mckibben.signals.protocol import Protocol, protocol
+from mckibben.system import ordinary
+from mckibben.system.atomic import to_json, write_text, written
+
+
+def catalogue() -> dict[str, Any]:
+    """Return the rigs, the protocols made for them, and the signals that can drive them."""
+    rigs = {name: load_rig(name) for name in rig_names()}
+    plans = {name: protocol(name) for name in registry.names("protocols")}
+    signals = {name: settings_of(name) for name in registry.names("signals")}
+    named = ("title", "version", "inputs", "outputs")
+    return {
+        "rigs": {
+            name: {key: getattr(rig, key) for key in named} for name, rig in rigs.items()
+        },
+        "protocols": {
+            name: {"rig": plan.rig, "runs": len(plan.runs), "source": plan.source}
+            for name, plan in plans.items()
+        },
+        "signals": {
+            name: {key: kind for key, (kind, _) in settings.items()}
+            for name, settings in signals.items()
+        },
+    }
+
+
+def commands(
+    rig: Rig, signals: Sequence[str], duration: float, rate: float | None, seed: int
+) -> Recording:
+    """Return commands for a rig from signals, as ``pressure=triangle:period=10,high=5``.
+
+    Parameters
+    ----------
+    signals : sequence of str
+        By default of the first input; low and high are by default the ends of the input's range.
+    duration : float
+        [s].
+    rate : float, optional
+        Samples per second; default the rig's.
+
+    Raises
+    ------
+    DataError
+        On an unknown channel, signal or setting, or too many samples.
+    """
+    rate = 1 / rig.sample_time if rate is None else rate
+    if not (0 < duration < 1e6 and 0 < rate <= 1e5 and duration * rate >= 1):
+        raise DataError(
+            f"{duration:g} s at {rate:g} samples a second cannot be recorded",
+            remedy="give a `duration` up to 1e6 and a `rate` up to 1e5, and at least two samples",
+        )
+    time = np.arange(round(duration * rate) + 1) / rate
+    channels = {}
+    for item in signals:
+        head, _, tail = item.partition(":")
+        channel, equals, kind = head.rpartition("=")
+        channel = channel if equals else rig.inputs[0]
+        if channel not in rig.inputs:
+            raise DataError(
+                f"the rig {rig.name!r} has no input {channel!r}",
+                parameter="signal",
+                remedy=f"use one of {', '.join(rig.inputs)}",
+            )
+        settings: dict[str, Any] = {}
+        for pair in filter(None, tail.split(",")):
+            key, equals, value = pair.partition("=")
+            if not (key and equals and value):
+                raise DataError(
+                    f"{pair!r} is not of the form SETTING=VALUE",
+                    parameter="signal",
+                    remedy="write for instance triangle:period=10,high=5.5",
+                )
+            settings[key.replace("-", "_")] = value
+        known, limits = settings_of(kind), rig.limits(channel)
+        usual = {"low": limits.low, "high": limits.high, "peaks": limits.high, "seed": seed}
+        settings = {key: usual[key] for key in known if key in usual} | settings
+        channels[channel] = build(kind, time, **settings)
+    return Recording(channels, 1 / rate)
+
+
+def at_first_commands(rig: Rig, given: Recording) -> Rig:
+    """Return a rig that is at rest at the first commands, unless it has a start of its own."""
+    if rig.start:
+        return rig
+    limits = {name: rig.limits(name) for name in rig.inputs if name in given}
+    starts = {
+        f"start.{name}": min(max(float(given[name][0]), limit.low), limit.high)
+        for name, limit in limits.items()
+    }
+    return rig.changed(starts)
+
+
+def record_protocol(
+    name: str,
+    folder: Path,
+    *,
+    rig: str | None = None,
+    changes: Mapping[str, Any] | None = None,
+    file_format: str = "csv",
+    only: str | None = None,
+    seed: int = 0,
+    jobs: int | None = None,
+    force: bool = False,
+    progress: Callable[[float, str], None] | None = None,
+) -> tuple[list[str], list[str]]:
+    """Record a protocol into a folder: one file a run, and ``protocol.json``.
+
+    Returns
+    -------
+    (list of str, list of str)
+        Runs recorded, and runs that were there already.
+
+    Raises
+    ------
+    DataError
+        If the folder holds another protocol, rig or seed, or files of the user's without ``force``.
+    """
+    from mckibben.files import write
+    from mckibben.files.own import is_own
+    from mckibben.system.results import claim
+
+    plant = load_rig(rig or protocol(name).rig).changed(changes or {})
+    plan = protocol(name, plant)
+    runs = [run.name for run in plan.runs if only is None or only in run.name]
+    if not runs:
+        listed = ", ".join(run.name for run in plan.runs[:5])
+        problem = f"no run of {name!r} has {only!r} in its name"
+        raise DataError(problem, parameter="only", remedy=f"there are {listed}, ...")
+    text, place = to_json(_roles(plan, plant, seed, file_format)) + "\n", folder / "protocol.json"
+    if os.path.lexists(place) and ordinary.read_text(place, most=ordinary.DESCRIPTION) != text:
+        raise DataError(
+            "the folder holds another protocol, rig or seed",
+            file=place,
+            remedy="give another folder, or remove this one",
+        )
+    files = {run: folder / f"{run}.{file_format}" for run in runs}
+    there = [run for run, file in files.items() if is_own(file)]
+    with written(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    wanted = [run for run in runs if run not in there]
+    for run in wanted:
+        claim(files[run], inputs=[Path(rig or "")], force=force)
+    write_text(place, text)
+    recorded = record(plan, plant, runs=wanted, seed=seed, jobs=jobs)
+    for done, (run, recording) in enumerate(recorded, start=1):
+        write(recording, files[run.name])
+        if progress is not None:
+            progress(done / len(wanted), run.name)
+    return wanted, there
+
+
+def _roles(plan: Protocol, rig: Rig, seed: int, file_format: str) -> dict[str, Any]:
+    return {
+        "protocol": plan.name,
+        "source": plan.source,
+        "notes": plan.notes,
+        "seed": seed,
+        "rig": rig.model_dump(mode="json"),
+        "runs": [
+            {
+                "name": run.name,
+                "file": f"{run.name}.{file_format}",
+                "role": run.role,
+                "labels": dict(run.labels),
+                "settings": dict(run.settings),
+            }
+            for run in plan.runs
+        ],
+    }

@@ -1,0 +1,165 @@
+"""A saved model run over a recording, with its errors and its band."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from mckibben.blocks.bands import Banded
+from mckibben.blocks.base import Block
+from mckibben.blocks.free_run import measured_start
+from mckibben.control.identified import beyond_known
+from mckibben.diagnosis.bands import outside
+from mckibben.errors import DataError, ModelError
+from mckibben.metrics import score
+from mckibben.recording import Recording
+from mckibben.report.words import outside_calibration
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A model's run over a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Inputs, what was measured, and ``OUTPUT_model``; of a band, ``OUTPUT_lower`` and ``_upper``.
+    metrics : mapping of str to mapping of str to float
+        Measured output -> its errors; of a band also ``coverage`` and ``band_width``.
+    horizon : int or None
+        Samples predicted ahead; None of a free run.
+    interval : float or None
+        Level of the band.
+    notes : tuple of str
+    """
+
+    recording: Recording
+    metrics: Mapping[str, Mapping[str, float]]
+    horizon: int | None
+    interval: float | None
+    notes: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the errors, for JSON."""
+        return {
+            "n_samples": len(self.recording),
+            "horizon": self.horizon,
+            "interval": self.interval,
+            "metrics": {name: dict(figures) for name, figures in self.metrics.items()},
+            "notes": list(self.notes),
+        }
+
+
+def simulated(
+    model: Block,
+    read: Callable[[list[str]], list[Recording]],
+    *,
+    initial: str = "model",
+    horizon: int | None = None,
+    interval: float | None = None,
+) -> Simulation:
+    """Run a model over a recording.
+
+    Parameters
+    ----------
+    model : Block
+    read : callable
+        Returns the recordings with some channels.
+    initial : str
+        Memory before the first sample: ``model``, ``first_sample``, ``virgin`` or ``measured``.
+    horizon : int, optional
+        Predict so many samples ahead from measured outputs, instead of free.
+    interval : float, optional
+        Level of the band of a calibrated model.
+
+    Raises
+    ------
+    DataError, ModelError
+        On a recording, or options, that do not suit the model.
+    """
+    banded, block = _with_band(model, interval)
+    if banded is not None and horizon is not None:
+        problem = "bands are of free runs"
+        raise ModelError(problem, parameter="horizon", remedy="leave it out, or `interval`")
+    inputs = [channel.name for channel in block.inputs]
+    outputs = [channel.name for channel in block.outputs]
+    try:
+        recording, *others = read(list(dict.fromkeys((*inputs, *outputs))))
+    except DataError:  # nothing was measured, or what lacks is said of the inputs
+        recording, *others = read(inputs)
+    if others:
+        raise DataError(
+            f"it has {1 + len(others)} recordings, or parts between gaps",
+            file=recording.source,
+            remedy="cut it first, or give `gaps=interpolate`",
+        )
+    if horizon is not None:
+        modelled = _predicted(block, recording, horizon)
+    else:
+        modelled = (banded or block).simulate(recording, initial=_start(initial, block, recording))
+    notes = beyond_known(block, recording)
+    if banded is not None:
+        if initial == "model" and all(name in recording for name in outputs):
+            notes += _other_start(block, recording, outputs)
+        known = {one.name: one for one in (*banded.band.driving, *banded.band.given)}
+        ranges = dict(zip(known, zip(*banded.band.ends, strict=True), strict=True))
+        notes += [
+            outside_calibration(recording.name, known[name], share, modelled[name], ranges[name])
+            for name, share in outside(banded.band, modelled.matrix(known)).items()
+        ]
+    found, metrics = recording.select(inputs), {}
+    for channel in block.outputs:
+        name = channel.name
+        added = {f"{name}_model": modelled[name]}
+        if banded is not None:
+            added |= {f"{name}_{end}": modelled[f"{name}_{end}"] for end in ("lower", "upper")}
+        found = found.with_channels(dict.fromkeys(added, channel.unit), **added)
+        if name in recording and name not in inputs:
+            measured = recording[name]
+            found = found.with_channels({name: recording.units[name]}, **{name: measured})
+            metrics[name] = asdict(score(measured, modelled[name]))
+            if banded is not None:
+                lower, upper = added[f"{name}_lower"], added[f"{name}_upper"]
+                metrics[name]["coverage"] = float(((lower <= measured) & (measured <= upper)).mean())
+                metrics[name]["band_width"] = float((upper - lower).mean())
+    return Simulation(found, metrics, horizon, interval, tuple(notes))
+
+
+def _with_band(block: Block, interval: float | None) -> tuple[Any, Any]:
+    """Return the model with its band at a level, if one is asked for, and the model."""
+    if interval is None:
+        return None, block.forward if isinstance(block, Banded) else block
+    if not isinstance(block, Banded):
+        problem = "this model has no band"
+        remedy = "calibrate it on recordings that it was not fitted to, with `calibrate()`"
+        raise ModelError(problem, parameter="interval", remedy=remedy)
+    return block.at(interval), block.forward
+
+
+def _predicted(block: Block, recording: Recording, horizon: int) -> Recording:
+    from mckibben.blocks.dynamics.transfer_function import TransferFunction
+
+    if not isinstance(block, TransferFunction):
+        raise ModelError(
+            f"{block.kind!r} has no noise model, so it cannot predict from measured outputs",
+            parameter="horizon",
+            remedy="leave it out, or fit arx, armax, oe or bj",
+        )
+    return block.predict(recording, horizon)
+
+
+def _start(rule: str, block: Block, recording: Recording) -> Any:
+    if rule == "measured":
+        return measured_start(block, recording, block.outputs[0].name).tolist()
+    return None if rule == "model" else rule
+
+
+def _other_start(block: Block, recording: Recording, outputs: list[str]) -> list[str]:
+    """Return that a run does not begin as the model does, if so, while its band has how it begins."""
+    own = block.initial_state(recording.matrix(c.name for c in block.inputs)[0])
+    if np.array_equal(measured_start(block, recording, outputs), own):
+        return []
+    return ["the run does not begin as the model does; the band is for `initial=measured`"]

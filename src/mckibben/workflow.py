@@ -1,0 +1,779 @@
+"""What a person does with the package: fit, study, track, invert, check, plan, review, export.
+
+The command line, the workbench and Python call these. Each takes recordings, or files with some, and
+returns a result that has numbers as ``to_dict()``. Parameters that they have in common:
+
+options : dataclass, optional
+    Of `mckibben.options`; its fields may also be given by name.
+reading : ReadOptions, optional
+    How files are read.
+out : path, optional
+    File or folder to write. The files of an earlier run are replaced when all is done.
+force : bool
+    Whether files of the user's may be replaced, too; what is read never is.
+progress : bool or callable, optional
+    Whether to show a bar; or called with the share done and words.
+
+They raise `DataError` on recordings, and `ModelError` on models or options, that cannot be used.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from mckibben import registry
+from mckibben.errors import DataError, ModelError
+from mckibben.options import (
+    CompareOptions,
+    COptions,
+    ExportOptions,
+    FitOptions,
+    FMUOptions,
+    InvertOptions,
+    PlanOptions,
+    StudyOptions,
+    TrackOptions,
+    given_options,
+)
+from mckibben.reading import (
+    Data,
+    ReadOptions,
+    files_of,
+    is_loaded,
+    read_files,
+    read_pair,
+    read_sides,
+)
+from mckibben.recording import Recording, listed
+from mckibben.system.progress import Tell, telling
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
+    from mckibben.comparison.leaderboard import Leaderboard
+    from mckibben.control import Before, Tracked
+    from mckibben.control.roles import Plant
+    from mckibben.diagnosis.check import Validation
+    from mckibben.diagnosis.review import Review
+    from mckibben.estimators.core.estimator import Estimator
+    from mckibben.planning.planner import Plan
+    from mckibben.studying.study import Study
+    from mckibben.system.results import Results
+
+Progress = bool | Tell | None
+Model = "Block | str | Path"
+"""A model, or the file that it is saved in."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model that was identified.
+
+    Parameters
+    ----------
+    name : str
+        Short name of the model.
+    model : Block
+        With the model whose residual was fitted, where there was one.
+    estimator : Estimator
+        Fitted; ``diagnostics_`` has errors and uncertainties.
+    notes : tuple of str
+    file : Path or None
+        Where the model is saved.
+    """
+
+    name: str
+    model: Block
+    estimator: Estimator
+    notes: tuple[str, ...] = ()
+    file: Path | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return errors and parameters, for JSON."""
+        from mckibben.blocks.equations import quantities
+
+        found, model = self.estimator.diagnostics_, self.estimator.model_
+        numbers = quantities(model)
+        names = [channel.name for channel in model.outputs]
+        copied = ("rmse", "rmse_from_rest", "n_samples", "n_evaluations", "seconds", "interrupted")
+        return {
+            "model": self.name,
+            "file": _text(self.file),
+            "n_parameters": found.n_free,
+            **{name: getattr(found, name) for name in copied},
+            "rmse_by_output": dict(zip(names, found.rmse_by_output, strict=True)),
+            "condition": found.condition,
+            "parameters": model.pack().tolist(),
+            "parameter_names": [one.name for one in numbers],
+            "parameter_units": [one.unit for one in numbers],
+            "standard_errors": list(found.standard_errors),
+            "at_bounds": list(found.at_bounds),
+            "undetermined": [numbers[place].name for place in self.estimator.undetermined()],
+            "notes": list(self.notes),
+        }
+
+
+def fit(
+    model: str,
+    data: Data,
+    options: FitOptions | None = None,
+    *,
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    progress: Progress = None,
+    **given: Any,
+) -> Fit:
+    """Identify one model, by its short name, such as ``"gpi"``."""
+    from mckibben.blocks.compose import Parallel
+    from mckibben.comparison.shared_rows import check_shared
+    from mckibben.estimators.catalogue import settings_of
+
+    chosen = given_options(FitOptions, options, given)
+    settings = settings_of(model, chosen.settings)
+    prior = chosen.prior or settings.get("prior")
+    file = _claim(out, _paths(data, chosen.validation, chosen.residual_of, prior), force)
+    for side in ("input", "output"):
+        if names := getattr(chosen, side):
+            settings.setdefault(side, names[0] if len(names) == 1 else tuple(names))
+    kind = registry.load("estimators", model)
+    if chosen.prior is not None:
+        if "prior" not in kind.__dataclass_fields__:
+            raise ModelError(f"{model!r} has none", parameter="prior", remedy="leave it out")
+        settings["prior"] = chosen.prior
+    estimator = kind(**{"seed": chosen.seed} | settings)
+    if chosen.validation and not estimator.stops_early:
+        problem = f"{model!r} does not stop early"
+        raise DataError(problem, parameter="validation", remedy="leave it out")
+    sides = [estimator.input, estimator.output]
+    if sides == ["pressure", "displacement"]:
+        asked = settings.get("input"), settings.get("output")
+        runs, estimator.input, estimator.output = read_pair(data, *asked, reading)
+    else:  # of several, each may hold an input, as isometric runs hold the length
+        needed = [n for some in sides for n in ((some,) if isinstance(some, str) else some or ())]
+        runs = read_files(data, needed or None, reading)
+    base, whole = _block(chosen.residual_of), runs
+    checks = read_files(chosen.validation, None, reading)
+    if base is not None:
+        runs, checks = (_residuals(base, estimator, some) for some in (runs, checks))
+    used = estimator.data(runs)
+    check_shared({"fit": runs}, *([one.name for one in of] for of in (used.inputs, used.outputs)))
+    with telling(progress, f"fitting {model}") as tell:
+        estimator.fit(runs, validation=checks, progress=_best_so_far(tell))
+    found: Block = estimator.model_ if base is None else Parallel((base, estimator.model_))
+    if file is not None:
+        found.save(file)
+    driven = [channel.name for channel in found.inputs]
+    notes = list(estimator.diagnostics_.notes)
+    if not chosen.input and "pressure" in driven and "voltage" in {*whole[0].channels} - {*driven}:
+        notes.append(
+            "voltage was recorded too; for a model of the valve's command: `input=voltage`"
+        )
+    return Fit(model, found, estimator, tuple(notes), file)
+
+
+def _best_so_far(tell: Tell | None) -> Callable[[float, float], None] | None:
+    """Return a progress callback that takes the share done and the least error so far."""
+    if tell is None:
+        return None
+    return lambda share, best: tell(share, f"best {best:.3g}" if math.isfinite(best) else "")
+
+
+def _residuals(base: Block, estimator: Any, runs: list[Recording]) -> list[Recording]:
+    """Return recordings with the output less what a model gives."""
+    from mckibben.estimators.force.multistate import extract_hysteresis
+
+    names = [channel.name for channel in base.outputs]
+    if names != [estimator.output]:
+        raise ModelError(
+            f"the model gives {', '.join(names)}, and {estimator.output} is fitted",
+            parameter="residual_of",
+            remedy="name a model of the same output, or `output=NAME`",
+        )
+    return extract_hysteresis(runs, base, output=estimator.output)
+
+
+def compare(
+    train: Data,
+    test: Data = (),
+    options: CompareOptions | None = None,
+    *,
+    validation: Sequence[Recording] = (),
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    progress: Progress = None,
+    **given: Any,
+) -> Leaderboard:
+    """Fit models, choose by cross-validation, and test on data used for neither; all free-running.
+
+    Recordings in a folder with a ``protocol.json`` have their roles there; ``validation`` is what to
+    choose by, in place of cross-validation. An interrupted comparison returns what is finished; with
+    ``out``, the same call goes on from there.
+    """
+    from mckibben.comparison.ranking import compare as rank
+    from mckibben.report.results_folder import LEADERBOARD, write_leaderboard
+
+    chosen = given_options(CompareOptions, options, given)
+    with _compared(train, test, validation, chosen, reading, out, force, lambda _: LEADERBOARD) as (
+        arguments,
+        results,
+    ):
+        board = rank(**arguments, progress=_standing(progress))
+        if results is not None:
+            write_leaderboard(board, results)
+            results.commit()
+    return board
+
+
+def study(
+    train: Data,
+    test: Data = (),
+    options: StudyOptions | None = None,
+    *,
+    validation: Sequence[Recording] = (),
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    command: str = "",
+    progress: Progress = None,
+    found: Callable[[Study], None] | None = None,
+    **given: Any,
+) -> Study:
+    """Characterize a muscle, choose a model as `compare` does, check and invert it, and write a report.
+
+    ``command`` is how the study is repeated, for the report. ``found`` is called with the study so far:
+    once the muscle is characterized, then after every model.
+    """
+    from mckibben.report.results_folder import StudyFolder, study_files
+    from mckibben.studying.study import study as run
+
+    chosen = given_options(StudyOptions, options, given)
+    with _compared(train, test, validation, chosen, reading, out, force, study_files) as (
+        arguments,
+        results,
+    ):
+        folder = None if results is None else StudyFolder(results, command, title=chosen.title)
+
+        def pass_on(so_far: Study) -> None:
+            if folder is not None:
+                folder.take(so_far)
+            if found is not None:
+                found(so_far)
+
+        done = run(
+            **arguments,
+            rig=chosen.rig,
+            model=_block(chosen.model),
+            compensator=_block(chosen.compensator),
+            progress=_standing(progress),
+            found=pass_on,
+        )
+        if folder is not None:
+            folder.take(done, last=True)
+        if results is not None and not done.leaderboard.stopped:
+            results.commit()
+    return done
+
+
+def _standing(progress: Progress) -> Any:
+    """Return a progress callback that takes the standing of a comparison."""
+    if not callable(progress):
+        return progress
+    return lambda standing: progress(standing.share, str(standing))
+
+
+@contextmanager
+def _compared(
+    train: Data,
+    test: Data,
+    validation: Sequence[Recording],
+    chosen: CompareOptions,
+    reading: ReadOptions | None,
+    out: str | Path | None,
+    force: bool,
+    written: Callable[[Sequence[str]], Sequence[str]],
+) -> Iterator[tuple[dict[str, Any], Results | None]]:
+    """Claim the files that a comparison will write, read its recordings, and return its arguments."""
+    from mckibben.comparison.backends import on_cluster
+    from mckibben.estimators.catalogue import settings_of_all
+    from mckibben.files.sources import expanded
+    from mckibben.system import workers
+    from mckibben.system.results import results_in
+
+    if chosen.jobs != 1 and chosen.dask is None:
+        workers.prepare()
+    arguments = {one.name: getattr(chosen, one.name) for one in fields(CompareOptions)}
+    whole = chosen.models in ("all", "quick")
+    names = list(registry.names("estimators") if whole else chosen.models)
+    arguments["settings"] = settings_of_all(names, chosen.settings) if chosen.settings else {}
+    sides: Sequence[Data] = (listed(train), [], listed(test)) if is_loaded(train) else ()
+    sides = sides or expanded(files_of(train), files_of(test))
+    logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
+    with (
+        results_in(out, written(names), inputs=_paths(train, *sides, logs), force=force) as results,
+        on_cluster(arguments.pop("dask")),
+    ):
+        runs, checks, tests = read_sides(sides, chosen.inputs, chosen.outputs, chosen.load, reading)
+        arguments |= {"train": runs, "validation": [*validation, *checks], "test": tests}
+        yield arguments | {"folder": out, "clear": False}, results
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How a reference was followed by a controller, and how without compensation.
+
+    Parameters
+    ----------
+    tracked : Tracked
+    uncompensated : Before
+    plant : Plant
+    options : TrackOptions
+    controller : Block or Controller
+    notes : tuple of str
+    file, controller_file : Path or None
+        Recording and controller, where they were written.
+    """
+
+    tracked: Tracked
+    uncompensated: Before
+    plant: Plant
+    options: TrackOptions
+    controller: Any
+    notes: tuple[str, ...] = ()
+    file: Path | None = None
+    controller_file: Path | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the errors, for JSON."""
+        found, without = self.tracked, self.uncompensated.tracked
+        return {
+            "controller": self.options.controller,
+            "plant": {"name": self.plant.name, "virtual_rig": self.options.rig is not None},
+            **_errors(found),
+            "clipping_cost": found.clipping_cost,
+            "out_of_reach": {name: far._asdict() for name, far in found.beyond.items()},
+            "scatter": dict(found.scatter),
+            "uncompensated": None if without is None else _errors(without),
+            "step_time": dict(zip(("median", "p99.9"), found.step_time, strict=True)),
+            "file": _text(self.file),
+            "controller_file": _text(self.controller_file),
+            "notes": list(self.notes),
+        }
+
+
+def _errors(found: Tracked) -> dict[str, Any]:
+    return {"rmse": dict(found.rmse), "largest": dict(found.largest), "clipped": found.clipped}
+
+
+def track(
+    compensator: Model,
+    reference: Recording | str | Path,
+    options: TrackOptions | None = None,
+    *,
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    controller_out: str | Path | None = None,
+    force: bool = False,
+    progress: Progress = None,
+    **given: Any,
+) -> Tracking:
+    """Let a compensator, or a controller with it, follow a reference on a virtual rig or on a model.
+
+    ``out`` is the recording of the run, ``controller_out`` the controller, for `export`.
+    """
+    from mckibben.blocks.base import Block
+    from mckibben.blocks.feedback import FeedforwardFeedback
+    from mckibben.control import BlockController, before, control_law, dead_time_undone, tune_pid
+    from mckibben.control import track as close
+    from mckibben.control.identified import beyond_known
+    from mckibben.control.roles import asked, offered
+    from mckibben.control.suiting import doubts_of_feedback
+    from mckibben.control.twin import COMMAND
+    from mckibben.files import write
+
+    chosen = given_options(TrackOptions, options, given)
+    read = _paths(compensator, reference, chosen.rig, chosen.plant)
+    file = _claim(out, read, force)
+    controller_file = _claim(controller_out, [*read, *_paths(out)], force)
+    block, plant = _block(compensator), _plant(chosen, reading)
+    (run, *_) = read_files(reference, None, reading)
+    wanted = asked(plant, run, block)
+    BlockController(block).connect(offered(plant, wanted))  # before anything is tuned
+    step = wanted.sample_time or 0.02
+    held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
+    # commands are no pressures to be compared with what is measured
+    commanded = any(channel.name.startswith(COMMAND) for channel in block.outputs)
+    copied = ("approach", "settle", "noise", "delay", "slew", "seed")
+    arguments: dict[str, Any] = {name: getattr(chosen, name) for name in copied}
+    arguments["pressure_loop"] = chosen.pressure_loop and not commanded
+    with telling(progress, f"{chosen.controller} on {plant.name}") as tell:
+        law = control_law(
+            chosen.controller,
+            block,
+            lambda: tune_pid(plant, sample_time=step, scheduled=held, references=block.inputs),
+        )
+        if controller_file is not None:
+            ahead = dead_time_undone(block) if chosen.preview is None else chosen.preview
+            ahead += block.samples_ahead * step
+            if not isinstance(law, Block) or (
+                isinstance(law, FeedforwardFeedback) and ahead > step
+            ):
+                raise ModelError(
+                    f"{chosen.controller!r} cannot be saved as one block",
+                    parameter="controller_out",
+                    remedy="leave it out; or use feedforward or pid, or both with `preview=0`",
+                )
+        halves = [_half(tell, start) for start in (0.0, 0.5)]
+        tracked = close(law, plant, wanted, preview=chosen.preview, progress=halves[0], **arguments)
+        without = before(block, plant, wanted, progress=halves[1], **arguments)
+    if file is not None:
+        write(without.beside(tracked.recording), file)
+    if controller_file is not None and isinstance(law, Block):
+        law.save(controller_file)
+    notes = (
+        *beyond_known(block, wanted),
+        *without.notes,
+        *doubts_of_feedback(chosen.controller, plant),
+    )
+    return Tracking(tracked, without, plant, chosen, law, notes, file, controller_file)
+
+
+def _half(tell: Tell | None, start: float) -> Callable[[float], None] | None:
+    return None if tell is None else lambda share: tell(start + 0.5 * share, "")
+
+
+def _plant(chosen: TrackOptions, reading: ReadOptions | None) -> Any:
+    """Return what a loop is closed on: a rig, or a model as a twin of the user's muscle."""
+    from mckibben.control import Twin
+    from mckibben.rigs import Rig, load_rig
+
+    rest_length = None if reading is None else reading.rest_length
+    if (chosen.rig is None) == (chosen.plant is None):
+        raise DataError(
+            "a loop is closed on one plant",
+            remedy="give `plant=model.json`, a model of your own muscle, or `rig=NAME`",
+        )
+    if chosen.rig is not None:
+        for name, value in (("limits", chosen.limits), ("rest_length", rest_length)):
+            if value:
+                raise DataError("a rig has its own", parameter=name, remedy="leave it out")
+        return chosen.rig if isinstance(chosen.rig, Rig) else load_rig(str(chosen.rig))
+    if isinstance(chosen.plant, Twin):
+        return chosen.plant
+    if wrong := [name for name, ends in chosen.limits.items() if len(ends) != 2 or None in ends]:
+        remedy = f"write `limits[{wrong[0]}]=LOW:HIGH`; `slew` limits the rate"
+        raise DataError("limits of a plant are two numbers", channel=wrong[0], remedy=remedy)
+    name = next((path.stem for path in _paths(chosen.plant)), "plant")
+    limits: Any = dict(chosen.limits)
+    return Twin(_block(chosen.plant), limits=limits, name=name, rest_length=rest_length)
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """A compensator, or an estimate of force.
+
+    Parameters
+    ----------
+    block : Block
+    kind : {"inverse", "adaptive", "predictive", "learned", "feedforward", "force", "itself"}
+        The inverse of a memory, one that learns, looks ahead, or is a trained network; a force in
+        closed form, by the pressure or estimated; a model that gives pressures already.
+    reachable : mapping of str to (float, float)
+        Output of the model -> what is reachable whatever happened before; empty where that depends on
+        more than the model.
+    rmse : mapping of str to float
+        Of a learned inverse, by its outputs on the recordings.
+    file : Path or None
+        Where it is saved.
+    """
+
+    block: Block
+    kind: str
+    reachable: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    rmse: Mapping[str, float] = field(default_factory=dict)
+    file: Path | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what kind of inverse it is and what it reaches, for JSON."""
+        return {
+            "file": _text(self.file),
+            "kind": self.kind,
+            "inputs": [channel.name for channel in self.block.inputs],
+            "outputs": [channel.name for channel in self.block.outputs],
+            "reachable": {name: list(ends) for name, ends in self.reachable.items()},
+            "samples_ahead": self.block.samples_ahead,
+            "rmse": dict(self.rmse),
+        }
+
+
+def invert(
+    model: Model,
+    options: InvertOptions | None = None,
+    *,
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    progress: Progress = None,
+    **given: Any,
+) -> Inverse:
+    """Return the compensator of a model: desired output in, input out; or its estimate of force."""
+    chosen = given_options(InvertOptions, options, given)
+    chosen.check()
+    file = _claim(out, _paths(model, chosen.learned), force)
+    found = _inverse(_block(model, chosen.fields), chosen, reading, progress)
+    if file is not None:
+        found.block.save(file)
+    return replace(found, file=file)
+
+
+def _inverse(
+    block: Block, chosen: InvertOptions, reading: ReadOptions | None, progress: Progress
+) -> Inverse:
+    from mckibben.blocks.adaptive import adaptive
+    from mckibben.blocks.coupled.load_estimate import load_of
+    from mckibben.blocks.force.feedforward import ForceFeedforward
+    from mckibben.blocks.inverse import drives
+    from mckibben.blocks.predictive import Predictive
+    from mckibben.estimators.coupled.sdchm import learned_inverse
+
+    if chosen.learned:
+        runs = read_files(chosen.learned, None, reading)
+        with telling(progress, "learning the inverse") as tell:
+            learned, rmse = learned_inverse(block, runs, chosen.seed, _best_so_far(tell))
+        return Inverse(learned, "learned", rmse=rmse)
+    if chosen.predictive:
+        return Inverse(Predictive(block.inverse(), **chosen.of_predictive()), "predictive")
+    if chosen.wanted == "force":
+        return Inverse(load_of(block), "force")
+    if not chosen.adaptive:
+        if (feedforward := ForceFeedforward.of(block)) is not None:
+            return Inverse(feedforward, "feedforward")
+        if not block.undoing and drives(block.outputs[0]) and not drives(block.inputs[0]):
+            return Inverse(block, "itself")
+    kind = "adaptive" if chosen.adaptive else "inverse"
+    time = 60.0 if chosen.time is None else chosen.time
+    inverse = adaptive(block, time, chosen.noise) if chosen.adaptive else block.inverse()
+    ends = [tuple(map(float, pair)) for pair in zip(*block.reachable(), strict=True)]
+    known = all(math.isfinite(end) for pair in ends for end in pair)
+    names = [channel.name for channel in block.outputs]
+    return Inverse(inverse, kind, dict(zip(names, ends, strict=True)) if known else {})
+
+
+def check(
+    model: Model,
+    data: Data,
+    *,
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    progress: Progress = None,
+) -> Validation:
+    """Test whether a model is right on recordings, and what it misses; see `mckibben.diagnosis.check`.
+
+    With ``out``, a folder, ``validation.json`` and ``report.html`` are written.
+    """
+    from mckibben.diagnosis.check import check as find
+    from mckibben.diagnosis.description import describe
+    from mckibben.files.sources import expanded
+    from mckibben.report.check_page import write_check
+    from mckibben.system.results import results_in
+
+    files: Data = data if is_loaded(data) else expanded([], files_of(data))[2]
+    names = ["validation.json", "report.html"]
+    with results_in(out, names, inputs=_paths(model, files), force=force) as results:
+        block = _block(model)
+        needed = dict.fromkeys(channel.name for channel in (*block.inputs, *block.outputs))
+        recordings = read_files(files, list(needed), reading)
+        found = find(block, recordings, progress=progress)
+        found = replace(found, description=describe(block, recordings, fitted=False))
+        if results is not None:
+            write_check(results, found, next(map(str, _paths(model)), block.title))
+            results.commit()
+    return found
+
+
+def plan(
+    data: Data = (),
+    options: PlanOptions | None = None,
+    *,
+    reading: ReadOptions | None = None,
+    out: str | Path | None = None,
+    force: bool = False,
+    **given: Any,
+) -> Plan:
+    """Return what to record next: random motion within limits, and what closes data gaps.
+
+    With ``out``, its commands are written as a recording.
+    """
+    from mckibben.files import write
+    from mckibben.planning.planner import plan as make
+
+    chosen = given_options(PlanOptions, options, given)
+    arguments = {one.name: getattr(chosen, one.name) for one in fields(chosen)}
+    read = _paths(data, chosen.rig, chosen.muscle, chosen.model)
+    file = _claim(out, read, force)
+    if str(chosen.model).endswith(".json"):
+        arguments["model"] = _block(chosen.model)
+    found = make(read_files(data, None, reading), **arguments)
+    if file is not None:
+        write(found.recording, file)
+    return found
+
+
+def review(
+    log: Data,
+    *,
+    model: Model | None = None,
+    compensator: Model | None = None,
+    refit: bool = True,
+    seed: int = 0,
+    reading: ReadOptions | None = None,
+) -> Review:
+    """Return how a logged loop followed its reference, and why no better; see `mckibben.diagnosis.review`.
+
+    The log has a reference, such as ``reference_displacement``; one of model and compensator is enough.
+    """
+    from mckibben.diagnosis.review import review as find
+
+    ran = {"model": _block(model), "compensator": _block(compensator)}
+    return find(read_files(log, None, reading), refit=refit, seed=seed, **ran)
+
+
+@dataclass(frozen=True)
+class Exported:
+    """Code that was written.
+
+    Parameters
+    ----------
+    path : Path
+        Folder, or FMU.
+    name : str
+        Of functions and files.
+    files : tuple of str
+        In it.
+    self_test, emulation : str or None
+        What the self-test and the emulated run printed.
+    """
+
+    path: Path
+    name: str
+    files: tuple[str, ...]
+    self_test: str | None = None
+    emulation: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it, for JSON."""
+        return {one.name: getattr(self, one.name) for one in fields(self)} | {
+            "path": str(self.path),
+            "files": list(self.files),
+        }
+
+
+def export(
+    model: Model,
+    out: str | Path,
+    target: Literal["c", "fmu", "ros2"] = "c",
+    options: ExportOptions | None = None,
+    **given: Any,
+) -> Exported:
+    """Write a model as code: C99, an FMU, or a ROS 2 package.
+
+    Parameters
+    ----------
+    model : Block, or file
+    out : path
+        Folder, or for an FMU the file, to write.
+    target : {"c", "fmu", "ros2"}
+        Of that target: `COptions`, `FMUOptions`, or for ROS 2 `ExportOptions`.
+    """
+    from mckibben.blocks.force.feedforward import compensator
+    from mckibben.export import export_c, export_fmu, export_ros2
+    from mckibben.export.naming import name_from
+    from mckibben.export.programs import self_test
+    from mckibben.system.results import refuse_inputs
+
+    kinds = {"c": COptions, "fmu": FMUOptions, "ros2": ExportOptions}
+    chosen: Any = given_options(kinds[target], options, given)
+    out = Path(out)
+    refuse_inputs(out, [Path(str(model))] if _is_path(model) else [])
+    block = _block(model, chosen.fields)
+    block = compensator(block) if chosen.inverse else block
+    name = chosen.name or (name_from(Path(str(model))) if _is_path(model) else "model")
+    common = {"sample_time": chosen.sample_time, "overwrite": chosen.overwrite}
+    tests: list[str | None] = [None, None]
+    if target == "c":
+        serving = _serving(chosen)
+        export_c(block, out, name=name, single=chosen.single, serving=serving, **common)
+        tests = [
+            self_test(out, name) if chosen.check else None,
+            _emulated(block, chosen.sample_time) if chosen.emulate else None,
+        ]
+    elif target == "fmu":
+        named = {"all": None, "none": ()}.get(chosen.platforms, chosen.platforms)
+        export_fmu(block, out, name=name, platforms=named, **common)
+    else:
+        name = chosen.name or name.lower()
+        export_ros2(block, out, name=name, **common)
+    return Exported(out, name, tuple(_contents(out)), *tests)
+
+
+def _contents(path: Path) -> list[str]:
+    """Return the files in a folder or a zip."""
+    if path.is_dir():
+        return sorted(p.relative_to(path).as_posix() for p in path.rglob("*") if p.is_file())
+    with zipfile.ZipFile(path) as archive:
+        return archive.namelist()
+
+
+def _serving(chosen: COptions) -> Any:
+    """Return how exported code is served over a serial line, where it is."""
+    from mckibben.export.c.serving import Serving
+
+    if not chosen.link:
+        for name in ("limits", "safe", "watchdog"):
+            if getattr(chosen, name):
+                raise ModelError("it is of served code", parameter=name, remedy="add `link`")
+        return None
+    watchdog = 0.5 if chosen.watchdog is None else chosen.watchdog
+    return Serving(chosen.limits, chosen.safe, watchdog)
+
+
+def _block(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
+    """Return a model, read where it is a file, with some of its fields set."""
+    from mckibben.blocks.saving import load
+    from mckibben.blocks.setting import with_fields
+
+    if model is None:
+        return None
+    return with_fields(load(model) if isinstance(model, str | Path) else model, settings or {})
+
+
+def _paths(*given: Any) -> list[Path]:
+    """Return the files among what is given, in lists too."""
+    found: list[Path] = []
+    for one in given:
+        if isinstance(one, str | Path):
+            found.append(Path(one))
+        elif isinstance(one, list | tuple):
+            found += _paths(*one)
+    return found
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)
+
+
+def _claim(out: str | Path | None, read: Sequence[Path], force: bool) -> Path | None:
+    """Refuse to write over what is read or the user's, before any work; return the path."""
+    from mckibben.system.results import claim
+
+    if out is None:
+        return None
+    claim(Path(out), inputs=read, force=force)
+    return Path(out)

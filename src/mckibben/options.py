@@ -326,6 +326,37 @@ class InvertOptions:
     fields: Fields = field(default_factory=dict)
     seed: Seed = 0
 
+    def check(self) -> None:
+        """Refuse options that exclude each other, or lack what they are of."""
+        ways = {
+            "adaptive": self.adaptive,
+            "predictive": self.predictive,
+            "learned": bool(self.learned),
+            "wanted=force": self.wanted == "force",
+        }
+        if len(both := [name for name, on in ways.items() if on]) > 1:
+            raise ModelError(
+                f"`{both[0]}` and `{both[1]}` exclude each other", remedy=f"leave out `{both[1]}`"
+            )
+        for way, names in {"adaptive": ("time", "noise"), "predictive": PREDICTIVE}.items():
+            alone = [name for name in names if getattr(self, name) is not None]
+            if alone and not ways[way]:
+                raise ModelError(
+                    f"it is of a compensator with `{way}`",
+                    parameter=alone[0],
+                    remedy=f"add `{way}`, or leave it out",
+                )
+
+    def of_predictive(self) -> dict[str, Any]:
+        """Return the arguments of `mckibben.blocks.predictive.Predictive`."""
+        given = {name: getattr(self, name) for name in PREDICTIVE}
+        given["pressure_range"] = given.pop("pressures")
+        given["horizon"] = 20 if self.horizon is None else self.horizon
+        return given
+
+
+PREDICTIVE = ("horizon", "rate_limit", "pressures", "total_limit", "flow_limit")
+
 
 @dataclass(frozen=True)
 class PlanOptions:
@@ -361,7 +392,7 @@ class ExportOptions:
     ] = None
     inverse: Annotated[bool, Option("Export the model's inverse.")] = False
     fields: Fields = field(default_factory=dict)
-    overwrite: Annotated[bool, Option("Replace what an export wrote there before.")] = False
+    force: Annotated[bool, Option("Replace files of yours, too; never what is read.")] = False
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from mckibben import options
 from mckibben.errors import DataError
 from mckibben.options import Option
 from mckibben.recording import Recording
+
+if TYPE_CHECKING:
+    from mckibben.diagnosis.data_gaps import Gap
+    from mckibben.files.choosing import Seen
 
 MOST = 2.0 * 1024**3
 """Largest file that is read by default [bytes]."""
@@ -123,9 +127,14 @@ class ReadOptions:
         return recordings
 
 
-def is_loaded(data: Data) -> bool:
-    """Return whether data are recordings already, rather than files."""
-    return isinstance(data, Recording) or any(isinstance(one, Recording) for one in data)
+def loaded(data: Data) -> list[Recording] | None:
+    """Return data that are recordings already, rather than files."""
+    if isinstance(data, Recording):
+        return [data]
+    if isinstance(data, str | Path):
+        return None
+    found = [one for one in data if isinstance(one, Recording)]
+    return found or None
 
 
 def files_of(data: Data) -> list[Path]:
@@ -153,9 +162,8 @@ def read_files(
     from mckibben.files import read
 
     reading = reading or ReadOptions()
-    listed = [data] if isinstance(data, Recording | str | Path) else data
     found: list[Recording] = []
-    for one in listed:
+    for one in [data] if isinstance(data, Recording | str | Path) else data:
         if isinstance(one, Recording):
             found.append(one)
         else:
@@ -226,3 +234,86 @@ def read_pair(
     if not all(name in one for one in recordings for name in usual):
         recordings = read_files(data, [*usual, *others], reading)  # says what is wrong with it
     return recordings, *usual
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What files contain.
+
+    Parameters
+    ----------
+    columns : mapping of str to list of Seen
+        File -> its columns, and what they are read as; not of folders.
+    recordings : list of Recording
+    gaps : tuple of Gap, or str
+        What the recordings cannot identify, or why that is unknown.
+    """
+
+    columns: Mapping[str, list[Seen]]
+    recordings: list[Recording]
+    gaps: tuple[Gap, ...] | str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything but the samples, for JSON."""
+        from mckibben.files.condition import condition
+
+        files = {file: [asdict(one) for one in found] for file, found in self.columns.items()}
+        recordings = [
+            {
+                "name": one.name,
+                "n_samples": one.n_samples,
+                "sample_time": one.sample_time,
+                "start_time": one.start_time,
+                "channels": {
+                    name: {
+                        "unit": one.units[name],
+                        "min": float(samples.min()),
+                        "max": float(samples.max()),
+                        **condition(samples),
+                    }
+                    for name, samples in one.channels.items()
+                },
+                "meta": dict(one.meta),
+            }
+            for one in self.recordings
+        ]
+        gaps = self.gaps if isinstance(self.gaps, str) else [one.to_dict() for one in self.gaps]
+        return {"files": files, "recordings": recordings, "data_gaps": gaps}
+
+
+def look(
+    files: Sequence[Path],
+    reading: ReadOptions,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+) -> Contents:
+    """Return what files contain, and what the recordings in them cannot identify.
+
+    Raises
+    ------
+    DataError
+        If a file cannot be read, or a channel that is named is not there.
+    """
+    from mckibben.diagnosis.data_gaps import data_gaps
+    from mckibben.files import read
+    from mckibben.files.reading import look as look_into
+
+    named = [*(inputs or ()), *(outputs or ())] or None
+    arguments = {"channels": named, "informative": False, **reading.arguments()}
+    recordings: list[Recording] = []
+    columns: dict[str, list[Seen]] = {}
+    for file in files:
+        if file.is_dir():
+            recordings += read(file, **arguments)
+        else:
+            found, columns[str(file)] = look_into(file, **arguments)
+            recordings += found
+    recordings = reading.prepare(recordings)
+    gaps: tuple[Gap, ...] | str
+    try:
+        gaps = data_gaps(recordings, inputs, outputs)
+    except DataError as error:
+        if named:
+            raise
+        gaps = str(error)
+    return Contents(columns, recordings, gaps)

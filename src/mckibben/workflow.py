@@ -45,12 +45,12 @@ from mckibben.reading import (
     Data,
     ReadOptions,
     files_of,
-    is_loaded,
+    loaded,
     read_files,
     read_pair,
     read_sides,
 )
-from mckibben.recording import Recording, listed
+from mckibben.recording import Recording
 from mckibben.system.progress import Tell, telling
 
 if TYPE_CHECKING:
@@ -66,8 +66,6 @@ if TYPE_CHECKING:
     from mckibben.system.results import Results
 
 Progress = bool | Tell | None
-Model = "Block | str | Path"
-"""A model, or the file that it is saved in."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +155,7 @@ def fit(
     else:  # of several, each may hold an input, as isometric runs hold the length
         needed = [n for some in sides for n in ((some,) if isinstance(some, str) else some or ())]
         runs = read_files(data, needed or None, reading)
-    base, whole = _block(chosen.residual_of), runs
+    base, whole = saved(chosen.residual_of), runs
     checks = read_files(chosen.validation, None, reading)
     if base is not None:
         runs, checks = (_residuals(base, estimator, some) for some in (runs, checks))
@@ -227,7 +225,8 @@ def compare(
         board = rank(**arguments, progress=_standing(progress))
         if results is not None:
             write_leaderboard(board, results)
-            results.commit()
+            if not board.stopped:
+                _complete(results)
     return board
 
 
@@ -269,16 +268,24 @@ def study(
         done = run(
             **arguments,
             rig=chosen.rig,
-            model=_block(chosen.model),
-            compensator=_block(chosen.compensator),
+            model=saved(chosen.model),
+            compensator=saved(chosen.compensator),
             progress=_standing(progress),
             found=pass_on,
         )
         if folder is not None:
             folder.take(done, last=True)
         if results is not None and not done.leaderboard.stopped:
-            results.commit()
+            _complete(results)
     return done
+
+
+def _complete(results: Results) -> None:
+    """Swap the files of a comparison in, and remove its checkpoints."""
+    from mckibben.checkpoints import Checkpoints
+
+    results.commit()
+    Checkpoints(results.folder).clear()
 
 
 def _standing(progress: Progress) -> Any:
@@ -312,8 +319,9 @@ def _compared(
     whole = chosen.models in ("all", "quick")
     names = list(registry.names("estimators") if whole else chosen.models)
     arguments["settings"] = settings_of_all(names, chosen.settings) if chosen.settings else {}
-    sides: Sequence[Data] = (listed(train), [], listed(test)) if is_loaded(train) else ()
-    sides = sides or expanded(files_of(train), files_of(test))
+    runs = loaded(train)
+    files = expanded(files_of(train), files_of(test))
+    sides: Sequence[Data] = files if runs is None else (runs, [], loaded(test) or [])
     logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
     with (
         results_in(out, written(names), inputs=_paths(train, *sides, logs), force=force) as results,
@@ -372,7 +380,7 @@ def _errors(found: Tracked) -> dict[str, Any]:
 
 
 def track(
-    compensator: Model,
+    compensator: Block | str | Path,
     reference: Recording | str | Path,
     options: TrackOptions | None = None,
     *,
@@ -401,7 +409,7 @@ def track(
     read = _paths(compensator, reference, chosen.rig, chosen.plant)
     file = _claim(out, read, force)
     controller_file = _claim(controller_out, [*read, *_paths(out)], force)
-    block, plant = _block(compensator), _plant(chosen, reading)
+    block, plant = saved(compensator), _plant(chosen, reading)
     (run, *_) = read_files(reference, None, reading)
     wanted = asked(plant, run, block)
     BlockController(block).connect(offered(plant, wanted))  # before anything is tuned
@@ -471,7 +479,7 @@ def _plant(chosen: TrackOptions, reading: ReadOptions | None) -> Any:
         raise DataError("limits of a plant are two numbers", channel=wrong[0], remedy=remedy)
     name = next((path.stem for path in _paths(chosen.plant)), "plant")
     limits: Any = dict(chosen.limits)
-    return Twin(_block(chosen.plant), limits=limits, name=name, rest_length=rest_length)
+    return Twin(saved(chosen.plant), limits=limits, name=name, rest_length=rest_length)
 
 
 @dataclass(frozen=True)
@@ -513,7 +521,7 @@ class Inverse:
 
 
 def invert(
-    model: Model,
+    model: Block | str | Path,
     options: InvertOptions | None = None,
     *,
     reading: ReadOptions | None = None,
@@ -526,7 +534,7 @@ def invert(
     chosen = given_options(InvertOptions, options, given)
     chosen.check()
     file = _claim(out, _paths(model, chosen.learned), force)
-    found = _inverse(_block(model, chosen.fields), chosen, reading, progress)
+    found = _inverse(saved(model, chosen.fields), chosen, reading, progress)
     if file is not None:
         found.block.save(file)
     return replace(found, file=file)
@@ -540,12 +548,12 @@ def _inverse(
     from mckibben.blocks.force.feedforward import ForceFeedforward
     from mckibben.blocks.inverse import drives
     from mckibben.blocks.predictive import Predictive
-    from mckibben.estimators.coupled.sdchm import learned_inverse
+    from mckibben.estimators.coupled.sdchm import trained_inverse
 
     if chosen.learned:
         runs = read_files(chosen.learned, None, reading)
         with telling(progress, "learning the inverse") as tell:
-            learned, rmse = learned_inverse(block, runs, chosen.seed, _best_so_far(tell))
+            learned, rmse = trained_inverse(block, runs, chosen.seed, _best_so_far(tell))
         return Inverse(learned, "learned", rmse=rmse)
     if chosen.predictive:
         return Inverse(Predictive(block.inverse(), **chosen.of_predictive()), "predictive")
@@ -559,14 +567,14 @@ def _inverse(
     kind = "adaptive" if chosen.adaptive else "inverse"
     time = 60.0 if chosen.time is None else chosen.time
     inverse = adaptive(block, time, chosen.noise) if chosen.adaptive else block.inverse()
-    ends = [tuple(map(float, pair)) for pair in zip(*block.reachable(), strict=True)]
+    ends = [(float(low), float(high)) for low, high in zip(*block.reachable(), strict=True)]
     known = all(math.isfinite(end) for pair in ends for end in pair)
     names = [channel.name for channel in block.outputs]
     return Inverse(inverse, kind, dict(zip(names, ends, strict=True)) if known else {})
 
 
 def check(
-    model: Model,
+    model: Block | str | Path,
     data: Data,
     *,
     reading: ReadOptions | None = None,
@@ -584,10 +592,10 @@ def check(
     from mckibben.report.check_page import write_check
     from mckibben.system.results import results_in
 
-    files: Data = data if is_loaded(data) else expanded([], files_of(data))[2]
+    files: Data = loaded(data) or expanded([], files_of(data))[2]
     names = ["validation.json", "report.html"]
     with results_in(out, names, inputs=_paths(model, files), force=force) as results:
-        block = _block(model)
+        block = saved(model)
         needed = dict.fromkeys(channel.name for channel in (*block.inputs, *block.outputs))
         recordings = read_files(files, list(needed), reading)
         found = find(block, recordings, progress=progress)
@@ -619,7 +627,7 @@ def plan(
     read = _paths(data, chosen.rig, chosen.muscle, chosen.model)
     file = _claim(out, read, force)
     if str(chosen.model).endswith(".json"):
-        arguments["model"] = _block(chosen.model)
+        arguments["model"] = saved(chosen.model)
     found = make(read_files(data, None, reading), **arguments)
     if file is not None:
         write(found.recording, file)
@@ -629,19 +637,19 @@ def plan(
 def review(
     log: Data,
     *,
-    model: Model | None = None,
-    compensator: Model | None = None,
+    model: Block | str | Path | None = None,
+    compensator: Block | str | Path | None = None,
     refit: bool = True,
     seed: int = 0,
     reading: ReadOptions | None = None,
 ) -> Review:
-    """Return how a logged loop followed its reference, and why no better; see `mckibben.diagnosis.review`.
+    """Return how a logged loop followed its reference, and why no better; see `diagnosis.review`.
 
     The log has a reference, such as ``reference_displacement``; one of model and compensator is enough.
     """
     from mckibben.diagnosis.review import review as find
 
-    ran = {"model": _block(model), "compensator": _block(compensator)}
+    ran = {"model": saved(model), "compensator": saved(compensator)}
     return find(read_files(log, None, reading), refit=refit, seed=seed, **ran)
 
 
@@ -676,7 +684,7 @@ class Exported:
 
 
 def export(
-    model: Model,
+    model: Block | str | Path,
     out: str | Path,
     target: Literal["c", "fmu", "ros2"] = "c",
     options: ExportOptions | None = None,
@@ -694,6 +702,7 @@ def export(
     """
     from mckibben.blocks.force.feedforward import compensator
     from mckibben.export import export_c, export_fmu, export_ros2
+    from mckibben.export.c.emulation import emulate
     from mckibben.export.naming import name_from
     from mckibben.export.programs import self_test
     from mckibben.system.results import refuse_inputs
@@ -701,18 +710,18 @@ def export(
     kinds = {"c": COptions, "fmu": FMUOptions, "ros2": ExportOptions}
     chosen: Any = given_options(kinds[target], options, given)
     out = Path(out)
-    refuse_inputs(out, [Path(str(model))] if _is_path(model) else [])
-    block = _block(model, chosen.fields)
+    refuse_inputs(out, _paths(model))
+    block = saved(model, chosen.fields)
     block = compensator(block) if chosen.inverse else block
-    name = chosen.name or (name_from(Path(str(model))) if _is_path(model) else "model")
-    common = {"sample_time": chosen.sample_time, "overwrite": chosen.overwrite}
+    name = chosen.name or next(map(name_from, _paths(model)), "model")
+    common = {"sample_time": chosen.sample_time, "force": chosen.force}
     tests: list[str | None] = [None, None]
     if target == "c":
         serving = _serving(chosen)
         export_c(block, out, name=name, single=chosen.single, serving=serving, **common)
         tests = [
             self_test(out, name) if chosen.check else None,
-            _emulated(block, chosen.sample_time) if chosen.emulate else None,
+            str(emulate(block, sample_time=chosen.sample_time)) if chosen.emulate else None,
         ]
     elif target == "fmu":
         named = {"all": None, "none": ()}.get(chosen.platforms, chosen.platforms)
@@ -744,7 +753,14 @@ def _serving(chosen: COptions) -> Any:
     return Serving(chosen.limits, chosen.safe, watchdog)
 
 
-def _block(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
+def unfinished(folder: str | Path) -> Path:
+    """Return where results are until a run is complete."""
+    from mckibben.system.results import UNFINISHED
+
+    return Path(folder) / UNFINISHED / "new"
+
+
+def saved(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
     """Return a model, read where it is a file, with some of its fields set."""
     from mckibben.blocks.saving import load
     from mckibben.blocks.setting import with_fields

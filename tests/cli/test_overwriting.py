@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mckibben.outputs import MANIFEST, Results
 
 from mckibben.errors import DataError
-from mckibben.outputs import MANIFEST, Results
 from mckibben.system import manifest
 from mckibben.system.atomic import PART, write_text
 from tests.cli.calls import CALLS, INVERSE, MODEL, RIG, RUN, call_of, files

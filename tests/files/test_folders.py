@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mckibben.outputs import claim, never
 
 import mckibben
 from mckibben import DataError, Recording
 from mckibben.files.channels import NAME, described
 from mckibben.files.sources import roles
 from mckibben.measured.sets import split_of
-from mckibben.outputs import claim, never
 from tests.files.made import Cells, one, put, refused, several
 
 N = 60

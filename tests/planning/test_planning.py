@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mckibben.cli.options import limits_in
 
 from mckibben import PI, Recording, data_gaps, load_rig, plan
 from mckibben.blocks.base import Block
-from mckibben.cli.options import limits_in
 from mckibben.errors import DataError, ModelError
 from mckibben.planning.limits import Limit, narrowed
 from mckibben.planning.motion import motion

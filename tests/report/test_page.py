@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mckibben.outputs import Results
 
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.diagnosis.description import describe
 from mckibben.numerals import number, percent
-from mckibben.outputs import Results
 from mckibben.recording import Recording
 from mckibben.report import StudyFolder, templating, write_report
 from mckibben.report.commands import Typed, commands

@@ -86,3 +86,24 @@ def _changed(value: Any, values: Mapping[str, Any]) -> Any:
     new |= {name: values[name] for name in value.settable if name in values}
     changed = {name: one for name, one in new.items() if one is not now[name]}
     return replace(value, **changed) if changed else value
+
+
+def summary(model: Block) -> dict[str, Any]:
+    """Return what a model takes, gives and is, for JSON."""
+    from mckibben.blocks.force.feedforward import compensator
+
+    try:
+        compensator(model)
+        inverse = "yes"
+    except ModelError as error:
+        inverse = f"no: {error}"
+    return {
+        "kind": model.kind,
+        "inputs": [f"{channel.name} [{channel.unit}]" for channel in model.inputs],
+        "outputs": [f"{channel.name} [{channel.unit}]" for channel in model.outputs],
+        "n_parameters": model.n_parameters,
+        "n_states": model.n_states,
+        "rate_dependent": bool(model.rate_dependent),
+        "inverse": inverse,
+        "settable": settable(model),
+    }

@@ -12,7 +12,6 @@ from importlib import import_module
 from importlib.util import find_spec
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -36,7 +35,7 @@ COMMANDS = (
     *("track", "plan", "plot", "reproduce", "measured", "info", "link", "example", "export"),
     *("rig", "muscles", "app"),
 )
-"""Each is a module of `mckibben.cli.commands`, with a ``command`` and its help as docstring."""
+"""Each is a module of `mckibben.cli.commands`, with a command of its name, and its help as docstring."""
 
 
 class Commands(click.Group):
@@ -50,7 +49,7 @@ class Commands(click.Group):
         """Return one, loaded."""
         if cmd_name not in COMMANDS:
             return None
-        found: click.Command = import_module(f"mckibben.cli.commands.{cmd_name}").command
+        found: click.Command = import_module(f"mckibben.cli.commands.{cmd_name}").__dict__[cmd_name]
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -118,8 +117,7 @@ def _run() -> int:
         finish()
         return code or 0
     except click.UsageError as error:
-        error.message = visible(error.message)
-        error.show()
+        click.UsageError(visible(error.message), error.ctx).show()
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
         return _say("Interrupted.", INTERRUPTED)

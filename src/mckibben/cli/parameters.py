@@ -7,7 +7,6 @@ import sys
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
-from enum import Enum
 from inspect import Parameter, cleandoc, signature
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -118,7 +117,7 @@ def made(name: str, hint: Any, default: Any) -> click.Parameter:
             nargs=-1 if several else 1,
             default=None if required or several else default,
         )
-    flags = [name, *_flags(name, about.flag)]
+    flags = [name, *_spellings(name, about.flag)]
     if kind is bool:
         on = flags[1]
         both = f"{on}/--no-{on[2:]}" if default is True else on
@@ -132,13 +131,13 @@ def made(name: str, hint: Any, default: Any) -> click.Parameter:
         required=required,
         multiple=several or mapping,
         nargs=width if about.parse is None else 1,
-        default=None,
-        show_default=_shown(default, about),
+        default=default if _is_plain(default, about) else None,
+        show_default=_is_plain(default, about),
         callback=_parsed(about, mapping, several, default),
     )
 
 
-def _flags(name: str, flag: str) -> list[str]:
+def _spellings(name: str, flag: str) -> list[str]:
     if flag == "-o":
         return ["-o", "--out"]
     return [flag or f"--{name.replace('_', '-')}"]
@@ -166,9 +165,9 @@ def _click_type(kind: Any) -> Any:
     return kind if kind in (int, float, str) else str
 
 
-def _shown(default: Any, about: Option) -> str | bool:
-    plain = isinstance(default, int | float | str | Enum) and default not in ("", False)
-    return str(default) if plain and about.parse is None else False
+def _is_plain(default: Any, about: Option) -> bool:
+    """Return whether a default is what would be typed."""
+    return isinstance(default, int | float | str | Path) and default != "" and not about.parse
 
 
 def _parsed(about: Option, mapping: bool, several: bool, default: Any) -> Callable[..., Any]:

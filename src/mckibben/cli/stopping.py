@@ -111,7 +111,7 @@ def how_to_go_on(folder: Path | None) -> str:
         return "Stopped."
     if not any((folder / "unfinished").rglob("*.*")):
         return "Stopped before anything was finished."
-    return f"Stopped. What is finished is in {folder / 'unfinished'}; the same command goes on from there."
+    return f"Stopped; the same command goes on from what is in {folder / 'unfinished'}."
 
 
 def stop_short(board: Leaderboard, folder: Path | None) -> None:

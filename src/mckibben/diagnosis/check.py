@@ -12,6 +12,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.bands import inside
 from mckibben.blocks.base import Block
 from mckibben.comparison.choosing import useful
+from mckibben.diagnosis.description import ModelDescription
 from mckibben.diagnosis.free_runs import Run, runs_of
 from mckibben.diagnosis.patterns import Pattern, Whiteness, bins, whiteness
 from mckibben.diagnosis.regression import FTest, Regression

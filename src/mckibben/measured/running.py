@@ -195,9 +195,7 @@ def measure(
     inputs = [one.folder for one in chosen]
     with results_in(out, ["measured.md", "measured.csv"], inputs=inputs, force=force) as results:
         every: list[Outcome] = []
-        for one in outcomes(
-            chosen, models=models, seed=seed, jobs=jobs, folder=out, tell=progress
-        ):
+        for one in outcomes(chosen, models=models, seed=seed, jobs=jobs, folder=out, tell=progress):
             every.append(one)
             if found is not None:
                 found(one)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import string
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -21,6 +21,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
 from mckibben.estimators.optimisers.tracker import whole_searches
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
+from mckibben.reading import ReadOptions, read_files
 from mckibben.recording import REST_LENGTH, Recording, conversion
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, Role, protocol
@@ -507,7 +508,12 @@ def rerun(
 
     paper(name)
     runs = None if data is None else _recordings(data, reading)
-    given = {"name": name, "rig": rig and load_rig(rig), "data": runs, "quick": quick}
+    given: dict[str, Any] = {
+        "name": name,
+        "rig": rig and load_rig(rig),
+        "data": runs,
+        "quick": quick,
+    }
     given |= {"seed": seed, "jobs": jobs, "folder": out}
     inputs = [] if data is None else [data]
     with results_in(out, ["report.html", "tables.json"], inputs=inputs, force=force) as results:

@@ -94,8 +94,8 @@ class Paper(_Strict):
     figures: dict[str, FigureText]
     models: dict[str, dict[str, Any]] = {}
 
-    def summary(self) -> dict[str, Any]:
-        """Return what it is about, for JSON."""
+    def about(self) -> dict[str, Any]:
+        """Return its number, title and question, for JSON."""
         return {key: getattr(self, key) for key in ("number", "title", "question")}
 
     def printed(self, name: str) -> Any:

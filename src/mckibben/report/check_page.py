@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mckibben.diagnosis.check import LEVEL
+from mckibben.recording import notes_by_file
 from mckibben.report import (
     check_subjects,
     description_subjects,
@@ -13,10 +14,12 @@ from mckibben.report import (
     templating,
     words,
 )
+from mckibben.system.atomic import to_json
 
 if TYPE_CHECKING:
     from mckibben.diagnosis.check import Validation
     from mckibben.diagnosis.description import ModelDescription
+    from mckibben.system.results import Results
 
 MOST_RECORDINGS = 4
 """Recordings with figures of their own: the longest."""
@@ -25,6 +28,23 @@ MOST_OUTPUTS = 6
 """Outputs with figures of their own; the others have their numbers."""
 
 MODEL = "model"
+
+
+def check_json(found: Validation, model_file: str) -> dict[str, Any]:
+    """Return a check with its verdict in words, for JSON."""
+    return found.to_dict() | {
+        "verdict": words.check_verdict(found),
+        "sentences": words.check_sentences(found),
+        "model_file": model_file,
+        "notes_of_reading": notes_by_file([run.recording for run in found.runs]),
+    }
+
+
+def write_check(results: Results, found: Validation, model_file: str) -> None:
+    """Write ``validation.json`` and ``report.html``."""
+    results.write_text("validation.json", to_json(check_json(found, model_file)) + "\n")
+    if found.description is not None:
+        results.write_text("report.html", check_page(found, found.description, model_file))
 
 
 def check_page(found: Validation, description: ModelDescription, model_file: str) -> str:

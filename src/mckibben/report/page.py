@@ -19,7 +19,6 @@ from mckibben.report import (
     templating,
     words,
 )
-from mckibben.report.commands import Typed, commands
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown, unique
 
@@ -65,9 +64,10 @@ def write_report(study: Study, path: str | Path) -> None:
     write_text(path, page(study))
 
 
-def page(study: Study, typed: Typed | None = None) -> str:
-    """Return the report of a study as HTML, with how it was asked for on the command line, if it was."""
+def page(study: Study, command: str = "", *, title: str = "") -> str:
+    """Return the report of a study as HTML, with how it is repeated, and its title."""
     from mckibben.report.columns import columns_of_board
+    from mckibben.report.commands import commands
 
     every = shown(study)
     pictured = drawn(every)
@@ -97,8 +97,9 @@ def page(study: Study, typed: Typed | None = None) -> str:
         reading=notes_by_file(measured),
         notes=[note for note in study.notes if note not in reading_notes(measured)],
         versions=templating.versions(),
-        typed=typed or Typed(),
-        commands=commands(study, typed),
+        command=command,
+        title=title,
+        commands=commands(study, command),
         answers=words.answers(study),
         checked=checked(study),
         description=study.description,

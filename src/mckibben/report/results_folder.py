@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mckibben.blocks.saving import to_text
 from mckibben.diagnosis.refit import Refit
-from mckibben.outputs import Results
-from mckibben.report.commands import Typed
 from mckibben.report.page import page
 from mckibben.system.atomic import to_json
+from mckibben.system.results import Results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -57,22 +55,20 @@ def write_leaderboard(board: Leaderboard, results: Results) -> None:
 class StudyFolder:
     """A study's results: what the muscle does, leaderboard, models, inverse and report.
 
-    What an earlier run wrote there is removed, so that no model of it stays.
-
     Parameters
     ----------
-    results : Results or Path
-        The folder, which exists.
-    typed : Typed, optional
-        How the study was asked for on the command line.
+    results : Results
+        Where they are written.
+    command : str
+        How the study is repeated on the command line.
+    title : str
+        Of the report; default the recording's name.
     """
 
-    def __init__(self, results: Results | Path, typed: Typed | None = None) -> None:
-        self._typed = typed
-        self._results = Results(results) if isinstance(results, Path) else results
+    def __init__(self, results: Results, command: str = "", *, title: str = "") -> None:
+        self._results, self._command, self._title = results, command, title
         self._saved: set[str] = set()
         self._next_page = 0.0
-        self._results.clear()
 
     def take(self, study: Study, *, last: bool = False) -> None:
         """Write what is new; the page only when it is due, or the last."""
@@ -100,7 +96,7 @@ class StudyFolder:
                 write("banded.json", to_text(best.banded))
         started = time.monotonic()
         if last or not board.pending or started >= self._next_page:
-            write("report.html", page(study, self._typed))
+            write("report.html", page(study, self._command, title=self._title))
             ended = time.monotonic()
             first = not board.rows  # the page of the first model is never waited for
             self._next_page = ended if first else ended + (ended - started) / PAGE_SHARE

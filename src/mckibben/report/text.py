@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mckibben.numerals import numeral
@@ -16,9 +16,16 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.bands import Calibration
     from mckibben.diagnosis.characterization import Characterization
     from mckibben.diagnosis.check import Validation
+    from mckibben.link.device import Device, State
+    from mckibben.link.driving import Driven
+    from mckibben.papers.experiment import Reproduction
+    from mckibben.papers.paper import Paper
     from mckibben.planning.planner import Plan
+    from mckibben.reading import Contents
+    from mckibben.recording import Recording
+    from mckibben.studying.simulating import Simulation
     from mckibben.studying.study import Study
-    from mckibben.workflow import Fit, Inverse, Tracking
+    from mckibben.workflow import Exported, Fit, Inverse, Tracking
 
 STARTS_MATTER = 0.05
 """Relative difference of the errors from rest and from fitted starts from which both are given."""
@@ -210,7 +217,7 @@ def inverse(found: Inverse) -> Iterator[str]:
             f"{units.get(name, '')}; references beyond are clipped."
         )
     if found.kind in ("inverse", "adaptive") and not found.reachable:
-        yield "What can be reached depends on load, past or other muscles; track states what was clipped."
+        yield "What can be reached depends on load, past or other muscles; track has what was clipped."
     for name, error in found.rmse.items():
         yield f"{name}: RMSE {numeral(error, 4)} {units[name]} on the recordings."
     if block.samples_ahead:
@@ -244,3 +251,150 @@ def plan(found: Plan) -> Iterator[str]:
 
 def _percent(share: float | None) -> str:
     return "-" if share is None else "over 100 %" if share > 1 else f"{numeral(100 * share, 2)} %"
+
+
+def exported(found: Exported) -> Iterator[str]:
+    """Return what a self-test printed, and how many files were written."""
+    yield from filter(None, (found.self_test, found.emulation))
+    libraries = [name for name in found.files if name.startswith("binaries/")]
+    yield from (f"Library: {name}" for name in libraries)
+    yield f"{len(found.files)} files" + ("" if libraries else "; start with README.md")
+
+
+def simulation(found: Simulation) -> Iterator[str]:
+    """Return the errors of a model over a recording, and what its band holds."""
+    ahead = "" if found.horizon is None else f", {found.horizon} samples ahead"
+    for name, one in found.metrics.items():
+        unit = found.recording.units[name]
+        yield (
+            f"{name}{ahead}: RMSE {numeral(one['rmse'], 4)}, MAE {numeral(one['mae'], 4)}, largest "
+            f"{numeral(one['max_error'], 4)} {unit}, R² {numeral(one['r2'], 5)}"
+        )
+        if found.interval is not None:
+            yield (
+                f"{name}: {numeral(100 * one['coverage'], 3)} % of the samples are within the band for "
+                f"{numeral(100 * found.interval, 3)} %, {numeral(one['band_width'], 3)} {unit} wide on "
+                "average"
+            )
+
+
+def models(every: Mapping[str, Any]) -> Iterator[str]:
+    """Return what every model is, and its settings."""
+    yield table(["model", "what it is"], [[name, one["summary"]] for name, one in every.items()])
+    for name, one in every.items():
+        listed = ", ".join(f"{key}={value}" for key, value in one["settings"].items())
+        yield f"\n{name} settings (--set NAME=VALUE): {listed}"
+
+
+def model(about: Mapping[str, Any]) -> Iterator[str]:
+    """Return what a saved model is."""
+    settable = ", ".join(f"{name}={value}" for name, value in about["settable"].items())
+    rows = {**about, "settable": settable}.items()
+    yield table(["", "value"], [[key, str(value)] for key, value in rows])
+
+
+def contents(found: Contents) -> Iterator[str]:
+    """Return the columns of files, the channels of recordings, and what these cannot identify."""
+    for file, columns in found.columns.items():
+        yield file
+        yield table(
+            ["column", "unit", "first cells", "read as"],
+            [[c.header, c.unit or "-", ", ".join(c.first), c.channel or "-"] for c in columns],
+        )
+    for recording, about in zip(found.recordings, found.to_dict()["recordings"], strict=True):
+        yield repr(recording)
+        yield table(
+            ["channel", "unit", "lowest", "highest", "at a limit", "stuck samples"],
+            [
+                [
+                    name,
+                    one["unit"] or "-",
+                    *(f"{one[end]:.6g}" for end in ("min", "max")),
+                    f"{100 * one['saturated']:.3g} %",
+                    str(one["stuck"]),
+                ]
+                for name, one in about["channels"].items()
+            ],
+        )
+        yield from (f"Note: {note}" for note in recording.notes)
+    yield ""
+    if isinstance(found.gaps, str):
+        yield f"Data gaps: unknown, {found.gaps}"
+        return
+    yield "Data gaps:" if found.gaps else "Data gaps: none"
+    yield from (f"- {words.gap_sentence(gap)} {words.gap_run(gap)}" for gap in found.gaps)
+
+
+def papers(found: Mapping[str, Paper]) -> Iterator[str]:
+    """Return what papers are about."""
+    for name, one in found.items():
+        yield f"{one.number}. {name}: {one.title}\n   {one.question}"
+
+
+def reproduction(found: Reproduction) -> Iterator[str]:
+    """Return the tables of a paper's re-run, and what it shows."""
+    from mckibben.report.reproduction import heading
+
+    for one in found.tables:
+        yield f"\n{heading(one, quick=found.quick)}"
+        rows = [[c if isinstance(c, str) else numeral(c, 4) for c in row] for row in one.rows]
+        yield table(one.columns, rows)
+        if one.text.note:
+            yield one.text.note
+    yield ""
+    yield from found.summary
+
+
+def device(found: Driven) -> Iterator[str]:
+    """Return what a device is, its ports, and what it did."""
+    one = found.device
+    yield (
+        f"Model {one.fingerprint}: a step every {one.period:g} s, safe after "
+        f"{one.period * one.silence:g} s of silence; {_state(one, found.before)}"
+    )
+    kinds = ["input"] * len(one.inputs) + ["output"] * len(one.outputs)
+    values = [*found.before.inputs.tolist(), *found.before.outputs.tolist()]
+    yield table(
+        ["", "channel", "unit", "lowest", "highest", "safe", "now"],
+        [
+            [
+                kind,
+                port.name,
+                port.unit,
+                numeral(port.low, 4),
+                numeral(port.high, 4),
+                numeral(port.safe, 4) if kind == "output" else "",
+                numeral(now, 5),
+            ]
+            for kind, port, now in zip(kinds, [*one.inputs, *one.outputs], values, strict=True)
+        ],
+    )
+    if found.after is not None:
+        yield f"Afterwards: {_state(one, found.after)}"
+
+
+def _state(device: Device, state: State) -> str:
+    pairs = zip(device.outputs, state.outputs.tolist(), strict=True)
+    outputs = ", ".join(f"{port.name} {numeral(value, 5)} {port.unit}" for port, value in pairs)
+    return f"{'safe' if state.is_safe else 'driven'} after {state.steps} steps: {outputs}"
+
+
+def rigs(found: Mapping[str, Any]) -> Iterator[str]:
+    """Return the rigs, protocols and signals."""
+    yield "Rigs:"
+    for name, one in found["rigs"].items():
+        yield f"  {name}: {one['title']}"
+        yield f"    driven by {', '.join(one['inputs'])}; measures {', '.join(one['outputs'])}"
+    yield "\nProtocols:"
+    for name, one in found["protocols"].items():
+        yield f"  {name}: {one['runs']} runs on {one['rig']}"
+    yield "\nSignals (--signal NAME:SETTING=VALUE,...):"
+    for name, settings in found["signals"].items():
+        yield f"  {name}: {', '.join(f'{key} ({kind})' for key, kind in settings.items())}"
+
+
+def ranges(recording: Recording) -> Iterator[str]:
+    """Return the range of every channel."""
+    for name, samples in recording.channels.items():
+        low, high = (numeral(float(end) + 0.0, 4) for end in (samples.min(), samples.max()))
+        yield f"{name}: {low} to {high} {recording.units[name]}"

@@ -28,9 +28,7 @@ def catalogue() -> dict[str, Any]:
     signals = {name: settings_of(name) for name in registry.names("signals")}
     named = ("title", "version", "inputs", "outputs")
     return {
-        "rigs": {
-            name: {key: getattr(rig, key) for key in named} for name, rig in rigs.items()
-        },
+        "rigs": {name: {key: getattr(rig, key) for key in named} for name, rig in rigs.items()},
         "protocols": {
             name: {"rig": plan.rig, "runs": len(plan.runs), "source": plan.source}
             for name, plan in plans.items()
@@ -160,10 +158,10 @@ def record_protocol(
         claim(files[run], inputs=[Path(rig or "")], force=force)
     write_text(place, text)
     recorded = record(plan, plant, runs=wanted, seed=seed, jobs=jobs)
-    for done, (run, recording) in enumerate(recorded, start=1):
-        write(recording, files[run.name])
+    for done, (made, recording) in enumerate(recorded, start=1):
+        write(recording, files[made.name])
         if progress is not None:
-            progress(done / len(wanted), run.name)
+            progress(done / len(wanted), made.name)
     return wanted, there
 
 

@@ -123,7 +123,9 @@ def simulated(
             metrics[name] = asdict(score(measured, modelled[name]))
             if banded is not None:
                 lower, upper = added[f"{name}_lower"], added[f"{name}_upper"]
-                metrics[name]["coverage"] = float(((lower <= measured) & (measured <= upper)).mean())
+                metrics[name]["coverage"] = float(
+                    ((lower <= measured) & (measured <= upper)).mean()
+                )
                 metrics[name]["band_width"] = float((upper - lower).mean())
     return Simulation(found, metrics, horizon, interval, tuple(notes))
 

@@ -50,7 +50,8 @@ def cache_folder() -> Path | None:
     from platformdirs import user_cache_path
 
     given = os.environ.get("NUMBA_CACHE_DIR")
-    folder = (Path(given).absolute() / "mckibben" if given else user_cache_path("mckibben")) / __version__
+    home = Path(given).absolute() / "mckibben" if given else user_cache_path("mckibben")
+    folder = home / __version__
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -60,7 +61,9 @@ def cache_folder() -> Path | None:
             return folder
     except OSError:
         pass
-    _note(f"{folder} cannot be used, so that every start compiles anew; set NUMBA_CACHE_DIR to a folder")
+    _note(
+        f"{folder} cannot be used, so that every start compiles anew; set NUMBA_CACHE_DIR to a folder"
+    )
     return None
 
 

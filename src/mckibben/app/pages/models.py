@@ -16,6 +16,7 @@ from mckibben.app.pages.choosing import Choice
 from mckibben.app.together import obstacle
 from mckibben.errors import ModelError
 from mckibben.estimators.catalogue import settings_of
+from mckibben.estimators.core.settings import setting_value
 
 FIT, FIT_MORE = "Models, by what they are for", "Fit more models, by what they are for"
 
@@ -80,7 +81,9 @@ def _fit(desk: Desk, choice: Choice) -> None:
     for model in choice.ticked:
         written = choice.settings.get(model, {})
         try:
-            given = settings_of(model, [f"{name}={text}" for name, text in written.items()])
+            given = settings_of(
+                model, {name: setting_value(text) for name, text in written.items()}
+            )
         except ModelError as error:
             tell(error)
             continue

@@ -11,7 +11,7 @@ from mckibben import registry
 from mckibben.app.desk import labelled, named, tell
 from mckibben.errors import ModelError
 from mckibben.estimators.catalogue import full_name, settings_of
-from mckibben.estimators.core.settings import Setting, settings_with_defaults
+from mckibben.estimators.core.settings import Setting, setting_value, settings_with_defaults
 
 CHANNELS = ("input", "output", "scheduling")
 """What is chosen elsewhere."""
@@ -35,7 +35,7 @@ def ask(model: str, kept: Written) -> None:
 
         def done() -> None:
             try:
-                settings_of(model, [f"{name}={text}" for name, text in given.items()])
+                settings_of(model, {name: setting_value(text) for name, text in given.items()})
             except ModelError as error:
                 tell(error)
                 return

@@ -1,1 +1,1 @@
-"""The commands: a module each, with its help as docstring and a ``command``."""
+"""The commands: a module each, of its name, with its help as docstring."""

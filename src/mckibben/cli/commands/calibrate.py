@@ -43,6 +43,8 @@ def calibrate(
     banded.save(out)
     notes = [words.calibrated_on_blocks(found)] if found.band.unit == "block" else []
     if not known:
-        notes.append("whether the model was fitted to these recordings is checked with --fitted FILE")
+        notes.append(
+            "whether the model was fitted to these recordings is checked with --fitted FILE"
+        )
     about = {"file": str(out)} | found.to_dict() | {"notes": notes}
     show(about, lambda: text.calibration(found), as_json, notes, [out])

@@ -52,4 +52,6 @@ def _export(
     show(found, lambda: text.exported(found), as_json, written=[out])
 
 
-command = click.Group("export", help=__doc__, commands={one.name or "": one for one in (c, fmu, ros2)})
+export = click.Group(
+    "export", help=__doc__, commands={one.name or "": one for one in (c, fmu, ros2)}
+)

@@ -23,10 +23,12 @@ def info(
     as_json: Json = False,
 ) -> None:
     from mckibben import registry
-    from mckibben.blocks.saving import is_model
+    from mckibben.blocks.saving import load
+    from mckibben.blocks.setting import summary
     from mckibben.errors import DataError
     from mckibben.estimators.catalogue import described
-    from mckibben.files.look import look
+    from mckibben.files import has_columns
+    from mckibben.reading import look
     from mckibben.report import text
 
     if models:
@@ -41,10 +43,8 @@ def info(
             f"{named[0]!r} is a model, and there is no file of that name",
             remedy="list the models with `models`, or give a file",
         )
-    if len(files) == 1 and is_model(files[0]):
-        from mckibben.workflow import description
-
-        about = description(files[0])
+    if len(files) == 1 and files[0].suffix.lower() == ".json" and not has_columns(files[0]):
+        about = summary(load(files[0]))
         show(about, lambda: text.model(about), as_json)
         return
     found = look(files, reading, inputs, outputs)

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 @command
 def measured(
     folder: Annotated[
-        Path, Argument("FOLDER", "A folder for every set of recordings, each with its channels.toml.")
+        Path,
+        Argument("FOLDER", "A folder for every set of recordings, each with its channels.toml."),
     ],
     out: Annotated[Path, Option("Folder for measured.md and measured.csv.", "DIR", "-o")] = Path(
         "measured"

@@ -35,4 +35,6 @@ def show_(
         say(muscles.described(muscle), end="")
 
 
-command = click.Group("muscles", help=__doc__, commands={one.name or "": one for one in (list_, show_)})
+muscles = click.Group(
+    "muscles", help=__doc__, commands={one.name or "": one for one in (list_, show_)}
+)

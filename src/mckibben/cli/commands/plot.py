@@ -35,9 +35,9 @@ def plot(
 
     format_of(out)  # another ending is refused now
     claim(out, inputs=[*files, *([] if model is None else [model])], force=force)
-    recordings, *pair = read_pair(files, input, output, reading)
+    recordings, given, moved = read_pair(files, input, output, reading)
     if model is None:
-        plot_recording(recordings, *pair, kind or "loop", out)
+        plot_recording(recordings, given, moved, kind or "loop", out)
     else:
         plot_model(load(model), recordings, kind or "fit", out)
     say(f"Written: {out}")

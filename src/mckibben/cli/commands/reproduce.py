@@ -41,7 +41,9 @@ def reproduce(
     from mckibben.report import text
 
     if listed:
-        show([one.summary() for one in papers().values()], lambda: text.papers(papers()), as_json)
+        every = papers()
+        about = [{"name": key} | one.about() for key, one in every.items()]
+        show(about, lambda: text.papers(every), as_json)
         return
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give `listed`")

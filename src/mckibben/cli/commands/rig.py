@@ -14,7 +14,8 @@ from mckibben.options import Jobs, Option, Seed, setting
 
 Name = Annotated[str, Argument("RIG", "Name of a rig, or its file (.toml).")]
 Changes = Annotated[
-    dict[str, Any], Option("Change the rig: payload=10; repeatable.", "NAME=VALUE", "--set", setting)
+    dict[str, Any],
+    Option("Change the rig: payload=10; repeatable.", "NAME=VALUE", "--set", setting),
 ]
 
 
@@ -115,9 +116,7 @@ def run(
 def record(
     protocol: Annotated[str, Argument("PROTOCOL", "Protocol to record; see rig list.")],
     out: Annotated[Path, Option("Folder to write the recordings to.", "DIR", "-o")],
-    rig: Annotated[
-        str | None, Option("Rig to record on. Default: the protocol's.", "RIG")
-    ] = None,
+    rig: Annotated[str | None, Option("Rig to record on. Default: the protocol's.", "RIG")] = None,
     changes: Changes = {},  # noqa: B006
     file_format: Annotated[
         Literal["csv", "tsv", "parquet"], Option("Of the files.", flag="--format")
@@ -175,6 +174,6 @@ def new(
     say(f"Written: {file}. Next: mckibben rig run {file} --signal triangle:period=10 -o run.csv")
 
 
-command = click.Group(
+rig = click.Group(
     "rig", help=__doc__, commands={one.name or "": one for one in (list_, show_, run, record, new)}
 )

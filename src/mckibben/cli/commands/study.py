@@ -48,7 +48,8 @@ def study(
         if not so_far.leaderboard.rows and not as_json:
             for line in text.study_begun(so_far):
                 say(line)
-            say(f"Report: {workflow.unfinished(out) / 'report.html'}, updated with every model.\n", flush=True)
+            live = workflow.unfinished(out) / "report.html"
+            say(f"Report so far, updated with every model: {live}\n", flush=True)
 
     with stoppable(out), progress_bar("study:", plainly=True) as tell:
         found = workflow.study(
@@ -65,4 +66,9 @@ def study(
         stop_short(found.leaderboard, out)
     about = {"folder": str(out)} | found.to_dict()
     about["notes"] = notes_by_file([*found.train, *found.test])
-    show(about if as_json else found, lambda: text.study(found), as_json, written=[out / "report.html"])
+    show(
+        about if as_json else found,
+        lambda: text.study(found),
+        as_json,
+        written=[out / "report.html"],
+    )

@@ -10,7 +10,7 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Algorithm 1.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -39,6 +39,7 @@ from mckibben.estimators.coupled.fuzzy import (
 from mckibben.estimators.hysteresis.pi import play_operators
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
+from mckibben.metrics import rmse
 from mckibben.presets import preset
 from mckibben.recording import Recording
 
@@ -336,6 +337,24 @@ def coupled(memories: list[Block], runs: list[Run], data: TrainingData) -> Coupl
             if j != i:
                 gains[i, j] = float(v @ run.outputs[:, j]) / float(v @ v)
     return Coupling(rows(gains), data.outputs, data.outputs)
+
+
+def trained_inverse(
+    model: Block,
+    recordings: Sequence[Recording],
+    seed: int = 0,
+    progress: Callable[[float, float], None] | None = None,
+) -> tuple[Series, dict[str, float]]:
+    """Return `learned_inverse` by the paper's swarm, and its RMSE on the recordings by output."""
+    search = Search("pso", SDCHMEstimator.search_samples, printed_swarm(), seed)
+    tracker = Tracker(progress=progress)
+    inverse = learned_inverse(model, recordings, search=search, tracker=tracker)
+    tracker.end()
+    pairs = [(one, inverse.simulate(one)) for one in recordings]
+    return inverse, {
+        channel.name: rmse(*(np.concatenate([p[k][channel.name] for p in pairs]) for k in (0, 1)))
+        for channel in inverse.outputs
+    }
 
 
 def learned_inverse(

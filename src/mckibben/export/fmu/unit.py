@@ -17,7 +17,6 @@ import sys
 import tarfile
 import tempfile
 import uuid
-import zipfile
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
@@ -33,8 +32,8 @@ from mckibben.export.c.project import described, source_files
 from mckibben.export.folders import write_texts, zipped
 from mckibben.export.programs import own_compiler, run
 from mckibben.export.templating import literals, render
-from mckibben.system.results import claim
 from mckibben.system.atomic import replacing
+from mckibben.system.results import claim
 
 HERE = Path(__file__).parent
 

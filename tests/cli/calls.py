@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import click
 import numpy as np
 
 from mckibben import GPI, PI, Recording, write
+from mckibben.cli.main import app
 from mckibben.rigs import describe, load_rig
 from mckibben.signals import triangle
 
@@ -50,11 +54,6 @@ CALLS: dict[str, Call] = {
     "invert": call_of(f"{MODEL} --predictive -o out.json", MODEL),
     "track": call_of(f"{INVERSE} --rig {RIG} --reference {RUN} -o out.csv", INVERSE, RUN, RIG),
     "plan": call_of(f"{RUN} --model pi.json --minutes 0.5 -o out.csv", RUN, "pi.json"),
-    "ros": call_of(
-        f"{INVERSE} --reference reference --pressure pressure --highest 6 --duration 0.05"
-        " -o out.mcap",
-        INVERSE,
-    ),
     "plot": call_of(f"{RUN} --model {MODEL} -o out.png", RUN, MODEL),
     "reproduce": call_of("multistate --quick --jobs 1"),
     "info": call_of(RUN),
@@ -90,3 +89,13 @@ def files(folder: Path) -> None:
     PI.example().save(folder / "pi.json")
     GPI.example().inverse().save(folder / INVERSE)
     (folder / RIG).write_text(describe(load_rig("mas20-hanging")))
+
+
+def commands(group: Any = app, path: tuple[str, ...] = ()) -> Iterator[tuple[str, click.Command]]:
+    """Yield every command of the command line by the words that call it."""
+    for name in group.list_commands(click.Context(group)):
+        found = group.get_command(click.Context(group), name)
+        if isinstance(found, click.Group):
+            yield from commands(found, (*path, name))
+        else:
+            yield " ".join((*path, name)), found

@@ -88,7 +88,7 @@ def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: P
     assert written == {
         *("report.html", "characterization.json", "inverse.json"),
         *("validation.json", "banded.json"),
-        *("leaderboard.csv", "leaderboard.json", "results.sha256"),
+        *("leaderboard.csv", "leaderboard.json", "run.json"),
         *("models/pi.json", "models/gpi.json"),
     }
     assert load(folder / "inverse.json").inverse() == load(folder / "models" / "gpi.json")

@@ -6,14 +6,12 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
+import click
 import pytest
-import typer
 
 import mckibben
-from mckibben.cli.main import app
-from tests.cli.calls import CALLS, files
+from tests.cli.calls import CALLS, commands, files
 from tests.cli.conftest import Cli
 from tests.golden.commands import answered
 
@@ -35,35 +33,25 @@ HARMLESS = {
     ("export c", "--sample-time", "1e300"),
     ("export fmu", "--sample-time", "1e300"),
     ("export ros2", "--sample-time", "1e300"),
-    ("ros", "--lowest", "-1"),
 }
 """Strange, and no error."""
 
-OTHERS = {("app", "--port"), ("app", "--host"), ("app", "--token")}
+OTHERS = {("app", "--port"), ("app", "--host")}
 """Of the workbench, which has tests of its own."""
 
 
-def options() -> Iterator[tuple[str, str, tuple[str, ...], Any]]:
+def options() -> Iterator[tuple[str, str, tuple[str, ...], str]]:
     """Yield every option that takes a value: its command, name, spellings and type."""
-
-    def walk(
-        command: Any, path: tuple[str, ...]
-    ) -> Iterator[tuple[str, str, tuple[str, ...], Any]]:
-        for name, inner in getattr(command, "commands", {}).items():
-            yield from walk(inner, (*path, name))
-        for option in command.params if path and not hasattr(command, "commands") else ():
-            if option.param_type_name == "option" and not option.is_flag:
-                kind = getattr(option, "type_descriptor", None) or option.type
-                yield " ".join(path), option.opts[-1], tuple(option.opts), kind
-
-    yield from walk(typer.main.get_command(app), ())
+    for path, command in commands():
+        for option in command.params:
+            if isinstance(option, click.Option) and not option.is_flag:
+                yield path, option.opts[-1], tuple(option.opts), option.type.name
 
 
-def hostile(name: str, kind: Any) -> list[str]:
+def hostile(name: str, kind: str) -> list[str]:
     if name == "--set":
         return SETTINGS
-    said = f"{getattr(kind, 'annotation', '')} {getattr(kind, 'name', '')}".casefold()
-    return WHOLE if "int" in said else NUMBERS if "float" in said else WORDS
+    return {"integer": WHOLE, "float": NUMBERS}.get(kind, WORDS)
 
 
 CASES = [

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import ModelError, Recording, registry
+from mckibben import DataError, ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.leaderboard import inverse_of
@@ -29,6 +29,7 @@ from mckibben.estimators.catalogue import (
 )
 from mckibben.estimators.core.estimator import DefaultFor, Estimator, Purpose
 from mckibben.estimators.hysteresis.pi import PIEstimator
+from mckibben.options import setting
 
 FITTED = Path(__file__).parents[2] / "docs" / "models" / "fitted"
 MODELS = registry.names("estimators")
@@ -102,25 +103,21 @@ def test_a_load_that_some_recordings_lack_is_an_objection_of_those_that_are_told
 def test_settings_of_another_model_are_refused() -> None:
     for name in ("gpi", "pii"):
         with pytest.raises(ModelError, match=name):
-            settings_of("pi", [f"{name}.seed=3"])
+            settings_of("pi", {f"{name}.seed": 3})
 
 
-def test_settings_are_read_as_json_or_words() -> None:
-    said = [
-        "n_operators=7",
-        "nonnegative=false",
-        "initial=virgin",
-        "thresholds=[0,0.5]",
-        "pi.seed=3",
-    ]
+def test_settings_are_of_one_model_or_nested() -> None:
+    given = {"n_operators": 7, "nonnegative": False, "initial": "virgin", "pi.seed": 3}
     read = {"n_operators": 7, "nonnegative": False, "initial": "virgin", "seed": 3}
-    assert settings_of("pi", said) == read | {"thresholds": (0, 0.5)}
-    with pytest.raises(ModelError, match="n_operators"):
-        settings_of("pi", ["n_operators"])
+    assert settings_of("pi", given) == read
+    assert settings_of("pi", {"pi": read}) == read
+    assert setting("thresholds=[0,0.5]") == ("thresholds", (0, 0.5))
+    with pytest.raises(DataError):
+        setting("n_operators")
 
 
 def test_a_bare_setting_goes_to_the_models_that_have_it() -> None:
-    found = settings_of_all(["pi", "bouc-wen"], ["n_operators=7", "bouc-wen.seed=3"])
+    found = settings_of_all(["pi", "bouc-wen"], {"n_operators": 7, "bouc-wen.seed": 3})
     assert found == {"pi": {"n_operators": 7}, "bouc-wen": {"seed": 3}}
     with pytest.raises(ModelError, match="n_operators"):
-        settings_of_all(["bouc-wen"], ["n_operators=7"])
+        settings_of_all(["bouc-wen"], {"n_operators": 7})

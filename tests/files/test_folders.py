@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mckibben.outputs import claim, never
 
 import mckibben
 from mckibben import DataError, Recording
 from mckibben.files.channels import NAME, described
 from mckibben.files.sources import roles
 from mckibben.measured.sets import split_of
+from mckibben.system.results import claim
 from tests.files.made import Cells, one, put, refused, several
 
 N = 60
@@ -213,9 +213,9 @@ def test_join_names_those_that_belong_together(tmp_path: Path) -> None:
     for read in (tmp_path, firsts[0]):  # nothing that is read with a path is written to
         for written in ("1_stroke.csv", NAME):
             with pytest.raises(DataError) as caught:
-                claim(tmp_path / written, never, inputs=[read], force=True)
+                claim(tmp_path / written, inputs=[read], force=True)
             assert caught.value.file == tmp_path / written
-        claim(tmp_path / "new.csv", never, inputs=[read])
+        claim(tmp_path / "new.csv", inputs=[read])
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 from mckibben.errors import DataError
+from mckibben.outputs import RUN as LISTED
+from mckibben.outputs import Results, digest
 from mckibben.system.atomic import PART, write_json, write_text
-from mckibben.system.results import RUN as LISTED
-from mckibben.system.results import Results, digest
 from tests.cli.calls import CALLS, INVERSE, MODEL, RIG, RUN, call_of, files
 from tests.cli.conftest import Cli
 

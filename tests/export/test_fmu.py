@@ -162,12 +162,13 @@ def test_what_makes_no_fmu_is_refused(tmp_path: Path) -> None:
 def test_the_same_model_gives_the_same_bytes_and_a_file_stays(tmp_path: Path) -> None:
     path = exported(MODELS["SDCHM inverse"], tmp_path, platforms=[])
     before = path.read_bytes()
+    exported(MODELS["SDCHM inverse"], tmp_path, platforms=[])
+    assert path.read_bytes() == before
+    path.write_bytes(b"mine")
     with pytest.raises(DataError) as refused:
         exported(MODELS["pi"], tmp_path, platforms=[])
     assert refused.value.file == path
-    assert path.read_bytes() == before
-    exported(MODELS["SDCHM inverse"], tmp_path, platforms=[], force=True)
-    assert path.read_bytes() == before
+    assert path.read_bytes() == b"mine"
 
 
 def test_units_are_in_si(tmp_path: Path) -> None:

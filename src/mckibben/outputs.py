@@ -12,7 +12,7 @@ import json
 import os
 import shutil
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -62,19 +62,16 @@ def claim(path: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = 
 
     path, inputs = Path(path), list(inputs)
     for one in filter(None, (path, description(path))):
-        _claim(one, inputs, force, is_ours)
+        _claim(one, inputs, force, is_ours(one))
 
 
-def _claim(
-    path: Path, inputs: Iterable[str | Path], force: bool, ours: Callable[[Path], bool]
-) -> None:
+def _claim(path: Path, inputs: Iterable[str | Path], force: bool, ours: bool) -> None:
     refuse_inputs(path, inputs)
     demand_room(path)
     with written(path):
         link = path.is_symlink()
-        if force or not (link or (path.exists() and path.stat().st_size)):
-            return
-    if link or not ours(path):
+        in_the_way = link or (path.exists() and path.stat().st_size)
+    if in_the_way and not force and (link or not ours):
         raise DataError(
             f"there is a {'link' if link else 'file'} of that name that this program did not write, "
             "or that was changed since",
@@ -166,7 +163,7 @@ class Results:
                 )
             if nearest == path.parent:
                 own = bool(listed) if name == RUN else _holds(path, listed.get(name))
-                _claim(path, self._inputs, self._force, lambda _, own=own: own)
+                _claim(path, self._inputs, self._force, own)
 
     def write_text(self, name: str, text: str) -> None:
         """Write a file in UTF-8, beside the earlier ones, by its path in the folder."""
@@ -177,7 +174,7 @@ class Results:
         self._digests[name] = digest(text.encode())
 
     def commit(self) -> None:
-        """Put the files in their places, and remove those of the earlier run that were not changed.
+        """Put the files in their places, and remove others of the earlier run that were not changed.
 
         Raises
         ------
@@ -185,7 +182,8 @@ class Results:
             If a file in their places was changed while the run went.
         """
         self.claim(self._digests)
-        removed = {n: old for n, old in _listed(self.folder).items() if n not in self._digests}
+        earlier = _listed(self.folder).items()
+        removed = {n: old for n, old in earlier if n not in self._digests and self._removable(n)}
         write_json(self.new / RUN, {"format": FORMAT, "version": 1, "files": self._digests})
         journal = {"files": [*self._digests, RUN], "removed": removed}
         write_json(self.new / JOURNAL, journal)
@@ -193,6 +191,13 @@ class Results:
             (self.new / JOURNAL).replace(self.folder / UNFINISHED / JOURNAL)
         _finish(self.folder)
         self._digests = {}
+
+    def _removable(self, name: str) -> bool:
+        """Return whether a file that is listed is in the folder, and is no input."""
+        with suppress(DataError):
+            refuse_inputs(_inside(self.folder, name), self._inputs)
+            return True
+        return False
 
 
 @contextmanager

@@ -146,7 +146,8 @@ class Workers:
         for link in list(self._processes)[: len(waiting)]:
             begin(link)
         while busy:
-            for link in set(connection.wait(list(busy))) & busy.keys():
+            ready = set(connection.wait(list(busy)))
+            for link in [link for link in busy if link in ready]:
                 index = busy[link]
                 try:
                     kind, what = understood(link.recv_bytes())

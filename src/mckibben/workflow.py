@@ -61,9 +61,9 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.check import Validation
     from mckibben.diagnosis.review import Review
     from mckibben.estimators.core.estimator import Estimator
+    from mckibben.outputs import Results
     from mckibben.planning.planner import Plan
     from mckibben.studying.study import Study
-    from mckibben.system.results import Results
 
 Progress = bool | Tell | None
 
@@ -310,8 +310,8 @@ def _compared(
     from mckibben.comparison.backends import on_cluster
     from mckibben.estimators.catalogue import settings_of_all
     from mckibben.files.sources import expanded
+    from mckibben.outputs import results_in
     from mckibben.system import workers
-    from mckibben.system.results import results_in
 
     if chosen.jobs != 1 and chosen.dask is None:
         workers.prepare()
@@ -589,8 +589,8 @@ def check(
     from mckibben.diagnosis.check import check as find
     from mckibben.diagnosis.description import describe
     from mckibben.files.sources import expanded
+    from mckibben.outputs import results_in
     from mckibben.report.check_page import write_check
-    from mckibben.system.results import results_in
 
     files: Data = loaded(data) or expanded([], files_of(data))[2]
     names = ["validation.json", "report.html"]
@@ -705,7 +705,7 @@ def export(
     from mckibben.export.c.emulation import emulate
     from mckibben.export.naming import name_from
     from mckibben.export.programs import self_test
-    from mckibben.system.results import refuse_inputs
+    from mckibben.outputs import refuse_inputs
 
     kinds = {"c": COptions, "fmu": FMUOptions, "ros2": ExportOptions}
     chosen: Any = given_options(kinds[target], options, given)
@@ -755,7 +755,7 @@ def _serving(chosen: COptions) -> Any:
 
 def unfinished(folder: str | Path) -> Path:
     """Return where results are until a run is complete."""
-    from mckibben.system.results import UNFINISHED
+    from mckibben.outputs import UNFINISHED
 
     return Path(folder) / UNFINISHED / "new"
 
@@ -787,7 +787,7 @@ def _text(path: Path | None) -> str | None:
 
 def _claim(out: str | Path | None, read: Sequence[Path], force: bool) -> Path | None:
     """Refuse to write over what is read or the user's, before any work; return the path."""
-    from mckibben.system.results import claim
+    from mckibben.outputs import claim
 
     if out is None:
         return None

@@ -6,16 +6,14 @@ import errno
 import json
 import os
 import shutil
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mckibben.errors import DataError
-from mckibben.system.atomic import PART, write_json, write_text
-from mckibben.system.results import RUN as LISTED
-from mckibben.system.results import Results, digest
+from mckibben.outputs import RUN as LISTED
+from mckibben.system.atomic import PART, digest, write_text
 from tests.cli.calls import CALLS, INVERSE, MODEL, RIG, RUN, call_of, files
 from tests.cli.conftest import Cli
 
@@ -184,26 +182,6 @@ def test_results_are_not_written_over_recordings_in_the_same_folder(cli: Cli, fo
         assert result.code == 2
         assert "leaderboard.csv" in result.err
     assert held(runs) == before
-
-
-def test_a_hostile_list_of_files_removes_nothing_elsewhere(tmp_path: Path) -> None:
-    (tmp_path / "mine").write_text("mine")
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "elsewhere" / "pi.json").write_text("mine")
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "models").symlink_to(tmp_path / "elsewhere")
-    names = ("../mine", str(tmp_path / "mine"), "models/pi.json")
-    content = {"format": "mckibben-run", "version": 1}
-    write_json(out / LISTED, content | {"files": {name: digest(b"mine") for name in names}})
-    results = Results(out, force=True)
-    with pytest.raises(DataError):
-        results.claim(["models/pi.json"])
-    results.write_text("report.html", "new")
-    with suppress(DataError):
-        results.commit()
-    assert (tmp_path / "mine").exists()
-    assert (tmp_path / "elsewhere" / "pi.json").exists()
 
 
 def test_planted_links_are_not_written_through_and_rights_stay(

@@ -14,13 +14,13 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "arrays", "registry", "presets", "numerals", "version", "example", "system"},
+    {"errors", "arrays", "registry", "presets", "numerals", "version", "system"},
     {"recording", "signals", "metrics", "statistics"},
     {"files"},
     {"rigs"},
     {"blocks"},
     {"muscles"},
-    {"estimators", "export", "stream", "link", "outputs", "checkpoints"},
+    {"estimators", "export", "stream", "link", "outputs", "checkpoints", "example"},
     {"control", "simulators", "ros"},
     {"environments"},
     {"comparison", "diagnosis"},
@@ -40,7 +40,7 @@ BASE = {"arrays", "errors"}
 STANDS_ON = {
     "files": {"files", "recording", "registry", "system", *BASE},
     "rigs": {"rigs", "recording", "signals", "registry", "system", "metrics", *BASE},
-    "export": {"export", "blocks", "registry", "system", *BASE},
+    "export": {"export", "blocks", "outputs", "registry", "system", *BASE},
     "stream": {"stream", "blocks", *BASE},
     "link": {"link", "export", "blocks", *BASE},
     "control": {

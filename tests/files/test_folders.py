@@ -14,7 +14,7 @@ from mckibben import DataError, Recording
 from mckibben.files.channels import NAME, described
 from mckibben.files.sources import roles
 from mckibben.measured.sets import split_of
-from mckibben.system.results import claim
+from mckibben.outputs import claim
 from tests.files.made import Cells, one, put, refused, several
 
 N = 60

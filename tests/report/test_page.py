@@ -20,13 +20,13 @@ from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
 from mckibben.diagnosis.description import describe
 from mckibben.numerals import number, percent
+from mckibben.outputs import Results
 from mckibben.recording import Recording
 from mckibben.report import StudyFolder, templating, write_report
 from mckibben.report.commands import commands
 from mckibben.report.description_subjects import figures
 from mckibben.report.page import page
 from mckibben.studying.study import Study
-from mckibben.system.results import Results
 from tests.report.studies_by_hand import measured, renamed, study
 
 SECTIONS = {

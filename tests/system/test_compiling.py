@@ -5,13 +5,17 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
+from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 
 import cloudpickle
 import numpy as np
 import pytest
 
-from mckibben.system.compiling import deferred
+from mckibben.errors import CacheWarning
+from mckibben.system.compiling import cache_folder, deferred
 
 HEAVY = {"sklearn", "numba", "scipy.optimize", "pandas", "joblib", "pint", "plotly"}
 """Half a second to several, each."""
@@ -86,6 +90,59 @@ def test_a_kernel_kept_notices_what_changes_in_the_files_that_it_calls(tmp_path:
     ):
         (tmp_path / "called.py").write_text(content)
         assert printed("import calling", tmp_path, **own) == expected
+
+
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "truncated": lambda content: content[: len(content) // 2],
+    "garbled": lambda content: content[:-9] + bytes(9),
+    "empty": lambda content: b"",
+    "of another version": lambda content: sha256(b"K\x01.").digest() + b"K\x01.",
+    "no pickle": lambda content: sha256(b"text").digest() + b"text",
+}
+
+
+def test_damaged_files_of_the_cache_are_compiled_again(tmp_path: Path) -> None:
+    own = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    (tmp_path / "calling.py").write_text(CALLING)
+    (tmp_path / "called.py").write_text(CALLED)
+    code = """
+import warnings
+with warnings.catch_warnings(record=True) as noted:
+    warnings.simplefilter("always")
+    from calling import grown
+    grown(1.0)
+print(len(noted))
+"""
+    assert printed(code, tmp_path, **own) == ["6.0 0", "0"]
+    files = list((tmp_path / "cache").rglob("*.nbc"))
+    assert len(files) == 2
+    for damage in DAMAGES.values():
+        for path in files:
+            path.write_bytes(damage(path.read_bytes()))
+        assert printed(code, tmp_path, **own) == ["6.0 0", "1"]
+    assert printed(code, tmp_path, **own) == ["6.0 1", "0"]
+
+
+def test_what_other_versions_cached_goes_in_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    kept = []
+    for version, days in (("0.0.1", 31), ("0.0.2", 1)):
+        folder = tmp_path / "mckibben" / version
+        folder.mkdir(parents=True)
+        for name in ("kernel.nbc", "mine.txt"):
+            (folder / name).write_text("")
+        then = time.time() - 86400 * days
+        os.utime(folder, (then, then))
+        kept += [folder / "mine.txt", *([folder / "kernel.nbc"] if days < 30 else [])]
+    found = cache_folder.__wrapped__()
+    assert found is not None
+    assert {*tmp_path.rglob("*.*")} - {*tmp_path.glob("*/*")} == {*kept}
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
+    with pytest.warns(CacheWarning):
+        assert cache_folder.__wrapped__() is None
 
 
 LOOPING = """

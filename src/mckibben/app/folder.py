@@ -14,7 +14,7 @@ import sys
 import time
 import unicodedata
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,6 @@ from typing import Any
 from mckibben.app import kept
 from mckibben.errors import DataError
 from mckibben.system.atomic import PART, write_text, written
-from mckibben.system.locks import Lock
 from mckibben.system.ordinary import DESCRIPTION, opened, read_bytes
 
 FOLDERS = (
@@ -49,8 +48,7 @@ TAKEN = ".json"
 class Folder:
     """A folder of plain files, for nobody else on this machine.
 
-    What a process writes here is for nobody else where it calls
-    `mckibben.system.locks.keep_to_the_user`.
+    What a process writes here is for nobody else where it sets `os.umask`.
 
     Parameters
     ----------
@@ -104,15 +102,23 @@ class Folder:
         DataError
             If the disk cannot lock files, or cannot keep others out.
         """
-        self._owner = Lock(self.folder / ".owner")
-        jobs = Lock(self.folder / ".working")
-        if not self._owner.take():
-            self.read_only = "another workbench has this folder open"
-        elif not jobs.take(patience=PATIENCE):
-            self.read_only = "jobs of a workbench that was killed have not ended yet"
-        else:
-            self._tidy()
-        jobs.leave()
+        from filelock import FileLock, Timeout
+
+        self._owner = FileLock(self.folder / ".owner", timeout=0, mode=0o600)
+        with written(self.folder):
+            try:
+                self._owner.acquire()
+                for path in self.folder.glob(".working-*"):
+                    with FileLock(path, timeout=PATIENCE):
+                        path.unlink(missing_ok=True)
+            except Timeout:
+                self.read_only = (
+                    "jobs of a workbench that was killed have not ended yet"
+                    if self._owner.is_locked
+                    else "another workbench has this folder open"
+                )
+            else:
+                self._tidy()
         for path, found in self._rights():
             if found.st_mode & 0o077:
                 raise DataError(
@@ -122,20 +128,15 @@ class Folder:
                 )
         return not self.read_only
 
-    def work(self) -> Lock:
-        """Let a job write here for as long as it holds what is returned, and lives.
+    @contextmanager
+    def work(self) -> Iterator[None]:
+        """Let a job write here: whoever claims the folder after this process was killed waits for it."""
+        from filelock import FileLock
 
-        Raises
-        ------
-        DataError
-            If a workbench is just taking the folder over.
-        """
-        held = Lock(self.folder / ".working")
-        if not held.take(shared=True, patience=PATIENCE):
-            raise DataError(
-                "another workbench took it over", file=self.folder, remedy="start again"
-            )
-        return held
+        path = self.folder / f".working-{os.getpid()}"
+        with written(path), FileLock(path, mode=0o600):
+            yield
+            path.unlink(missing_ok=True)
 
     def _tidy(self) -> None:
         """Take rights from others, and give names back that nothing came to bear.

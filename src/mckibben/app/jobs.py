@@ -11,7 +11,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -21,7 +21,6 @@ from mckibben.app import kept
 from mckibben.app.fields import said
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
-from mckibben.system.locks import keep_to_the_user
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 from mckibben.system.threads import cores
 from mckibben.system.workers import context, end_with_parent, prepare
@@ -313,9 +312,10 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     end_with_parent()
     if hasattr(os, "nice"):
         os.nice(KINDNESS)
-    keep_to_the_user()
+    os.umask(0o077)  # what is written is its user's alone
     workspace = Workspace(folder)
-    held = workspace.work()
+    held = ExitStack()
+    held.enter_context(workspace.work())
     path = workspace.path("jobs", f"{name}.progress")
     started, last = time.monotonic(), -TELLING
 
@@ -339,4 +339,4 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
         note(workspace, name, kind, given, state, by_name(workspace, message)[: kept.LONGEST])
     except DataError:
         sys.exit(UNWRITTEN)
-    held.leave()
+    held.close()

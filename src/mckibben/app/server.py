@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 import sys
 from collections.abc import Callable, Iterator
@@ -14,7 +15,6 @@ from mckibben.app.door import door, knock
 from mckibben.app.guard import checked_token, new_token
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
-from mckibben.system.locks import keep_to_the_user
 
 UNUSED = ("aiohttp", "requests", "tornado", "websocket")
 """Clients of the web, which the framework of the pages loads where it finds them: half a second."""
@@ -57,7 +57,7 @@ def serve(
         If the workspace cannot be made, the port is taken, or the token could be guessed.
     """
     token = new_token() if token is None else checked_token(token)
-    keep_to_the_user()
+    os.umask(0o077)  # what is written is its user's alone
     workspace = Workspace(folder)
     port = _free(host, port)
     workspace.claim()

@@ -89,7 +89,7 @@ def outcomes(work: Work, common: Any, items: Sequence[Any]) -> Iterator[Outcome]
         ):
             left.remove(index)
             kind, what = understood(answer)
-            yield Outcome(index, **{"value" if kind == "done" else "error": what})
+            yield Outcome(index, **{kind: what})
     except Exception as error:  # of the backend: what came before is kept
         failure = said(error)
     for index in sorted(left):

@@ -11,9 +11,9 @@ import tempfile
 from itertools import accumulate
 from pathlib import Path
 
+from mckibben.outputs import claim
 from mckibben.system.atomic import replacing, written
 from mckibben.system.compiling import cache_folder
-from mckibben.system.results import claim
 
 PACKED = Path(__file__).parent
 

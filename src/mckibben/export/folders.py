@@ -7,7 +7,7 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from mckibben.system.results import results_in
+from mckibben.outputs import results_in
 
 OLDEST = (1980, 1, 1, 0, 0, 0)
 """Date of the files in a zip, so that the same model gives the same bytes."""

@@ -17,7 +17,7 @@ from mckibben.files.notices import warn
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
 from mckibben.system import ordinary
-from mckibben.system.results import digest
+from mckibben.system.atomic import digest
 
 STILL = ("calibration", "pressure_reference")
 """What of a recording's meta applies to samples that were edited since."""

@@ -12,9 +12,8 @@ from mckibben.files import own
 from mckibben.files.table import Column, Table, column
 from mckibben.files.tree import without_numbers
 from mckibben.recording import Recording
-from mckibben.system.atomic import replacing
+from mckibben.system.atomic import digest, replacing
 from mckibben.system.extras import demand
-from mckibben.system.results import digest
 
 demand("pyarrow", "parquet", "Parquet")
 

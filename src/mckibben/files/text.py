@@ -26,9 +26,8 @@ from mckibben.files.notices import listed, warn
 from mckibben.files.sniffing import SEPARATORS, Layout, decoded, sniff
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
-from mckibben.system.atomic import replacing
+from mckibben.system.atomic import digest, replacing
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
-from mckibben.system.results import digest
 
 _SNIFFED = 2**18  # bytes by which the layout of a table is recognised
 

@@ -178,8 +178,8 @@ def measure(
         On sets that are not there, or an ``out`` that may not be written.
     """
     from mckibben.measured.page import page, table
+    from mckibben.outputs import results_in
     from mckibben.system import workers
-    from mckibben.system.results import results_in
 
     sets = sets_in(folder)
     if unknown := sorted({*only} - {one.name for one in sets}):

@@ -501,10 +501,10 @@ def rerun(
     It runs in a process of its own, which can be ended whatever it is at. Parameters are those of
     `reproduce`; ``out`` is the folder for ``report.html`` and ``tables.json``.
     """
+    from mckibben.outputs import results_in
     from mckibben.report.reproduction import reproduction_page
     from mckibben.system import threads, workers
     from mckibben.system.atomic import to_json
-    from mckibben.system.results import results_in
 
     paper(name)
     runs = None if data is None else _recordings(data, reading)

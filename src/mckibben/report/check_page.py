@@ -19,7 +19,7 @@ from mckibben.system.atomic import to_json
 if TYPE_CHECKING:
     from mckibben.diagnosis.check import Validation
     from mckibben.diagnosis.description import ModelDescription
-    from mckibben.system.results import Results
+    from mckibben.outputs import Results
 
 MOST_RECORDINGS = 4
 """Recordings with figures of their own: the longest."""

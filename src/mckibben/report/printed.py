@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mckibben.errors import DataError
+from mckibben.outputs import MAKER
 from mckibben.report.drawing import Curve, Drawing, Panel
 from mckibben.system.atomic import replacing
 from mckibben.system.extras import demand
-from mckibben.system.results import MAKER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

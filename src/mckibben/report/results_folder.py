@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from mckibben.blocks.saving import to_text
 from mckibben.diagnosis.refit import Refit
+from mckibben.outputs import Results
 from mckibben.report.page import page
 from mckibben.system.atomic import to_json
-from mckibben.system.results import Results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -133,7 +133,7 @@ def record_protocol(
     """
     from mckibben.files import write
     from mckibben.files.own import is_own
-    from mckibben.system.results import claim
+    from mckibben.outputs import claim
 
     plant = load_rig(rig or protocol(name).rig).changed(changes or {})
     plan = protocol(name, plant)

@@ -7,9 +7,11 @@ import math
 import os
 import secrets
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +23,10 @@ PART = ".mckibben-"
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """Give a temporary path in the same folder, and rename it to ``path`` when all went well.
+    """Open a temporary path in the same folder, and rename it to ``path`` when all went well.
 
-    The temporary file is new, whatever is lying in wait there, and has the rights of the one that it
-    replaces, or those that the process gives to new files. A link of that name is replaced itself: what
-    it leads to stays as it is.
+    The temporary file is new, and has the rights of the file that it replaces. A link of that name is
+    replaced itself: the file that it leads to stays as it is.
 
     Raises
     ------
@@ -35,7 +36,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     with written(path):
         before = _replaceable(path)
-        new = _begun(path)
+        new = _temporary(path)
         try:
             if before is not None and stat.S_ISREG(before.st_mode):
                 new.chmod(stat.S_IMODE(before.st_mode) & 0o777)
@@ -48,13 +49,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def written(path: str | Path) -> Iterator[None]:
-    """Say of what the operating system refuses which file is not written because of it.
-
-    Raises
-    ------
-    DataError
-        In place of an `OSError`.
-    """
+    """Raise a `DataError` that names this file in place of an `OSError`."""
     try:
         yield
     except OSError as error:
@@ -66,19 +61,14 @@ def written(path: str | Path) -> Iterator[None]:
 
 
 def demand_room(path: Path) -> None:
-    """Refuse a path in whose folder nothing can be written, before any work is done for it.
-
-    Raises
-    ------
-    DataError
-        As `written`.
-    """
+    """Refuse a path that `replacing` would refuse, before any work is done for it."""
     with written(path):
-        _begun(path).unlink()
+        _replaceable(path)
+        tempfile.TemporaryFile(dir=path.parent).close()
 
 
-def _begun(path: Path) -> Path:
-    """Make a file beside one, here and by nobody else: one or a link that was put there is refused."""
+def _temporary(path: Path) -> Path:
+    """Make a file beside one, which was not there before."""
     new = path.with_name(f"{PART}{secrets.token_hex(8)}.part")
     os.close(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     return new
@@ -89,18 +79,22 @@ def _replaceable(path: Path) -> os.stat_result | None:
     try:
         found = path.lstat()
     except (FileNotFoundError, NotADirectoryError):
-        if not path.parent.is_dir():
-            raise DataError(
-                "its folder does not exist", file=path, remedy="create the folder first"
-            ) from None
-        return None
+        if path.parent.is_dir():
+            return None
+        remedy = "create the folder first"
+        raise DataError("its folder does not exist", file=path, remedy=remedy) from None
     except ValueError as error:
-        raise DataError(f"no file has that name ({error})", file=path, remedy="mend it") from None
+        raise DataError(f"no file has that name ({error})", file=path, remedy="rename it") from None
     if path.is_dir():
         raise DataError("there is a folder of that name", file=path, remedy="name a file")
     if not (stat.S_ISREG(found.st_mode) or stat.S_ISLNK(found.st_mode)):
         raise DataError("there is a device or a pipe of that name", file=path, remedy="name a file")
     return found
+
+
+def digest(content: bytes) -> str:
+    """Return the SHA-256 of bytes, in hexadecimal digits."""
+    return sha256(content).hexdigest()
 
 
 def write_text(path: str | Path, text: str) -> None:

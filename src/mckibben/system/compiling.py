@@ -40,45 +40,36 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 _lock = threading.Lock()
 
-UNUSED = 60 * 86400.0
-"""Time after which a file that was not used is removed [s]."""
+UNUSED = 30 * 86400.0
+"""Time after which what other versions of the package cached is removed [s]."""
 
 
 @cache
 def cache_folder() -> Path | None:
-    """Return the folder for compiled functions, or None if there is none that is this user's."""
+    """Return the folder for compiled functions, or None if it cannot be written to."""
     from platformdirs import user_cache_path
 
     given = os.environ.get("NUMBA_CACHE_DIR")
-    home = Path(given).absolute() / "mckibben" if given else user_cache_path("mckibben")
-    folder = home / __version__
+    base = Path(given).absolute() / "mckibben" if given else user_cache_path("mckibben")
+    folder = base / __version__
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
-        found = folder.stat()
-        # what is there is run, so that nobody else may put anything there
-        if not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o022):
-            return folder
+        os.utime(folder)
     except OSError:
-        pass
-    _note(
-        f"{folder} cannot be used, so that every start compiles anew; set NUMBA_CACHE_DIR to a folder"
-    )
-    return None
+        _note(f"compiled functions are not cached: {folder} cannot be written to")
+        return None
+    for other in {base, *base.iterdir()} - {folder}:
+        with suppress(OSError):
+            if time.time() - other.stat().st_mtime > UNUSED:
+                for path in other.glob("*.nbc"):
+                    path.unlink()
+    return folder
 
 
 @cache
 def _note(text: str) -> None:
     warnings.warn(text, CacheWarning, stacklevel=2)
-
-
-@cache
-def _remove_unused(folder: Path) -> None:
-    """Remove files, of this version and of others, that were not used for long."""
-    for path in folder.parent.glob("*/*.nbc"):
-        with suppress(OSError):
-            if time.time() - path.stat().st_mtime > UNUSED:
-                path.unlink()
 
 
 class Deferred:
@@ -226,14 +217,12 @@ class _Cache:
 
         result: Any = compiler.CompileResult
         target_context.refresh()
-        file = self._file(signature, target_context.codegen())
         try:
-            content = file.read_bytes()
-            os.utime(file)
+            content = self._file(signature, target_context.codegen()).read_bytes()
             if sha256(content[DIGEST:]).digest() != content[:DIGEST]:
                 raise ValueError
             return result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
-        except FileNotFoundError:
+        except (FileNotFoundError, ImportError):  # of what it calls, which was elsewhere
             return None
         except Exception:  # whatever is wrong with it, it can be compiled again
             _note("compiled functions in the cache were damaged, and are compiled again")
@@ -248,7 +237,6 @@ class _Cache:
             return
         payload = dumps(compiled._reduce())
         file = self._file(signature, compiled.codegen)
-        _remove_unused(file.parent)
         with suppress(DataError, OSError), replacing(file) as new:
             new.write_bytes(sha256(payload).digest() + payload)
 

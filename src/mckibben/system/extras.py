@@ -1,4 +1,4 @@
-"""Libraries that only some need: asked for when they are, with how to get them."""
+"""Libraries that only some need."""
 
 from __future__ import annotations
 
@@ -9,27 +9,10 @@ from mckibben.errors import DataError
 
 
 def demand(module: str, extra: str, what: str, *, file: Path | None = None) -> None:
-    """Refuse what needs a library that is not installed.
+    """Raise `DataError` where a library is not installed, naming the extra that brings it.
 
-    Parameters
-    ----------
-    module : str
-        The library, as it is imported.
-    extra : str
-        What brings it: ``pip install 'mckibben[extra]'``.
-    what : str
-        What needs it, in the plural or as a mass: "figures", "Parquet".
-    file : Path, optional
-        That is read with it.
-
-    Raises
-    ------
-    DataError
-        Naming the extra.
+    ``what`` needs it, in the plural or as a mass: "figures", "Parquet"; ``file`` is read with it.
     """
     if find_spec(module) is None:
-        raise DataError(
-            f"{what}: the library {module} is not installed",
-            file=file,
-            remedy=f"pip install 'mckibben[{extra}]'",
-        )
+        problem = f"{what}: the library {module} is not installed"
+        raise DataError(problem, file=file, remedy=f"pip install 'mckibben[{extra}]'")

@@ -1,8 +1,7 @@
-"""Where every file is opened for reading: ordinary ones only, and no more of one than allowed.
+"""Files are opened for reading here: ordinary ones only, and no more of one than allowed.
 
-A pipe or a device of that name would wait or flow for ever, a link may lead round in circles, and a
-file may be larger than memory; what is opened here is looked at after it is open, so that nothing can
-be put in its place in between.
+A pipe or a device would wait or flow for ever, and a file may be larger than memory. What was opened is
+looked at, so that nothing can be put in its place in between.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ DESCRIPTION = 4 * 2**20
 """Bytes that a description (a sidecar, a protocol, a job, a rig) may have."""
 
 _SMALL = 2**16
-"""Bytes that are asked for without a look at how many there are."""
+"""Bytes that are read without a look at how many there are."""
 
 
 class _Ordinary(io.BufferedReader):
@@ -35,47 +34,32 @@ class _Ordinary(io.BufferedReader):
 
 @contextmanager
 def opened(path: str | Path, *, most: int) -> Iterator[BufferedReader]:
-    """Open an ordinary file for reading.
-
-    Parameters
-    ----------
-    path : str or Path
-    most : int
-        Bytes that it may have.
+    """Open an ordinary file of at most so many bytes for reading.
 
     Raises
     ------
     DataError
-        If it is missing, a folder, a pipe, a device or a circle of links, may not be read, or has more
-        bytes.
+        If it is missing, no ordinary file, may not be read, or has more bytes.
     """
-    path = Path(path)
     try:
         # without waiting for whoever writes to a pipe
-        number = os.open(
-            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-        )
+        flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        number = os.open(path, flags)
     except IsADirectoryError:
-        raise _folder(path) from None
+        raise DataError("this is a folder", file=path, remedy="give a file in it") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise DataError(
-            f"it cannot be read ({reason.lower()})",
-            file=path,
-            remedy="check the path and its rights",
-        ) from None
+        remedy = "check the path and its rights"
+        raise DataError(f"it cannot be read ({reason.lower()})", file=path, remedy=remedy) from None
     try:
         found = os.fstat(number)
         if stat.S_ISDIR(found.st_mode):
-            raise _folder(path)
+            raise DataError("this is a folder", file=path, remedy="give a file in it")
         if not stat.S_ISREG(found.st_mode):
             raise DataError("this is no ordinary file", file=path, remedy="give a file on disk")
         if found.st_size > most:
-            raise DataError(
-                f"{found.st_size} bytes are more than the {most} that are read",
-                file=path,
-                remedy="cut it into smaller files",
-            )
+            problem = f"{found.st_size} bytes are more than the {most} that are read"
+            raise DataError(problem, file=path, remedy="cut it into smaller files")
         with _Ordinary(io.FileIO(number, "rb", closefd=False)) as file:
             yield file
     finally:
@@ -89,18 +73,8 @@ def read_bytes(path: str | Path, *, most: int) -> bytes:
 
 
 def read_text(path: str | Path, *, most: int) -> str:
-    """Return what an ordinary file holds as text; errors are those of `opened`.
-
-    Raises
-    ------
-    DataError
-        Also if it is not UTF-8.
-    """
+    """Return what an ordinary file holds as text; it is also refused if that is not UTF-8."""
     try:
         return read_bytes(path, most=most).decode("utf-8-sig")  # which Windows' editors write
     except UnicodeDecodeError:
         raise DataError("it is not text in UTF-8", file=path, remedy="give a text file") from None
-
-
-def _folder(path: Path) -> DataError:
-    return DataError("this is a folder", file=path, remedy="give a file in it")

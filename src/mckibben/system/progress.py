@@ -1,18 +1,21 @@
-"""How far long work is: ``progress=True`` shows a bar, and a callable is told.
+"""Progress of long work: ``progress=True`` shows a bar, and a callable is called with it.
 
-What is told differs with the work: a share from 0 to 1, perhaps with words or the least error so far,
-or something that has a ``share`` and says itself.
+It is called with the share done, from 0 to 1, perhaps with words or the least error so far; or with an
+object that has a ``share`` and prints as words.
 """
 
 from __future__ import annotations
 
 import math
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from html import escape
 from importlib import import_module
 from typing import Any, TypeVar
+
+from mckibben.numerals import duration
 
 Tell = Callable[..., None]
 
@@ -21,65 +24,76 @@ Item = TypeVar("Item")
 
 @contextmanager
 def telling(progress: bool | Tell | None, what: str) -> Iterator[Tell | None]:
-    """Give what to tell how far work is; None where nobody wants to know.
+    """Return what is called with the progress of work; None where nobody wants it.
 
     Parameters
     ----------
     progress : bool, callable or None
-        Whether to show a bar, on standard error or in a notebook; or who is told.
+        Whether to show a bar, on standard error or in a notebook; or what is called.
     what : str
         The work, in a word or two.
     """
     if progress is not True:
         yield progress or None
         return
-    with (_in_notebook if _notebook() else _on_terminal)(what) as show:
-        yield lambda *told: show(*_read(told))
+    started = time.monotonic()
+    shell = sys.modules.get("IPython")
+    in_notebook = shell is not None and hasattr(shell.get_ipython(), "kernel")
+    with (_in_notebook if in_notebook else _on_terminal)(what) as show:
+
+        def tell(first: Any, *rest: Any) -> None:
+            share, words = getattr(first, "share", first), str(first)
+            if share is first:
+                words = ", ".join(filter(None, [_words(*rest), time_left(share, started)]))
+            show(share, words)
+
+        yield tell
+
+
+def _words(given: str | float = "", *_: object) -> str:
+    """Return words, or the least error in words.
+
+    >>> _words(1.234), _words("folds"), _words(math.inf), _words()
+    ('best so far 1.23', 'folds', '', '')
+    """
+    if isinstance(given, str):
+        return given
+    return f"best so far {given:.3g}" if math.isfinite(given) else ""
+
+
+def time_left(share: float, started: float) -> str:
+    """Return the time left, such as "about 40 s left", by the share done since a monotonic time.
+
+    Nothing within the first second, and at the end.
+    """
+    elapsed = time.monotonic() - started
+    if elapsed < 1 or not 0 < share < 1:
+        return ""
+    return f"about {duration(elapsed * (1 - share) / share)} left"
 
 
 def one_by_one(items: Iterable[Item], tell: Tell | None) -> Iterator[Item]:
-    """Give items one after another, and tell the share that is done."""
+    """Yield items one after another, and report the share that is done."""
     listed = list(items)
-    for place, item in enumerate(listed):
+    for place in range(len(listed) + 1):
         if tell is not None:
-            tell(place / len(listed), f"{place} of {len(listed)}")
-        yield item
-    if tell is not None:
-        tell(1.0, f"{len(listed)} of {len(listed)}")
-
-
-def _read(told: tuple[Any, ...]) -> tuple[float, str]:
-    """Return the share done and words.
-
-    >>> _read((0.5, 1.234)), _read((0.5, "folds"))
-    ((0.5, 'best so far 1.23'), (0.5, 'folds'))
-    """
-    first, *rest = told
-    if hasattr(first, "share"):
-        return first.share, str(first)
-    if rest and isinstance(rest[0], float):
-        return first, f"best so far {rest[0]:.3g}" if math.isfinite(rest[0]) else ""
-    return first, str(rest[0]) if rest else ""
-
-
-def _notebook() -> bool:
-    shell = sys.modules.get("IPython")
-    return shell is not None and hasattr(shell.get_ipython(), "kernel")
+            tell(place / len(listed) if listed else 1.0, f"{place} of {len(listed)}")
+        if place < len(listed):
+            yield listed[place]
 
 
 @contextmanager
 def _on_terminal(what: str) -> Iterator[Callable[[float, str], None]]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn
 
-    words = TextColumn("{task.description}", markup=False)
-    columns = (words, BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn())
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(what, total=1.0)
 
-        def show(share: float, said: str) -> None:
-            said = "".join(c if c.isprintable() else " " for c in said)
-            bar.update(task, completed=share, description=f"{what}: {said}" if said else what)
+        def show(share: float, words: str) -> None:
+            words = "".join(c if c.isprintable() else " " for c in words)
+            bar.update(task, completed=share, description=f"{what}: {words}" if words else what)
 
         yield show
 
@@ -88,9 +102,9 @@ def _on_terminal(what: str) -> Iterator[Callable[[float, str], None]]:
 def _in_notebook(what: str) -> Iterator[Callable[[float, str], None]]:
     shown: Any = import_module("IPython.display")
 
-    def html(share: float, said: str) -> Any:
+    def html(share: float, words: str) -> Any:
         bar = f'<progress value="{share:.4f}" max="1" style="vertical-align:middle"></progress>'
-        return shown.HTML(f"<div>{escape(what)} {bar} {escape(said)}</div>")
+        return shown.HTML(f"<div>{escape(what)} {bar} {escape(words)}</div>")
 
     place = shown.display(html(0.0, ""), display_id=True)
-    yield lambda share, said: place.update(html(share, said))
+    yield lambda share, words: place.update(html(share, words))

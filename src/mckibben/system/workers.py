@@ -1,9 +1,9 @@
-"""Processes that work for this one: quick to start, told apart, and ended at once.
+"""Processes that work for this one: quick to start, and ended at once.
 
-joblib's cannot be stopped within a second, do not tell how far they are, and load the library each for
-themselves; it serves clusters (`mckibben.comparison.backends`). These are forked, where the system can,
-from a server that has loaded the library. They never run the user's script again, do not hear Ctrl-C,
-and end with the process that they work for, however that one ends.
+joblib's cannot be stopped within a second and load the library each for themselves; it serves clusters
+(`mckibben.comparison.backends`). These are forked, where the system can, from a server that has loaded
+the library. They never run the user's script again, ignore Ctrl-C, and end with the process that they
+work for, however that one ends.
 """
 
 from __future__ import annotations
@@ -28,32 +28,29 @@ from mckibben.system import threads
 PRELOADED = ("mckibben.comparison.ranking", "mckibben.control", "numba", "scipy.optimize")
 """What the server loads, so that no process has to."""
 
-ONE_THREAD = (
-    "OPENBLAS_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
+ONE_THREAD = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
+"""Environment of the server."""
 
 MOST_JOBS = 4096
-"""Processes that may be asked for."""
 
 _starting = threading.Lock()
 
 Tell = Callable[..., None]
-"""Called by the work with whatever the caller is to be told."""
+"""Called by the work to report progress."""
 
 Work = Callable[[Any, Any, Tell], Any]
-"""Called with what all calls have in common, the item, and how to tell."""
+"""Called with what all calls have in common, the item, and a `Tell`."""
 
 
 class WorkerError(MckibbenError):
-    """The process that did the work ended without a word."""
+    """A process that did not return a result."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one item: a value, or an error.
+    """The result of one item, or its error.
 
     Parameters
     ----------
@@ -77,14 +74,14 @@ class Outcome:
 
 
 def in_turn(
-    work: Work, common: Any, items: Sequence[Any], told: Callable[..., None] | None = None
+    work: Work, common: Any, items: Sequence[Any], told: Tell | None = None
 ) -> Iterator[Outcome]:
     """Do the work in this process, one item after the other; see `Workers.results`."""
     for index, item in enumerate(items):
 
-        def tell(*what: Any, index: int = index) -> None:
+        def tell(*progress: Any, index: int = index) -> None:
             if told is not None:
-                told(index, *what)
+                told(index, *progress)
 
         tell()
         try:
@@ -117,34 +114,31 @@ class Workers:
     def __exit__(self, *_: object) -> None:
         for process in self._processes.values():
             process.kill()
-        for link, process in self._processes.items():
-            process.join()
-            link.close()
-        self._processes.clear()
+        for link in list(self._processes):
+            self._end(link)
 
     def results(
-        self, work: Work, items: Sequence[Any], told: Callable[..., None] | None = None
+        self, work: Work, items: Sequence[Any], told: Tell | None = None
     ) -> Iterator[Outcome]:
-        """Yield what comes of every item, as it comes; items are begun in their order.
+        """Yield the outcome of every item, as it comes; items are begun in their order.
 
         Parameters
         ----------
         work : callable
-            A function of a module; called with what is common, the item, and a callable to tell.
+            A function of a module.
         items : sequence
             What to work on.
         told : callable, optional
-            Called with an item's index when it is begun, and with what the work tells of it.
+            Called with an item's index when it is begun, and with its progress.
         """
         waiting = list(enumerate(items))[::-1]
         busy: dict[connection.Connection, int] = {}
 
         def begin(link: connection.Connection) -> None:
-            index, item = waiting.pop()
-            busy[link] = index
+            busy[link], item = waiting.pop()
             if told is not None:
-                told(index)
-            with suppress(ConnectionError):  # of one that has died, which is heard of next
+                told(busy[link])
+            with suppress(ConnectionError):  # of one that has died, which is noticed next
                 link.send_bytes(pickle.dumps((work, item)))
 
         while len(self._processes) < min(self.n, len(waiting)):
@@ -158,10 +152,16 @@ class Workers:
                 try:
                     kind, what = understood(link.recv_bytes())
                 except (EOFError, OSError):
-                    kind, what = "raised", self._bury(link)
+                    kind, what = (
+                        "error",
+                        WorkerError(
+                            f"its process ended (exit code {self._end(link)})",
+                            remedy="see whether memory is short; use fewer processes: `jobs=1`",
+                        ),
+                    )
                     del busy[link]
                     link = self._start() if waiting else link
-                if kind == "told":
+                if kind == "progress":
                     if told is not None:
                         told(index, *what)
                     continue
@@ -169,53 +169,38 @@ class Workers:
                     begin(link)
                 else:
                     busy.pop(link, None)
-                yield Outcome(index, **{"value" if kind == "done" else "error": what})
+                yield Outcome(index, **{kind: what})
 
     def _start(self) -> connection.Connection:
         ours, theirs = connection.Pipe()
-        process = context().Process(
-            target=_serve, args=(theirs, self._common, self._cores), daemon=False
-        )
+        arguments = (theirs, self._common, self._cores)
+        process = context().Process(target=_serve, args=arguments, daemon=False)
         with _without_the_script():
             process.start()
         theirs.close()
         self._processes[ours] = process
         return ours
 
-    def _bury(self, link: connection.Connection) -> WorkerError:
+    def _end(self, link: connection.Connection) -> int:
         process = self._processes.pop(link)
         process.join()
         link.close()
-        return WorkerError(
-            f"its process ended without a word (exit code {process.exitcode})",
-            remedy="see whether memory is short; give fewer processes with --jobs",
-        )
+        code: int = process.exitcode
+        return code
 
 
 def checked(jobs: int | None) -> int | None:
-    """Return a number of processes that was asked for.
-
-    Raises
-    ------
-    DataError
-        If it is below 1 or above `MOST_JOBS`.
-    """
+    """Return a number of processes; raise `DataError` if it is not from 1 to `MOST_JOBS`."""
     if jobs is not None and not 1 <= jobs <= MOST_JOBS:
-        raise DataError(f"jobs is {jobs}", remedy=f"give 1 to {MOST_JOBS}, or leave it out")
+        remedy = f"give 1 to {MOST_JOBS}, or leave it out"
+        raise DataError(f"it is {jobs}", parameter="jobs", remedy=remedy)
     return jobs
 
 
 def outcomes(
-    work: Work,
-    common: Any,
-    items: Sequence[Any],
-    n: int,
-    told: Callable[..., None] | None = None,
+    work: Work, common: Any, items: Sequence[Any], n: int, told: Tell | None = None
 ) -> Iterator[Outcome]:
-    """Yield what comes of every item, as it comes, from so many processes, or this one if it is one.
-
-    See `Workers.results`.
-    """
+    """Yield the outcome of every item, from so many processes, or this one; see `Workers.results`."""
     if min(n, len(items)) <= 1 or multiprocessing.current_process().daemon:  # has no children
         with threads.one_blas_thread():
             yield from in_turn(work, common, items, told)
@@ -225,17 +210,14 @@ def outcomes(
 
 
 def all_of(work: Work, items: Sequence[Any], jobs: int | None = None) -> list[Any]:
-    """Return what comes of every item, in their order; ``jobs`` processes, default as many as cores."""
+    """Return the results of all items, from ``jobs`` processes, default as many as cores."""
     n = checked(jobs) or threads.cores()
     found = {outcome.index: outcome.result() for outcome in outcomes(work, None, items, n)}
     return [found[index] for index in range(len(items))]
 
 
 def leave(code: int) -> NoReturn:
-    """End this process at once, whatever it is at; those that work for it end by themselves.
-
-    Temporary folders go, which `os._exit` alone would leave behind.
-    """
+    """End this process at once, without its temporary folders; those that work for it end, too."""
     with suppress(Exception):
         util._run_finalizers()  # type: ignore[attr-defined]  # typeshed lacks it
     os._exit(code)
@@ -246,23 +228,19 @@ def prepare() -> None:
     if context().get_start_method() != "forkserver":
         return
     with _starting:
-        _prepare()
-
-
-def _prepare() -> None:
-    resource_tracker.ensure_running()  # which else unblocks signals
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
-    # blocked signals stay blocked in whatever is started: no worker ever hears Ctrl-C
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        forkserver.ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        for name, value in before.items():
-            os.environ.pop(name, None)
-            if value is not None:
-                os.environ[name] = value
+        resource_tracker.ensure_running()  # which else unblocks signals
+        before = {name: os.environ.get(name) for name in ONE_THREAD}
+        os.environ.update(ONE_THREAD)
+        # blocked signals stay blocked in all that is started: no worker is stopped by Ctrl-C
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+            for name, value in before.items():
+                os.environ.pop(name, None)
+                if value is not None:
+                    os.environ[name] = value
 
 
 def _forget_the_server() -> None:
@@ -275,9 +253,9 @@ if hasattr(os, "register_at_fork"):
 
 
 def context() -> Any:
-    """Return how processes start: from a server that has loaded the library, where there can be one.
+    """Return how processes start: from a server that has loaded the library, or else spawned.
 
-    Where the caller set multiprocessing to spawn, or the system knows nothing else, they are spawned.
+    They are spawned where the caller set multiprocessing to that, or the system can do nothing else.
     """
     spawned = multiprocessing.get_start_method(allow_none=True) == "spawn"
     if spawned or "forkserver" not in multiprocessing.get_all_start_methods():
@@ -290,8 +268,8 @@ def context() -> Any:
 def end_with_parent() -> None:
     """End this process when the one that started it ends, however it does.
 
-    Where the system can, it does so itself: a thread would wait as long as compiled code keeps all
-    others from running.
+    On Linux the system does so: a thread would wait as long as compiled code keeps all others from
+    running.
     """
     parent = multiprocessing.parent_process()
     if parent is None:
@@ -320,53 +298,39 @@ def _serve(link: connection.Connection, common: Any, cores: int) -> None:
     threads.use_cores(cores)
     warnings.simplefilter("ignore")
 
-    with threads.one_blas_thread():
+    def tell(*progress: Any) -> None:
+        link.send_bytes(pickle.dumps(("progress", progress)))
+
+    def call(_: Any, given: bytes, tell: Tell) -> Any:
+        work, item = pickle.loads(given)
+        return work(common, item, tell)
+
+    with threads.one_blas_thread(), suppress(EOFError):
         while True:
-            try:
-                given = link.recv_bytes()
-            except EOFError:
-                return
-            try:
-                work, item = pickle.loads(given)
-            except Exception as error:
-                link.send_bytes(_packed("raised", _sendable(error)))
-                continue
-            link.send_bytes(
-                answered(work, common, item, lambda *what: link.send_bytes(_packed("told", what)))
-            )
+            link.send_bytes(answered(call, None, link.recv_bytes(), tell))
 
 
 def answered(work: Work, common: Any, item: Any, tell: Tell) -> bytes:
-    """Do the work, and return what came of it as it is sent: something that arrives, whatever it is."""
+    """Do the work, and return its value or error as it is sent; what cannot be sent is an error."""
     try:
-        value = work(common, item, tell)
+        return pickle.dumps(("value", work(common, item, tell)))
     except Exception as error:
-        return _packed("raised", _sendable(error))
+        with suppress(Exception):
+            answer = pickle.dumps(("error", error))
+            again = pickle.loads(answer)[1]
+            if type(again) is type(error) and str(again) == str(error):
+                return answer
+        return pickle.dumps(("error", WorkerError(said(error))))
+
+
+def understood(answer: bytes) -> tuple[str, Any]:
+    """Return whether an answer is progress, a value or an error, and what."""
     try:
-        return _packed("done", value)
+        kind, what = pickle.loads(answer)
+        return kind, what
     except Exception as error:
-        words = f"what it made, a {type(value).__name__}, cannot be sent: {said(error)}"
-        return _packed("raised", WorkerError(words))
-
-
-def understood(given: object) -> tuple[str, Any]:
-    """Return whether something was told, done or raised, and what; what is no answer is an error."""
-    if isinstance(given, Exception):
-        return "raised", WorkerError(f"the task failed: {said(given)}")
-    try:
-        kind, what = pickle.loads(given)  # type: ignore[arg-type]  # if it is none, that is told
-        if kind == "done" or (kind, type(what)) == ("told", tuple):
-            return kind, what
-        if kind == "raised" and isinstance(what, Exception):
-            return kind, what
-        words = "its process gave no answer that is understood"
-    except Exception as error:
-        words = f"what its process gave cannot be read: {said(error)}"
-    return "raised", WorkerError(f"{words}", remedy="use the same versions everywhere")
-
-
-def _packed(kind: str, what: Any) -> bytes:
-    return pickle.dumps((kind, what))
+        words = f"the answer of its process cannot be read: {said(error)}"
+        return "error", WorkerError(words, remedy="use the same versions everywhere")
 
 
 def said(error: Exception) -> str:
@@ -375,17 +339,6 @@ def said(error: Exception) -> str:
         return f"{type(error).__name__}: {error}"
     except Exception:
         return type(error).__name__
-
-
-def _sendable(error: Exception) -> Exception:
-    """Return an error that arrives: as it is where it can be made again, else in words."""
-    try:
-        if type(pickle.loads(pickle.dumps(error))) is type(error):
-            str(error)
-            return error
-    except Exception:
-        pass
-    return WorkerError(said(error))
 
 
 @contextmanager

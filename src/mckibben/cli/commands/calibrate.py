@@ -33,9 +33,9 @@ def calibrate(
 ) -> None:
     from mckibben.blocks.saving import load
     from mckibben.diagnosis.bands import calibration
+    from mckibben.outputs import claim
     from mckibben.reading import read_files
     from mckibben.report import text, words
-    from mckibben.system.results import claim
 
     claim(out, inputs=[model, *files, *fitted], force=force)
     block, known = load(model), read_files(fitted, None, reading)

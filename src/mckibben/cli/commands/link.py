@@ -35,8 +35,8 @@ def link(
     from mckibben.files import write
     from mckibben.link import Link
     from mckibben.link.driving import drive
+    from mckibben.outputs import claim
     from mckibben.report import text
-    from mckibben.system.results import claim
 
     if out is not None:
         if not settings:

@@ -28,10 +28,10 @@ def plot(
     force: Force = False,
 ) -> None:
     from mckibben.blocks.saving import load
+    from mckibben.outputs import claim
     from mckibben.reading import read_pair
     from mckibben.report.figures import plot_model, plot_recording
     from mckibben.report.printed import format_of
-    from mckibben.system.results import claim
 
     format_of(out)  # another ending is refused now
     claim(out, inputs=[*files, *([] if model is None else [model])], force=force)

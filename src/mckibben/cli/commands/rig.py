@@ -43,8 +43,8 @@ def show_(
 
     With -o it becomes a rig of your own, which is given by its file wherever a rig is asked for.
     """
+    from mckibben.outputs import claim
     from mckibben.rigs import describe, load_rig, save_rig
-    from mckibben.system.results import claim
 
     if out is not None:
         claim(out, inputs=[Path(name)], force=force)
@@ -86,10 +86,10 @@ def run(
     """
     from mckibben.errors import DataError
     from mckibben.files import read, write
+    from mckibben.outputs import claim
     from mckibben.report import text
     from mckibben.rigs import load_rig
     from mckibben.rigs.driving import at_first_commands, commands
-    from mckibben.system.results import claim
 
     claim(out, inputs=[Path(name), *([] if inputs is None else [inputs])], force=force)
     rig = load_rig(name).changed(changes)
@@ -161,8 +161,8 @@ def new(
     force: Force = False,
 ) -> None:
     """Make a rig of your own muscle from the numbers of its data sheet."""
+    from mckibben.outputs import claim
     from mckibben.rigs import rig_from_data_sheet, save_rig
-    from mckibben.system.results import claim
 
     claim(file, inputs=[], force=force)
     name = "".join(c if c.isalnum() else "-" for c in file.stem.lower()).strip("-") or "my-rig"

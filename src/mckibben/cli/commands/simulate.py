@@ -41,10 +41,10 @@ def simulate(
     as_json: Json = False,
 ) -> None:
     from mckibben.files import write
+    from mckibben.outputs import claim
     from mckibben.reading import read_files
     from mckibben.report import text
     from mckibben.studying.simulating import simulated
-    from mckibben.system.results import claim
     from mckibben.workflow import saved
 
     claim(out, inputs=[model, file], force=force)

@@ -32,8 +32,8 @@ from mckibben.export.c.project import described, source_files
 from mckibben.export.folders import write_texts, zipped
 from mckibben.export.programs import own_compiler, run
 from mckibben.export.templating import literals, render
+from mckibben.outputs import claim
 from mckibben.system.atomic import replacing
-from mckibben.system.results import claim
 
 HERE = Path(__file__).parent
 

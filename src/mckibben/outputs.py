@@ -1,0 +1,322 @@
+"""What a run writes: beside the earlier results, swapped in when complete, and never over the user's.
+
+In a folder of results, ``run.json`` lists the files of the last complete run with their digests. A run
+writes into ``unfinished/new``. When it is complete, it writes a journal of what goes where, and renames
+the files, ``run.json`` last. Whoever finds a journal finishes what is in it, so that a folder holds one
+run wholly, whenever a process is killed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from mckibben.errors import DataError
+from mckibben.system import ordinary
+from mckibben.system.atomic import demand_room, digest, write_json, write_text, written
+
+RUN = "run.json"
+"""Lists the files of the last complete run of a folder."""
+
+UNFINISHED = "unfinished"
+"""In a folder of results: the files of a run that is not complete, and its checkpoints."""
+
+JOURNAL = "journal.json"
+"""In that folder: what goes where, from when a run is complete until all of it is there."""
+
+FORMAT = "mckibben-run"
+
+MAKER = "drawn by mckibben"
+"""In the metadata of figures."""
+
+FIGURES = (".png", ".svg", ".pdf")
+
+LARGEST = 2**28
+"""Bytes of a file that is looked at; a larger one counts as the user's."""
+
+
+def claim(path: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = False) -> None:
+    """Refuse, before any work, an output that would replace what is not to be lost.
+
+    Parameters
+    ----------
+    path : path
+        File that will be written; of a text file with a recording, also the description beside it.
+    inputs : iterable of path
+        What is read for it; these are never replaced.
+    force : bool
+        Whether a file of the user's may be replaced: one that this package did not write, or that was
+        changed since. A saved model or a figure that was edited counts as the package's.
+
+    Raises
+    ------
+    DataError
+        If it may not be replaced, or cannot be written.
+    """
+    from mckibben.files.own import description
+
+    path, inputs = Path(path), list(inputs)
+    for one in filter(None, (path, description(path))):
+        _claim(one, inputs, force, is_ours(one))
+
+
+def _claim(path: Path, inputs: Iterable[str | Path], force: bool, ours: bool) -> None:
+    refuse_inputs(path, inputs)
+    demand_room(path)
+    with written(path):
+        link = path.is_symlink()
+        in_the_way = link or (path.exists() and path.stat().st_size)
+    if in_the_way and not force and (link or not ours):
+        raise DataError(
+            f"there is a {'link' if link else 'file'} of that name that this program did not write, "
+            "or that was changed since",
+            file=path,
+            remedy="give another name, or replace it with `force`",
+        )
+
+
+def is_ours(path: Path) -> bool:
+    """Return whether a file was written by this package, and is as it was; models may be edited."""
+    from mckibben.files.own import is_own
+
+    listed = _listed(path.parent)
+    if path.name in listed:
+        return _holds(path, listed[path.name])
+    with suppress(DataError, zipfile.BadZipFile), ordinary.opened(path, most=LARGEST) as file:
+        if path.suffix == ".fmu":
+            return "sources/unit_model.h" in zipfile.ZipFile(file).namelist()
+        start = file.read(256)
+        if path.suffix.lower() in FIGURES:
+            return MAKER.encode() in start + file.read()
+        if b"".join(start.split()).startswith(b'{"format":"mckibben-'):
+            return True
+    return is_own(path)
+
+
+def refuse_inputs(path: str | Path, inputs: Iterable[str | Path]) -> None:
+    """Refuse an output that is an input, part of one, or the description beside one, by any name.
+
+    Raises
+    ------
+    DataError
+        If it is.
+    """
+    from mckibben.files.sources import read_with
+
+    for given in inputs:
+        for read in read_with(Path(given)):
+            if _same(Path(path), read):
+                problem = f"it is read from {read}, so it is not written to"
+                raise DataError(problem, file=path, remedy="give another name")
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except (OSError, ValueError):
+        return os.path.normcase(os.path.realpath(one)) == os.path.normcase(os.path.realpath(other))
+
+
+class Results:
+    """The files of a run, in a folder that no other process writes to; see `results_in`.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists.
+    inputs : iterable of path
+        What is read for the results; never replaced.
+    force : bool
+        Whether files of the user's may be replaced.
+    """
+
+    def __init__(
+        self, folder: Path, *, inputs: Iterable[str | Path] = (), force: bool = False
+    ) -> None:
+        self.folder, self.new = folder, folder / UNFINISHED / "new"
+        self._inputs, self._force = list(inputs), force
+        self._digests: dict[str, str] = {}
+        _inside(folder, f"{UNFINISHED}/new/{RUN}")
+        _finish(folder)
+        with written(self.new):
+            if self.new.exists():  # of a run that was stopped
+                shutil.rmtree(self.new)
+
+    def claim(self, names: Iterable[str]) -> None:
+        """Refuse now what could not be written later: files by their path in the folder.
+
+        Only what is listed in ``run.json``, and was not changed since, is replaced without ``force``.
+        """
+        listed = _listed(self.folder)
+        for name in (RUN, *names):
+            path = _inside(self.folder, name)
+            nearest = next(each for each in path.parents if os.path.lexists(each))
+            if not nearest.is_dir():
+                problem = "there is a file where a folder will be"
+                raise DataError(
+                    problem, file=nearest, remedy="move it away, or give another folder"
+                )
+            if nearest == path.parent:
+                own = bool(listed) if name == RUN else _holds(path, listed.get(name))
+                _claim(path, self._inputs, self._force, own)
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write a file in UTF-8, beside the earlier ones, by its path in the folder."""
+        path = _inside(self.new, name)
+        with written(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        write_text(path, text)
+        self._digests[name] = digest(text.encode())
+
+    def commit(self) -> None:
+        """Put the files in their places, and remove others of the earlier run that were not changed.
+
+        Raises
+        ------
+        DataError
+            If a file in their places was changed while the run went.
+        """
+        self.claim(self._digests)
+        earlier = _listed(self.folder).items()
+        removed = {n: old for n, old in earlier if n not in self._digests and self._removable(n)}
+        write_json(self.new / RUN, {"format": FORMAT, "version": 1, "files": self._digests})
+        journal = {"files": [*self._digests, RUN], "removed": removed}
+        write_json(self.new / JOURNAL, journal)
+        with written(self.folder):
+            (self.new / JOURNAL).replace(self.folder / UNFINISHED / JOURNAL)
+        _finish(self.folder)
+        self._digests = {}
+
+    def _removable(self, name: str) -> bool:
+        """Return whether a file that is listed is in the folder, and is no input."""
+        with suppress(DataError):
+            refuse_inputs(_inside(self.folder, name), self._inputs)
+            return True
+        return False
+
+
+@contextmanager
+def results_in(
+    folder: str | Path | None,
+    names: Iterable[str],
+    *,
+    inputs: Iterable[str | Path] = (),
+    force: bool = False,
+) -> Iterator[Results | None]:
+    """Open a folder of results, made where it is missing, to which this process alone writes.
+
+    Parameters
+    ----------
+    folder : path or None
+        None where no results are written.
+    names : iterable of str
+        Files that will be written, by their path in the folder; claimed now.
+    inputs, force
+        As for `claim`.
+
+    Raises
+    ------
+    DataError
+        If another process writes there, or something may not be replaced.
+    """
+    if folder is None:
+        yield None
+        return
+    from filelock import FileLock, Timeout
+
+    folder = Path(folder)
+    place, new = folder / UNFINISHED, folder / UNFINISHED / "new"
+    lock, existed = place / "lock", folder.exists()
+    with written(folder):
+        if new.exists() and not lock.exists():  # which stays as long as there is a run to finish
+            problem = "this is in the way of unfinished results, and is not this program's"
+            raise DataError(problem, file=new, remedy="move it away, or give another folder")
+        place.mkdir(parents=True, exist_ok=True)
+        held = FileLock(lock, timeout=0)
+        try:
+            held.acquire()
+        except Timeout:
+            problem = "another process is writing its results there"
+            remedy = "wait until it has ended, or give another folder"
+            raise DataError(problem, file=folder, remedy=remedy) from None
+    try:
+        found = Results(folder, inputs=inputs, force=force)
+        found.claim(names)
+        yield found
+    finally:
+        _prune(new)
+        if not new.exists():
+            lock.unlink(missing_ok=True)
+        held.release()
+        for empty in (place, folder) if not existed else (place,):
+            with suppress(OSError):  # not empty
+                empty.rmdir()
+
+
+def _finish(folder: Path) -> None:
+    """Finish what is in a journal, if there is one: the process that wrote it may have been killed."""
+    place, new = folder / UNFINISHED / JOURNAL, folder / UNFINISHED / "new"
+    if not os.path.lexists(place):
+        return
+    try:
+        journal = json.loads(ordinary.read_text(place, most=ordinary.DESCRIPTION))
+        files, removed = list(journal["files"]), dict(journal["removed"])
+    except (ValueError, TypeError, KeyError):
+        remedy = "move it away, and look at the files in the folder `new` beside it"
+        raise DataError("the journal is damaged", file=place, remedy=remedy) from None
+    for name, old in removed.items():
+        path = _inside(folder, name)
+        if _holds(path, old):
+            with written(path):
+                path.unlink()
+            with suppress(OSError):  # not empty
+                path.parent.rmdir()
+    for name in files:
+        path, source = _inside(folder, name), _inside(new, name)
+        with written(path):
+            if source.exists():
+                path.parent.mkdir(parents=True, exist_ok=True)
+                source.replace(path)
+    with written(place):
+        place.unlink()
+    _prune(new)
+
+
+def _prune(folder: Path) -> None:
+    """Remove folders that are empty."""
+    for place, _, _ in os.walk(folder, topdown=False):
+        with suppress(OSError):
+            Path(place).rmdir()
+
+
+def _listed(folder: Path) -> Mapping[str, str]:
+    """Return the digests by file that the last run noted; none where it is absent or damaged."""
+    try:
+        found = json.loads(ordinary.read_text(folder / RUN, most=ordinary.DESCRIPTION))
+        return dict(found["files"]) if found["format"] == FORMAT else {}
+    except (DataError, ValueError, TypeError, KeyError):
+        return {}
+
+
+def _holds(path: Path, expected: str | None) -> bool:
+    """Return whether a file, not a link, has this digest."""
+    if path.is_symlink():
+        return False
+    try:
+        return digest(ordinary.read_bytes(path, most=LARGEST)) == expected
+    except DataError:
+        return False
+
+
+def _inside(folder: Path, name: str) -> Path:
+    """Return a file of a folder; refuse it where links or the name lead out of it."""
+    path = folder / name
+    if not path.parent.resolve().is_relative_to(folder.resolve()):
+        problem = "its folder is a link that leads elsewhere"
+        raise DataError(problem, file=path, remedy="remove the link")
+    return path

@@ -132,18 +132,30 @@ def loaded(data: Data) -> list[Recording] | None:
     """Return data that are recordings already, rather than files."""
     if isinstance(data, Recording):
         return [data]
-    if isinstance(data, str | Path):
+    if not isinstance(data, Sequence) or isinstance(data, str):
         return None
     found = [one for one in data if isinstance(one, Recording)]
     return found or None
 
 
 def files_of(data: Data) -> list[Path]:
-    """Return the files among data; none of recordings."""
-    if isinstance(data, Recording):
-        return []
-    listed = [data] if isinstance(data, str | Path) else data
-    return [Path(one) for one in listed if not isinstance(one, Recording)]
+    """Return the files among data; none of recordings.
+
+    Raises
+    ------
+    DataError
+        If data are neither.
+    """
+    if isinstance(data, Recording | str | Path):
+        data = [data]
+    if not (
+        isinstance(data, Sequence) and all(isinstance(d, Recording | str | Path) for d in data)
+    ):
+        raise DataError(
+            f"these are no recordings: {type(data).__name__}",
+            remedy="give recordings, or files; Recording.from_frame makes one of a data frame",
+        )
+    return [Path(one) for one in data if not isinstance(one, Recording)]
 
 
 def read_files(
@@ -163,6 +175,7 @@ def read_files(
     from mckibben.files import read
 
     reading = reading or ReadOptions()
+    files_of(data)
     found: list[Recording] = []
     for one in [data] if isinstance(data, Recording | str | Path) else data:
         if isinstance(one, Recording):

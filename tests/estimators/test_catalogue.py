@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import DataError, ModelError, Recording, registry
+from mckibben import ModelError, Recording, registry
 from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.leaderboard import inverse_of
@@ -112,7 +112,7 @@ def test_settings_are_of_one_model_or_nested() -> None:
     assert settings_of("pi", given) == read
     assert settings_of("pi", {"pi": read}) == read
     assert setting("thresholds=[0,0.5]") == ("thresholds", (0, 0.5))
-    with pytest.raises(DataError):
+    with pytest.raises(ValueError):
         setting("n_operators")
 
 

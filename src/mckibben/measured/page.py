@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.leaderboard import Leaderboard, Row
-from mckibben.measured.running import Outcome
+from mckibben.errors import DataError
+from mckibben.measured.running import Outcome, outcomes
+from mckibben.measured.sets import sets_in
 from mckibben.numerals import numeral
 from mckibben.report import words
 from mckibben.report.columns import columns_of_board
@@ -176,3 +180,66 @@ def _section(one: Outcome) -> Iterator[str]:
     yield from (f"- {note}" for note in notes)
     if notes:
         yield ""
+
+
+def measure(
+    folder: Path,
+    out: Path,
+    *,
+    only: Sequence[str] = (),
+    models: str | Sequence[str] = "all",
+    seed: int = 0,
+    jobs: int | None = None,
+    force: bool = False,
+    progress: Callable[[float, str], None] | None = None,
+    found: Callable[[Outcome], None] | None = None,
+) -> list[Outcome]:
+    """Compare all models on all sets of a folder, and write one page, ``measured.md``, and a table.
+
+    Parameters
+    ----------
+    folder, out : Path
+        With a folder for every set; where to write, outside of it.
+    only : sequence of str
+        Names of sets; default all.
+    models, seed, jobs
+        As for `outcomes`.
+    force : bool
+        Whether files of the user's may be replaced.
+    progress, found : callable, optional
+        Called with the share done and words; and with every outcome.
+
+    Raises
+    ------
+    DataError
+        On sets that are not there, or an ``out`` that may not be written.
+    """
+    from mckibben.outputs import results_in
+    from mckibben.system import workers
+
+    sets = sets_in(folder)
+    if unknown := sorted({*only} - {one.name for one in sets}):
+        listed = ", ".join(one.name for one in sets)
+        problem = f"there is no set {unknown[0]!r} in it"
+        raise DataError(problem, file=folder, remedy=f"use one of {listed}")
+    if out.resolve().is_relative_to(folder.resolve()):
+        problem = f"it is inside {folder}, where the next run would read results as recordings"
+        raise DataError(problem, file=out, remedy="give a folder elsewhere")
+    chosen = [one for one in sets if not only or one.name in only]
+    if jobs != 1:
+        workers.prepare()
+    inputs = [one.folder for one in chosen]
+    with results_in(out, ["measured.md", "measured.csv"], inputs=inputs, force=force) as results:
+        every: list[Outcome] = []
+        for one in outcomes(chosen, models=models, seed=seed, jobs=jobs, folder=out, tell=progress):
+            every.append(one)
+            if found is not None:
+                found(one)
+        if results is not None:
+            named = models if isinstance(models, str) else ",".join(models)
+            words = "" if named == "all" else f" --models {named}"
+            results.write_text("measured.md", page(every, f"mckibben measured FOLDER{words}"))
+            results.write_text("measured.csv", table(every).to_csv(index=False))
+            results.commit()
+        Checkpoints(out).clear()
+    return every

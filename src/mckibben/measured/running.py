@@ -14,7 +14,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.comparison.ranking import Standing, compare
 from mckibben.errors import DataError, MckibbenError
-from mckibben.measured.sets import Set, Task, parted, sets_in
+from mckibben.measured.sets import Set, Task, parted
 from mckibben.recording import Recording
 
 
@@ -143,67 +143,3 @@ def outcomes(
         seconds = time.perf_counter() - started
         notes = tuple(f"{r.name}: {note}" for r in (*train, *test) for note in r.notes)
         yield Outcome(one, task, board, span, seconds, notes=notes)
-
-
-def measure(
-    folder: Path,
-    out: Path,
-    *,
-    only: Sequence[str] = (),
-    models: str | Sequence[str] = "all",
-    seed: int = 0,
-    jobs: int | None = None,
-    force: bool = False,
-    progress: Callable[[float, str], None] | None = None,
-    found: Callable[[Outcome], None] | None = None,
-) -> list[Outcome]:
-    """Compare all models on all sets of a folder, and write one page, ``measured.md``, and a table.
-
-    Parameters
-    ----------
-    folder, out : Path
-        With a folder for every set; where to write, outside of it.
-    only : sequence of str
-        Names of sets; default all.
-    models, seed, jobs
-        As for `outcomes`.
-    force : bool
-        Whether files of the user's may be replaced.
-    progress, found : callable, optional
-        Called with the share done and words; and with every outcome.
-
-    Raises
-    ------
-    DataError
-        On sets that are not there, or an ``out`` that may not be written.
-    """
-    from mckibben.measured.page import page, table
-    from mckibben.outputs import results_in
-    from mckibben.system import workers
-
-    sets = sets_in(folder)
-    if unknown := sorted({*only} - {one.name for one in sets}):
-        listed = ", ".join(one.name for one in sets)
-        problem = f"there is no set {unknown[0]!r} in it"
-        raise DataError(problem, file=folder, remedy=f"use one of {listed}")
-    if out.resolve().is_relative_to(folder.resolve()):
-        problem = f"it is inside {folder}, where the next run would read results as recordings"
-        raise DataError(problem, file=out, remedy="give a folder elsewhere")
-    chosen = [one for one in sets if not only or one.name in only]
-    if jobs != 1:
-        workers.prepare()
-    inputs = [one.folder for one in chosen]
-    with results_in(out, ["measured.md", "measured.csv"], inputs=inputs, force=force) as results:
-        every: list[Outcome] = []
-        for one in outcomes(chosen, models=models, seed=seed, jobs=jobs, folder=out, tell=progress):
-            every.append(one)
-            if found is not None:
-                found(one)
-        if results is not None:
-            named = models if isinstance(models, str) else ",".join(models)
-            words = "" if named == "all" else f" --models {named}"
-            results.write_text("measured.md", page(every, f"mckibben measured FOLDER{words}"))
-            results.write_text("measured.csv", table(every).to_csv(index=False))
-            results.commit()
-        Checkpoints(out).clear()
-    return every

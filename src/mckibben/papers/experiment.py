@@ -8,7 +8,7 @@ from __future__ import annotations
 import string
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -21,7 +21,6 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError, ModelWarning
 from mckibben.estimators.optimisers.tracker import whole_searches
 from mckibben.papers.paper import FigureText, Paper, TableText, paper
-from mckibben.reading import ReadOptions, read_files
 from mckibben.recording import REST_LENGTH, Recording, conversion
 from mckibben.rigs import Rig, load_rig, record
 from mckibben.signals.protocol import Protocol, Role, protocol
@@ -481,70 +480,3 @@ def thinned(values: Sequence[float] | Array, most: int = MOST) -> Array:
     """Return every k-th value, so that at most so many are left."""
     array = np.asarray(values, dtype=np.float64)
     return array[:: max(1, -(-array.size // most))]
-
-
-def rerun(
-    name: str,
-    data: Path | None = None,
-    reading: ReadOptions | None = None,
-    *,
-    rig: str | None = None,
-    out: Path | None = None,
-    quick: bool = False,
-    seed: int = 0,
-    jobs: int | None = None,
-    force: bool = False,
-    progress: Progress | None = None,
-) -> Reproduction:
-    """Run a paper's experiment again on a rig or on a folder of recordings, and write its report.
-
-    It runs in a process of its own, which can be ended whatever it is at. Parameters are those of
-    `reproduce`; ``out`` is the folder for ``report.html`` and ``tables.json``.
-    """
-    from mckibben.outputs import results_in
-    from mckibben.report.reproduction import reproduction_page
-    from mckibben.system import threads, workers
-    from mckibben.system.atomic import to_json
-
-    paper(name)
-    runs = None if data is None else _recordings(data, reading)
-    given: dict[str, Any] = {
-        "name": name,
-        "rig": rig and load_rig(rig),
-        "data": runs,
-        "quick": quick,
-    }
-    given |= {"seed": seed, "jobs": jobs, "folder": out}
-    inputs = [] if data is None else [data]
-    with results_in(out, ["report.html", "tables.json"], inputs=inputs, force=force) as results:
-        with workers.Workers(1, cores=jobs or threads.cores()) as one:
-            (outcome,) = one.results(
-                _again, [given], lambda index, *news: progress(*news) if progress and news else None
-            )
-        found: Reproduction = outcome.result()
-        if results is not None:
-            results.write_text("report.html", reproduction_page(found))
-            results.write_text("tables.json", to_json(found.to_dict()) + "\n")
-            results.commit()
-        Checkpoints(out).clear()
-    return found
-
-
-def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Reproduction:
-    """Run a paper again in a worker's process."""
-    return reproduce(**given, clear=False, progress=tell)
-
-
-def _recordings(folder: Path, reading: ReadOptions | None) -> list[Recording]:
-    """Return the recordings of a folder, each named as its file."""
-    from mckibben.files.sources import inside
-
-    if not folder.is_dir():
-        raise DataError("there is no such folder", file=folder, remedy="name one with recordings")
-    found: list[Recording] = []
-    for path in inside(folder):
-        parts = read_files(path, None, reading)
-        for place, one in enumerate(parts, start=1):
-            name = f"{path.stem}-{place}" if len(parts) > 1 else path.stem
-            found.append(replace(one.with_meta(name=name), start_time=0.0))
-    return found

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mckibben import registry
-from mckibben.report.results_folder import model_file
 
 if TYPE_CHECKING:
     from mckibben.recording import Recording
@@ -56,3 +55,12 @@ def commands(study: Study, command: str = "") -> list[tuple[str, str]]:
 def _files(recordings: Sequence[Recording]) -> list[str]:
     sources = [recording.source or f"{recording.name}.csv" for recording in recordings]
     return list(dict.fromkeys(sources))
+
+
+def model_file(model: str) -> str:
+    """Return where in the folder a model is saved.
+
+    >>> model_file("memory a load")
+    'models/memory-a-load.json'
+    """
+    return f"models/{''.join(c if c.isalnum() or c in '-.' else '-' for c in model)}.json"

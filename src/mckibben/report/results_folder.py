@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from mckibben.blocks.saving import to_text
 from mckibben.diagnosis.refit import Refit
 from mckibben.outputs import Results
+from mckibben.report.commands import model_file
 from mckibben.report.page import page
 from mckibben.system.atomic import to_json
 
@@ -21,15 +22,6 @@ PAGE_SHARE = 0.1
 """Share of the time that may go into pages which the next model makes old."""
 
 LEADERBOARD = ("leaderboard.json", "leaderboard.csv")
-
-
-def model_file(model: str) -> str:
-    """Return where in the folder a model is saved.
-
-    >>> model_file("memory a load")
-    'models/memory-a-load.json'
-    """
-    return f"models/{''.join(c if c.isalnum() or c in '-.' else '-' for c in model)}.json"
 
 
 def study_files(models: Iterable[str]) -> list[str]:

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from mckibben.planning.planner import Plan
     from mckibben.reading import Contents
     from mckibben.recording import Recording
+    from mckibben.studying.results import Exported, Fit, Inverse, Tracking
     from mckibben.studying.simulating import Simulation
     from mckibben.studying.study import Study
-    from mckibben.workflow import Exported, Fit, Inverse, Tracking
 
 STARTS_MATTER = 0.05
 """Relative difference of the errors from rest and from fitted starts from which both are given."""
@@ -175,9 +175,9 @@ def calibration(found: Calibration) -> Iterator[str]:
 
 def tracking(found: Tracking) -> Iterator[str]:
     """Return how a reference was followed, with and without compensation."""
-    tracked, without, chosen = found.tracked, found.uncompensated.tracked, found.options
+    tracked, without = found.tracked, found.uncompensated.tracked
     measure = tracked.recording.units[next(iter(tracked.rmse))]
-    ways = [(chosen.controller, tracked), ("no compensation", without)]
+    ways = [(found.law, tracked), ("no compensation", without)]
     rows = [
         [name, way, numeral(one.rmse[name], 3), numeral(one.largest[name], 3)]
         for name in tracked.rmse
@@ -187,8 +187,8 @@ def tracking(found: Tracking) -> Iterator[str]:
     for note in found.notes:  # before what they put in doubt
         yield f"Note: {note}"
     yield table(["channel", "controller", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
-    kind = "virtual rig" if chosen.rig is not None else "model"
-    yield f"Plant: {found.plant.name} ({kind}), seed {chosen.seed}."
+    kind = "virtual rig" if found.virtual else "model"
+    yield f"Plant: {found.plant.name} ({kind}), seed {found.seed}."
     for name, size in tracked.scatter.items():
         yield f"The plant's own scatter of {name}: {numeral(size, 3)} {measure} RMS."
     if tracked.clipped >= len(tracked.recording):
@@ -276,6 +276,12 @@ def simulation(found: Simulation) -> Iterator[str]:
                 f"{numeral(100 * found.interval, 3)} %, {numeral(one['band_width'], 3)} {unit} wide on "
                 "average"
             )
+
+
+def outside(found: Simulation) -> Iterator[str]:
+    """Return where a run is beyond what its band was calibrated on."""
+    for channel, share, samples, limits in found.outside:
+        yield words.outside_calibration(found.recording.name, channel, share, samples, limits)
 
 
 def models(every: Mapping[str, Any]) -> Iterator[str]:

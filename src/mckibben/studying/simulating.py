@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.blocks.bands import Banded
 from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.free_run import measured_start
 from mckibben.control.identified import beyond_known
 from mckibben.diagnosis.bands import outside
 from mckibben.errors import DataError, ModelError
 from mckibben.metrics import score
 from mckibben.recording import Recording
-from mckibben.report.words import outside_calibration
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,9 @@ class Simulation:
     interval : float or None
         Level of the band.
     notes : tuple of str
+    outside : tuple of (Channel, float, array, (float, float))
+        Channels beyond what a band was calibrated on: the share of the samples that are, all samples,
+        and the range of the calibration.
     """
 
     recording: Recording
@@ -41,6 +45,7 @@ class Simulation:
     horizon: int | None
     interval: float | None
     notes: tuple[str, ...]
+    outside: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the errors, for JSON."""
@@ -101,15 +106,16 @@ def simulated(
     else:
         modelled = (banded or block).simulate(recording, initial=_start(initial, block, recording))
     notes = beyond_known(block, recording)
+    beyond: tuple[tuple[Channel, float, Array, tuple[float, float]], ...] = ()
     if banded is not None:
         if initial == "model" and all(name in recording for name in outputs):
             notes += _other_start(block, recording, outputs)
         known = {one.name: one for one in (*banded.band.driving, *banded.band.given)}
         ranges = dict(zip(known, zip(*banded.band.ends, strict=True), strict=True))
-        notes += [
-            outside_calibration(recording.name, known[name], share, modelled[name], ranges[name])
+        beyond = tuple(
+            (known[name], share, modelled[name], ranges[name])
             for name, share in outside(banded.band, modelled.matrix(known)).items()
-        ]
+        )
     found, metrics = recording.select(inputs), {}
     for channel in block.outputs:
         name = channel.name
@@ -127,7 +133,7 @@ def simulated(
                     ((lower <= measured) & (measured <= upper)).mean()
                 )
                 metrics[name]["band_width"] = float((upper - lower).mean())
-    return Simulation(found, metrics, horizon, interval, tuple(notes))
+    return Simulation(found, metrics, horizon, interval, tuple(notes), beyond)
 
 
 def _with_band(block: Block, interval: float | None) -> tuple[Any, Any]:

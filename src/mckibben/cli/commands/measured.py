@@ -38,7 +38,7 @@ def measured(
     as_json: Json = False,
 ) -> None:
     from mckibben.errors import DataError
-    from mckibben.measured.running import measure
+    from mckibben.measured.page import measure
     from mckibben.report import words
 
     def done(one: Outcome) -> None:

@@ -36,9 +36,9 @@ def reproduce(
     as_json: Json = False,
 ) -> None:
     from mckibben.errors import DataError
-    from mckibben.papers.experiment import rerun
     from mckibben.papers.paper import papers
     from mckibben.report import text
+    from mckibben.report.rerun import rerun
 
     if listed:
         every = papers()

@@ -23,7 +23,7 @@ Changes = Annotated[
 def list_(as_json: Json = False) -> None:
     """List the rigs, the protocols made for them, and the signals that can drive them."""
     from mckibben.report import text
-    from mckibben.rigs.driving import catalogue
+    from mckibben.studying.rig_runs import catalogue
 
     found = catalogue()
     show(found, lambda: text.rigs(found), as_json)
@@ -89,7 +89,7 @@ def run(
     from mckibben.outputs import claim
     from mckibben.report import text
     from mckibben.rigs import load_rig
-    from mckibben.rigs.driving import at_first_commands, commands
+    from mckibben.studying.rig_runs import at_first_commands, commands
 
     claim(out, inputs=[Path(name), *([] if inputs is None else [inputs])], force=force)
     rig = load_rig(name).changed(changes)
@@ -131,7 +131,7 @@ def record(
 
     Files of a recording that was stopped are not made again.
     """
-    from mckibben.rigs.driving import record_protocol
+    from mckibben.studying.rig_runs import record_protocol
 
     with stoppable(out), progress_bar(f"recording {protocol}:") as tell:
         recorded, earlier = record_protocol(

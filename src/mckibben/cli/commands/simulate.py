@@ -56,5 +56,6 @@ def simulate(
         interval=interval,
     )
     write(found.recording.with_meta(model=str(model)), out)
-    about = {"file": str(out)} | found.to_dict()
-    show(about, lambda: text.simulation(found), as_json, found.notes, [out])
+    notes = [*found.notes, *text.outside(found)]
+    about = {"file": str(out)} | found.to_dict() | {"notes": notes}
+    show(about, lambda: text.simulation(found), as_json, notes, [out])

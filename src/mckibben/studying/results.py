@@ -1,0 +1,187 @@
+"""What operations return: models, inverses, loops and code, with their numbers for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mckibben.blocks.equations import quantities
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
+    from mckibben.control import Before, Tracked
+    from mckibben.control.roles import Plant
+    from mckibben.estimators.core.estimator import Estimator
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model that was identified.
+
+    Parameters
+    ----------
+    name : str
+        Short name of the model.
+    model : Block
+        With the model whose residual was fitted, where there was one.
+    estimator : Estimator
+        Fitted; ``diagnostics_`` has errors and uncertainties.
+    notes : tuple of str
+    file : Path or None
+        Where the model is saved.
+    """
+
+    name: str
+    model: Block
+    estimator: Estimator
+    notes: tuple[str, ...] = ()
+    file: Path | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return errors and parameters, for JSON."""
+        found, model = self.estimator.diagnostics_, self.estimator.model_
+        numbers = quantities(model)
+        names = [channel.name for channel in model.outputs]
+        copied = ("rmse", "rmse_from_rest", "n_samples", "n_evaluations", "seconds", "interrupted")
+        return {
+            "model": self.name,
+            "file": _text(self.file),
+            "n_parameters": found.n_free,
+            **{name: getattr(found, name) for name in copied},
+            "rmse_by_output": dict(zip(names, found.rmse_by_output, strict=True)),
+            "condition": found.condition,
+            "parameters": model.pack().tolist(),
+            "parameter_names": [one.name for one in numbers],
+            "parameter_units": [one.unit for one in numbers],
+            "standard_errors": list(found.standard_errors),
+            "at_bounds": list(found.at_bounds),
+            "undetermined": [numbers[place].name for place in self.estimator.undetermined()],
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How a reference was followed by a controller, and how without compensation.
+
+    Parameters
+    ----------
+    tracked : Tracked
+    uncompensated : Before
+    plant : Plant
+    law : str
+        Name of the controller.
+    virtual : bool
+        Whether the plant is a virtual rig.
+    seed : int
+    controller : Block or Controller
+    notes : tuple of str
+    file, controller_file : Path or None
+        Recording and controller, where they were written.
+    """
+
+    tracked: Tracked
+    uncompensated: Before
+    plant: Plant
+    law: str
+    virtual: bool
+    seed: int
+    controller: Any
+    notes: tuple[str, ...] = ()
+    file: Path | None = None
+    controller_file: Path | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the errors, for JSON."""
+        found, without = self.tracked, self.uncompensated.tracked
+        return {
+            "controller": self.law,
+            "plant": {"name": self.plant.name, "virtual_rig": self.virtual},
+            **_errors(found),
+            "clipping_cost": found.clipping_cost,
+            "out_of_reach": {name: far._asdict() for name, far in found.beyond.items()},
+            "scatter": dict(found.scatter),
+            "uncompensated": None if without is None else _errors(without),
+            "step_time": dict(zip(("median", "p99.9"), found.step_time, strict=True)),
+            "file": _text(self.file),
+            "controller_file": _text(self.controller_file),
+            "notes": list(self.notes),
+        }
+
+
+def _errors(found: Tracked) -> dict[str, Any]:
+    return {"rmse": dict(found.rmse), "largest": dict(found.largest), "clipped": found.clipped}
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """A compensator, or an estimate of force.
+
+    Parameters
+    ----------
+    block : Block
+    kind : {"inverse", "adaptive", "predictive", "learned", "feedforward", "force", "itself"}
+        The inverse of a memory, one that learns, looks ahead, or is a trained network; a force in
+        closed form, by the pressure or estimated; a model that gives pressures already.
+    reachable : mapping of str to (float, float)
+        Output of the model -> what is reachable whatever happened before; empty where that depends on
+        more than the model.
+    rmse : mapping of str to float
+        Of a learned inverse, by its outputs on the recordings.
+    file : Path or None
+        Where it is saved.
+    """
+
+    block: Block
+    kind: str
+    reachable: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    rmse: Mapping[str, float] = field(default_factory=dict)
+    file: Path | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what kind of inverse it is and what it reaches, for JSON."""
+        return {
+            "file": _text(self.file),
+            "kind": self.kind,
+            "inputs": [channel.name for channel in self.block.inputs],
+            "outputs": [channel.name for channel in self.block.outputs],
+            "reachable": {name: list(ends) for name, ends in self.reachable.items()},
+            "samples_ahead": self.block.samples_ahead,
+            "rmse": dict(self.rmse),
+        }
+
+
+@dataclass(frozen=True)
+class Exported:
+    """Code that was written.
+
+    Parameters
+    ----------
+    path : Path
+        Folder, or FMU.
+    name : str
+        Of functions and files.
+    files : tuple of str
+        In it.
+    self_test, emulation : str or None
+        What the self-test and the emulated run printed.
+    """
+
+    path: Path
+    name: str
+    files: tuple[str, ...]
+    self_test: str | None = None
+    emulation: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it, for JSON."""
+        return {one.name: getattr(self, one.name) for one in fields(self)} | {
+            "path": str(self.path),
+            "files": list(self.files),
+        }
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)

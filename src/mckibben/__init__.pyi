@@ -25,9 +25,7 @@ from .comparison.identifying import identify as identify
 from .comparison.ranking import compare as compare
 from .diagnosis.bands import calibrate as calibrate
 from .diagnosis.characterization import characterize as characterize
-from .diagnosis.check import check as check
 from .diagnosis.data_gaps import data_gaps as data_gaps
-from .diagnosis.review import review as review
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning
 from .errors import MckibbenError as MckibbenError
@@ -39,13 +37,18 @@ from .estimators.hysteresis.mpi import MPIEstimator as MPIEstimator
 from .estimators.hysteresis.pi import PIEstimator as PIEstimator
 from .files import read as read
 from .files import write as write
-from .planning.planner import plan as plan
 from .recording import Recording as Recording
 from .report import write_report as write_report
 from .rigs import Rig as Rig
 from .rigs import check_rig as check_rig
 from .rigs import load_rig as load_rig
-from .studying.study import study as study
 from .version import __version__ as __version__
+from .workflow import check as check
+from .workflow import fit as fit
+from .workflow import invert as invert
+from .workflow import plan as plan
+from .workflow import review as review
+from .workflow import study as study
+from .workflow import track as track
 
 __all__: list[str]

@@ -58,11 +58,32 @@ def given_options(
     return replace(base, **given) if given else base
 
 
+def parsed(option: Option, text: str, name: str) -> Any:
+    """Return what an option makes of a text.
+
+    Raises
+    ------
+    DataError
+        If it is of another form; ``name`` is the parameter's.
+    """
+    try:
+        return text if option.parse is None else option.parse(text)
+    except (ValueError, KeyError, TypeError):
+        raise DataError(
+            f"{text!r:.80} is not of the form {option.metavar}",
+            parameter=name,
+            remedy=f"write it so: {option.help}",
+        ) from None
+
+
+# What options make of a text; a ValueError says that it is of another form.
+
+
 def pair(text: str) -> tuple[str, str]:
     """Return name and value of ``NAME=VALUE``."""
-    name, equals, value = text.partition("=")
-    if not (name and equals and value):
-        raise DataError(f"{text!r} is not of the form NAME=VALUE", remedy="write NAME=VALUE")
+    name, _, value = text.partition("=")
+    if not (name and value):
+        raise ValueError
     return name.strip(), value.strip()
 
 
@@ -78,54 +99,42 @@ def setting(text: str) -> tuple[str, Any]:
     return name.replace("-", "_"), setting_value(value)
 
 
+def number(text: str) -> tuple[str, float]:
+    """Return name and number of ``NAME=NUMBER``."""
+    name, value = pair(text)
+    return name, float(value)
+
+
 def constant(text: str) -> tuple[str, tuple[float, str]]:
     """Return channel, value and unit of ``force=200 g``."""
-    found = re.fullmatch(r"([^=]+)=\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)?", text)
+    name, value = pair(text)
+    found = re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)?", value)
     if found is None:
-        raise DataError(
-            f"{text!r} is not of the form CHANNEL=VALUE UNIT", remedy="write force=200 g"
-        )
-    return found[1].strip(), (float(found[2]), found[3] or "")
+        raise ValueError
+    return name, (float(found[1]), found[2] or "")
 
 
 def calibration(text: str) -> tuple[str, tuple[str, float, float, str]]:
     """Return channel, and column, gain, offset and unit of ``pressure=A0:2.5:-0.5:bar``."""
     channel, value = pair(text)
-    try:
-        column, gain, offset, unit = value.rsplit(":", 3)
-        if not (column and unit):
-            raise ValueError
-        return channel, (column, float(gain), float(offset), unit)
-    except ValueError:
-        raise DataError(
-            f"{text!r} is not of the form CHANNEL=COLUMN:GAIN:OFFSET:UNIT",
-            remedy="write for instance pressure=A0:2.5:-0.5:bar",
-        ) from None
+    column, gain, offset, unit = value.rsplit(":", 3)
+    if not (column and unit):
+        raise ValueError
+    return channel, (column, float(gain), float(offset), unit)
 
 
 def span(text: str) -> tuple[float, float]:
     """Return the two numbers of ``START:END``, infinite where they are left out."""
-    start, colon, end = text.partition(":")
-    try:
-        if not colon:
-            raise ValueError
-        return float(start or "-inf"), float(end or "inf")
-    except ValueError:
-        raise DataError(
-            f"{text!r} is not of the form START:END", remedy="write 15: to leave out the first 15 s"
-        ) from None
+    start, end = text.split(":")
+    return float(start or "-inf"), float(end or "inf")
 
 
 def size(text: str) -> float:
     """Return a size such as ``2GB``, ``500 MB`` or ``1e9`` in bytes."""
     found = re.fullmatch(r"\s*([\d.]+(?:[eE]\d+)?)\s*([kMGT]?)i?B?\s*", text, re.IGNORECASE)
-    try:
-        number = float(found[1]) if found else 0.0
-    except ValueError:
-        number = 0.0
-    if found is None or number <= 0:
-        raise DataError(f"{text!r} is no size", remedy="write for instance 2GB")
-    return number * 1024.0 ** " KMGT".index(found[2].upper() or " ")
+    if found is None or not float(found[1]) > 0:
+        raise ValueError
+    return float(found[1]) * 1024.0 ** " KMGT".index(found[2].upper() or " ")
 
 
 def limits(text: str) -> tuple[str, tuple[float | None, ...]]:
@@ -136,26 +145,9 @@ def limits(text: str) -> tuple[str, tuple[float | None, ...]]:
     """
     channel, value = pair(text)
     parts = value.split(":")
-    try:
-        if not 2 <= len(parts) <= 3:
-            raise ValueError
-        return channel, tuple(float(part) if part else None for part in parts)
-    except ValueError:
-        raise DataError(
-            f"{text!r} is not of the form CHANNEL=LOW:HIGH or CHANNEL=LOW:HIGH:RATE",
-            remedy="write for instance pressure=1:5.5:2, which is bar and bar/s",
-        ) from None
-
-
-def number(text: str) -> tuple[str, float]:
-    """Return name and number of ``NAME=NUMBER``."""
-    name, value = pair(text)
-    try:
-        return name, float(value)
-    except ValueError:
-        raise DataError(
-            f"{text!r} has no number", remedy="write for instance pressure=0.5"
-        ) from None
+    if not 2 <= len(parts) <= 3:
+        raise ValueError
+    return channel, tuple(float(part) if part else None for part in parts)
 
 
 def names(text: str) -> str | tuple[str, ...]:
@@ -281,6 +273,7 @@ class TrackOptions:
     pressure_loop: Annotated[
         bool, Option("Feed measured pressures back inside, as regulators do.")
     ] = True
+    fields: Fields = field(default_factory=dict)
     seed: Seed = 0
 
 

@@ -41,10 +41,11 @@ class ReadOptions:
 
     columns: Annotated[
         Mapping[str, str],
-        Option("Column of a channel.", "CHANNEL=COLUMN", "--column", options.pair),
+        Option("Column of a channel, as pressure=P1.", "CHANNEL=COLUMN", "--column", options.pair),
     ] = field(default_factory=dict)
     units: Annotated[
-        Mapping[str, str], Option("Unit of a channel.", "CHANNEL=UNIT", "--unit", options.pair)
+        Mapping[str, str],
+        Option("Unit of a channel, as pressure=kPa.", "CHANNEL=UNIT", "--unit", options.pair),
     ] = field(default_factory=dict)
     constants: Annotated[
         Mapping[str, tuple[float, str]],

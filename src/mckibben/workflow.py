@@ -409,7 +409,7 @@ def track(
     read = _paths(compensator, reference, chosen.rig, chosen.plant)
     file = _claim(out, read, force)
     controller_file = _claim(controller_out, [*read, *_paths(out)], force)
-    block, plant = saved(compensator), _plant(chosen, reading)
+    block, plant = saved(compensator, chosen.fields), _plant(chosen, reading)
     (run, *_) = read_files(reference, None, reading)
     wanted = asked(plant, run, block)
     BlockController(block).connect(offered(plant, wanted))  # before anything is tuned

@@ -88,11 +88,9 @@ def test_what_was_changed_since_is_not_replaced(cli: Cli, tmp_path: Path) -> Non
     sketch = folder / "examples" / "first" / "first.ino"
     sketch.write_text("mine")
     assert "out" in refused(cli, "export", "c", model, "-o", folder, "--name", "first")
-    told = refused(cli, "export", "c", model, "-o", folder, "--name", "first", "--overwrite")
-    assert "first.ino" in told
     assert sketch.read_text() == "mine"
     sketch.unlink()
-    done(cli, "export", "c", model, "-o", folder, "--name", "first", "--overwrite", "--float32")
+    done(cli, "export", "c", model, "-o", folder, "--name", "first", "--float32")
     assert "FLOAT32" in (folder / "src" / "mck_config.h").read_text()
     assert not list(tmp_path.glob(".*"))
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mckibben.cli.options import limits_in
 
 from mckibben import PI, Recording, data_gaps, load_rig, plan
 from mckibben.blocks.base import Block
 from mckibben.errors import DataError, ModelError
+from mckibben.options import limits as limits_of
 from mckibben.planning.limits import Limit, narrowed
 from mckibben.planning.motion import motion
 from mckibben.report.words import plan_sentences
@@ -113,10 +113,10 @@ def test_without_recordings_errors_are_those_of_a_likely_muscle(given: dict[str,
 
 
 def test_limits_are_read_and_narrowed() -> None:
-    assert limits_in(["a=1:2", "b=::3"]) == {"a": [1.0, 2.0], "b": [None, None, 3.0]}
+    assert limits_of("b=::3") == ("b", (None, None, 3.0))
     for text in ("a", "a=1", "a=1:2:3:4", "a=x:1", "=1:2"):
-        with pytest.raises(DataError, match="CHANNEL=LOW:HIGH"):
-            limits_in([text])
+        with pytest.raises(ValueError):
+            limits_of(text)
     limits = {"pressure": Limit(0.5, 4.0, 1.5, 0.5)}
     assert narrowed(limits, {"pressure": [1.0, None]})["pressure"] == Limit(1.0, 4.0, 1.5, 1.0)
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 import click
 
 from mckibben.errors import python_parameter
-from mckibben.options import Option
+from mckibben.options import Option, parsed
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def made(name: str, hint: Any, default: Any) -> click.Parameter:
         nargs=width if about.parse is None else 1,
         default=default if _is_plain(default, about) else None,
         show_default=_is_plain(default, about),
-        callback=_parsed(about, mapping, several, default),
+        callback=_parsed(name, about, mapping, several, default),
     )
 
 
@@ -170,7 +170,9 @@ def _is_plain(default: Any, about: Option) -> bool:
     return isinstance(default, int | float | str | Path) and default != "" and not about.parse
 
 
-def _parsed(about: Option, mapping: bool, several: bool, default: Any) -> Callable[..., Any]:
+def _parsed(
+    name: str, about: Option, mapping: bool, several: bool, default: Any
+) -> Callable[..., Any]:
     """Return what makes the value of an option from the words given for it."""
 
     def value(context: click.Context, parameter: click.Parameter, given: Any) -> Any:
@@ -179,12 +181,9 @@ def _parsed(about: Option, mapping: bool, several: bool, default: Any) -> Callab
             return None if default is Parameter.empty else default
         if about.parse is None:
             return given
-        try:
-            if mapping:
-                return dict(about.parse(text) for text in given)
-            return tuple(map(about.parse, given)) if several else about.parse(given)
-        except Exception as error:
-            error.parameter = parameter.name  # type: ignore[attr-defined]
-            raise
+        if not (mapping or several):
+            return parsed(about, given, name)
+        found = [parsed(about, text, name) for text in given]
+        return dict(found) if mapping else tuple(found)
 
     return value

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mckibben import Recording, write
-from mckibben.system.results import results_in
+from mckibben.outputs import results_in
 from tests.cli.calls import files
 from tests.cli.conftest import Cli
 from tests.golden.commands import call

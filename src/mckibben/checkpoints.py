@@ -1,7 +1,7 @@
-"""Finished parts of long work, kept in a folder as they come: what was stopped goes on from there.
+"""Finished parts of long work, in the folder of its results: what was stopped goes on from there.
 
-Each is a JSON file that a person can read, under a digest of all that it depends on: the data, settings,
-seed, and the program itself. What is under another digest is not used.
+Each is a JSON file under a digest of all that it depends on: the data, settings, seed, and the program
+itself. What is under another digest is not used.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ import mckibben
 from mckibben.blocks.base import Block
 from mckibben.blocks.saving import LARGEST_FILE, from_dict, to_dict
 from mckibben.errors import DataWarning, MckibbenError
+from mckibben.outputs import UNFINISHED
 from mckibben.presets import Chosen
 from mckibben.recording import PROVENANCE, Recording
 from mckibben.system import ordinary
@@ -33,40 +34,27 @@ from mckibben.system.atomic import PART, write_text, written
 
 Result = TypeVar("Result")
 
-FOLDER = "unfinished"
-"""Within the folder of results; it goes when all is done."""
-
-_OURS = re.compile(rf"-[0-9a-f]{{16}}\.json$|^{re.escape(PART)}[0-9a-f]{{16}}\.part$")
-"""Names that parts have, and what was being written when the program was killed."""
+_NAMES = re.compile(rf"-[0-9a-f]{{16}}\.json$|^{re.escape(PART)}[0-9a-f]{{16}}\.part$")
+"""Of checkpoints, and of what was being written when the program was killed."""
 
 
 class Checkpoints:
-    """What is finished of some long work.
+    """Finished parts of some long work.
 
     Parameters
     ----------
     folder : path or None
-        Of the results; None to keep nothing.
+        Of the results; None to write nothing.
     depends : object
         What everything depends on: anything that `digest` takes.
     """
 
     def __init__(self, folder: str | Path | None, *depends: object) -> None:
-        self._folder = None if folder is None else Path(folder) / FOLDER
+        self._folder = None if folder is None else Path(folder) / UNFINISHED
         self._digest = digest(program(), depends) if folder is not None else ""
 
     def get(self, name: str, kind: type[Result], *depends: object) -> Result | None:
-        """Return what was kept under a name, if it depends on the same; else None.
-
-        Parameters
-        ----------
-        name : str
-            Of the part, such as a model's.
-        kind : type
-            A block, or a dataclass of numbers, words and blocks.
-        depends : object
-            What this part depends on beside what everything does.
-        """
+        """Return a part, a block or a dataclass, if it depends on the same; else None."""
         path = self._path(name, depends)
         if path is None or not path.is_file():
             return None
@@ -77,7 +65,7 @@ class Checkpoints:
             return None
 
     def put(self, name: str, result: object, *depends: object) -> None:
-        """Keep a part; where that fails, the work goes on without."""
+        """Write a part; where that fails, the work goes on without."""
         path = self._path(name, depends)
         if path is not None:
             text = json.dumps(_to_json(result)) + "\n"
@@ -91,7 +79,7 @@ class Checkpoints:
     def once(
         self, name: str, kind: type[Result], compute: Callable[[], Result], *depends: object
     ) -> Result:
-        """Return what was kept under a name, or compute it and keep it."""
+        """Return a part, computed where it is not there yet."""
         found = self.get(name, kind, *depends)
         if found is None:
             found = compute()
@@ -99,15 +87,15 @@ class Checkpoints:
         return found
 
     def inside(self, name: str) -> Path | None:
-        """Return a folder for a part that keeps its own parts, or None to keep nothing."""
+        """Return a folder for a part that has parts of its own, or None to write nothing."""
         return None if self._folder is None else self._folder / name
 
     def clear(self) -> None:
-        """Forget everything: all is done. What somebody else put there stays."""
+        """Remove all parts; what somebody else put there stays."""
         if self._folder is None or self._folder.is_symlink():
             return
         for place, _, names in os.walk(self._folder, topdown=False):
-            for name in filter(_OURS.search, names):
+            for name in filter(_NAMES.search, names):
                 with suppress(OSError):
                     Path(place, name).unlink()
             with suppress(OSError):  # not empty
@@ -153,10 +141,7 @@ def digest(*what: object) -> str:
 
 @cache
 def program() -> str:
-    """Return a digest of the package's own files, and of what it computes with.
-
-    Another version may find other models.
-    """
+    """Return a digest of the package's own files, and of what it computes with."""
     home = Path(mckibben.__file__).parent
     files = [p for p in sorted(home.rglob("*")) if p.is_file() and "__pycache__" not in p.parts]
     libraries = {name: version(name) for name in ("numpy", "scipy", "numba")}

@@ -216,7 +216,7 @@ def test_what_was_stopped_is_found_and_then_done_anew(tmp_path: Path) -> None:
 
 def test_single_files_are_ours_by_what_is_in_them(tmp_path: Path) -> None:
     PI((0.0,), (1.0,)).save(tmp_path / "model.json")
-    made = Recording({"pressure": np.arange(3.0)}, 0.1)
+    made = Recording({"pressure": np.linspace(0.0, 1.0, 3)}, 0.1)
     write(made, tmp_path / "run.csv")
     write(made, tmp_path / "run.parquet")
     put(tmp_path, {"figure.svg": f"<svg>{MAKER}</svg>", "empty.json": ""})

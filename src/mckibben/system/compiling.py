@@ -73,15 +73,7 @@ def _note(text: str) -> None:
 
 
 class Deferred:
-    """A function that becomes numba's when it is first called, from Python or from another one.
-
-    Parameters
-    ----------
-    function : callable
-        What to compile.
-    options : dict
-        Of `numba.njit`.
-    """
+    """A function that becomes numba's when it is first called, from Python or from another one."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
@@ -134,25 +126,18 @@ class Deferred:
         return self.dispatcher(*arguments)
 
 
-def _named(module: str, name: str, digest: str) -> Any:
-    del digest
+def _named(module: str, name: str, _: str) -> Any:
     return getattr(import_module(module), name)
 
 
-def _again(function: Callable[..., Any], options: dict[str, Any], digest: str) -> Deferred:
-    del digest
+def _again(function: Callable[..., Any], options: dict[str, Any], _: str) -> Deferred:
     return Deferred(function, options)
 
 
 def deferred(function: Function, **options: Any) -> Function:
     """Compile a function when it is first called, with exact arithmetic if not told otherwise.
 
-    Parameters
-    ----------
-    function : callable
-        Of what numba compiles without Python objects.
-    **options
-        Of `numba.njit`, beside freedom of other threads, and division as NumPy does it.
+    ``options`` are those of `numba.njit`; other threads run meanwhile, and division is as NumPy's.
     """
     return cast("Function", Deferred(function, _OPTIONS | options))
 
@@ -190,13 +175,7 @@ class _Cache:
     So a file is never of anything else, whatever other processes write at the same time. Numba's own
     cache shares one file among functions of one name, as of kernels that one function made.
 
-    Parameters
-    ----------
-    folder : Path
-    name : str
-        Of the function.
-    digest : str
-        What `made_of` gives.
+    ``digest`` is that of `made_of`.
     """
 
     def __init__(self, folder: Path, name: str, digest: str) -> None:

@@ -98,6 +98,16 @@ def is_ours(path: Path) -> bool:
     return is_own(path)
 
 
+def claim_recording(
+    path: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = False
+) -> None:
+    """Refuse a recording likewise, and an ending that is no format."""
+    from mckibben.files.formats import writer
+
+    writer(Path(path))
+    claim(path, inputs=inputs, force=force)
+
+
 def refuse_inputs(path: str | Path, inputs: Iterable[str | Path]) -> None:
     """Refuse an output that is an input, part of one, or the description beside one, by any name.
 

@@ -310,7 +310,7 @@ def track(
 
     chosen = given_options(TrackOptions, options, given)
     read = _paths(compensator, reference, chosen.rig, chosen.plant)
-    file = _claim(out, read, force)
+    file = _claim(out, read, force, recording=True)
     controller_file = _claim(controller_out, [*read, *_paths(out)], force)
     block, plant = saved(compensator, chosen.fields), _plant(chosen, reading)
     (run, *_) = read_files(reference, None, reading)
@@ -353,7 +353,7 @@ def track(
         *doubts_of_feedback(chosen.controller, plant),
     )
     plain = chosen.controller, chosen.rig is not None, chosen.seed
-    return Tracking(tracked, without, plant, *plain, law, notes, file, controller_file)
+    return Tracking(tracked, without, plant, *plain, law, wanted, notes, file, controller_file)
 
 
 def _half(tell: Tell | None, start: float) -> Callable[[float], None] | None:
@@ -491,7 +491,7 @@ def plan(
     chosen = given_options(PlanOptions, options, given)
     arguments = {one.name: getattr(chosen, one.name) for one in fields(chosen)}
     read = _paths(data, chosen.rig, chosen.muscle, chosen.model)
-    file = _claim(out, read, force)
+    file = _claim(out, read, force, recording=True)
     if str(chosen.model).endswith(".json"):
         arguments["model"] = saved(chosen.model)
     found = make(read_files(data, None, reading), **arguments)
@@ -617,11 +617,13 @@ def _paths(*given: Any) -> list[Path]:
     return found
 
 
-def _claim(out: str | Path | None, read: Sequence[Path], force: bool) -> Path | None:
+def _claim(
+    out: str | Path | None, read: Sequence[Path], force: bool, *, recording: bool = False
+) -> Path | None:
     """Refuse to write over what is read or the user's, before any work; return the path."""
-    from mckibben.outputs import claim
+    from mckibben.outputs import claim, claim_recording
 
     if out is None:
         return None
-    claim(Path(out), inputs=read, force=force)
+    (claim_recording if recording else claim)(out, inputs=read, force=force)
     return Path(out)

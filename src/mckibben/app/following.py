@@ -45,34 +45,26 @@ def too_fast(workspace: Workspace, model: str, reference: Recording) -> list[str
 
 def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Let a controller follow a reference on a model or a virtual rig, and keep the recording."""
+    from mckibben import workflow
     from mckibben.blocks.base import Block
-    from mckibben.control import before, control_law, track, tune_pid
-    from mckibben.control.roles import asked
-    from mckibben.control.suiting import doubts_of_feedback
-    from mckibben.files import read, write
-    from mckibben.rigs import load_rig
+    from mckibben.files import write
 
     own, form = given.get("plant"), given.get("form", "inverse")
     compensator = forms.made(workspace, given["model"], form, given.get("settings") or {})
-    plant = workspace.twin(own) if own else load_rig(given["rig"])
-    (reference,) = read(workspace.path("runs", given["reference"]), informative=False)
-    reference = asked(plant, reference, compensator)
     kind = given["controller"]
-    step = reference.sample_time or 0.02
-    held = {name: float(reference[name][0]) for name in plant.inputs if name in reference}
-    controller = control_law(
-        kind,
+    run = workflow.track(
         compensator,
-        lambda: tune_pid(plant, sample_time=step, scheduled=held, references=compensator.inputs),
+        workspace.path("runs", given["reference"]),
+        rig=None if own else given["rig"],
+        plant=workspace.twin(own) if own else None,
+        controller=kind,
+        progress=lambda share, _: tell(share, float("nan")),
     )
-    found = track(
-        controller, plant, reference, progress=lambda share: tell(0.5 * share, float("nan"))
-    )
-    without = before(
-        compensator,
-        plant,
-        reference,
-        progress=lambda share: tell(0.5 + 0.5 * share, float("nan")),
+    found, without, reference, controller = (
+        run.tracked,
+        run.uncompensated,
+        run.reference,
+        run.controller,
     )
     name = str(given["name"])
     recording = without.beside(found.recording).with_meta(name=name)
@@ -98,7 +90,7 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
             "uncompensated": {} if without.tracked is None else dict(without.tracked.rmse),
             "units": units,
             "held": {c: None if np.ptp(reference[c]) else float(reference[c][0]) for c in beside},
-            "notes": [*without.notes, *doubts_of_feedback(kind, plant)],
+            "notes": list(run.notes),
             "clipped": int(found.clipped),
             "step_us": 1e6 * float(found.step_time[0]),
             "call": given.get("call", ""),
@@ -175,9 +167,9 @@ def kept_motion(
 def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Say how far a log of the real rig was off its reference, and why; keep it, and the refit."""
     from mckibben.diagnosis.refit import Refit
-    from mckibben.diagnosis.review import review
     from mckibben.files import read
     from mckibben.report import words
+    from mckibben.workflow import review
 
     name, settings = str(given["name"]), given.get("settings") or {}
     with warnings.catch_warnings(record=True) as caught:

@@ -98,34 +98,20 @@ def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]
             return inverse_of(block)
         case "force":
             return force_of(block)
-        case "adaptive":
-            from mckibben.blocks.adaptive import adaptive
+        case "adaptive" | "predictive":
+            from mckibben.workflow import invert
 
-            time = given["time"]
-            if not 0 < time <= 1e6:
-                raise ModelError(f"it cannot learn in {time:g} s", remedy="give 1 to 1000 s")
-            return adaptive(block, time)
-        case "predictive":
-            return _predictive(inverse_of(block), given)
+            if form == "predictive" and "horizon" in given:
+                given["horizon"] = int(given["horizon"])
+            return invert(
+                block, adaptive=form == "adaptive", predictive=form == "predictive", **given
+            ).block
     raise ModelError(
         f"{form!r:.40} is no use of a model", remedy=f"choose one of {', '.join(FORMS)}"
     )
 
 
-def _predictive(inverse: Block, given: Mapping[str, float]) -> Block:
-    from mckibben.blocks.predictive import MOST, Predictive
-
-    horizon, rate = int(given["horizon"]), given.get("rate_limit")
-    if not 1 <= horizon <= 200:
-        raise ModelError(f"it cannot look {horizon} samples ahead", remedy="give 1 to 200")
-    if rate is not None and not 0 < rate <= MOST:
-        raise ModelError(
-            f"pressure cannot change by {rate:g} bar/s", remedy="give what the valve can"
-        )
-    return Predictive(inverse, horizon=horizon, rate_limit=rate)
-
-
-def _options(form: str, settings: Mapping[str, Any]) -> dict[str, float]:
+def _options(form: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of a use; what is None is at its default."""
     given = DEFAULTS | {key: value for key, value in settings.items() if value is not None}
     return {key: v for key in SETTINGS.get(form, ()) if (v := given[key]) is not None}

@@ -77,7 +77,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
 def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Study the recordings with chosen models, and write the report."""
     from mckibben.report import write_report
-    from mckibben.studying.study import study
+    from mckibben.workflow import study
 
     found = study(
         workspace.with_role("train"),
@@ -86,12 +86,12 @@ def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         outputs=given["output"],
         load=given.get("load"),
         models=given["models"],
-        settings=given.get("settings") or None,
+        settings=given.get("settings") or {},
         seed=int(given.get("seed", 0)),
         jobs=1,
         allow_shared=bool(given.get("allow_shared", False)),
         allow_early=True,  # with a note
-        progress=lambda standing: tell(standing.done / standing.total, float("nan")),
+        progress=lambda share, _: tell(share, float("nan")),
     )
     path = workspace.path("takeaway", "report.html")
     write_report(found, path)
@@ -100,11 +100,10 @@ def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
 
 def check(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Judge a model by the test recordings, or else the training ones, and write the page."""
-    from mckibben.diagnosis.check import check as judged
-    from mckibben.diagnosis.description import describe
     from mckibben.report.check_page import check_page
     from mckibben.report.words import check_sentences, check_verdict
     from mckibben.system.atomic import write_text
+    from mckibben.workflow import check as judged
 
     name = str(given["name"])
     model = workspace.model(name)
@@ -120,17 +119,16 @@ def check(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         recordings, on = train, f"Test recordings tell too little: {error} {TRAINED_ON}"
         found = judged(model, recordings)
     tell(0.6, float("nan"))
-    description = describe(model, recordings, fitted=False)
-    page = check_page(found, description, f"models/{name}.json")
-    write_text(workspace.new_path("takeaway", str(given["file"])), page)
+    if found.description is not None:
+        page = check_page(found, found.description, f"models/{name}.json")
+        write_text(workspace.new_path("takeaway", str(given["file"])), page)
     return " ".join([on, check_verdict(found), *check_sentences(found)])
 
 
 def plan(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Plan what to record next, and write it as a file of inputs over time."""
-    from mckibben.files import write
-    from mckibben.planning.planner import plan as planned
     from mckibben.report.words import plan_sentences
+    from mckibben.workflow import plan as planned
 
     name = str(given.get("name") or "")
     found = planned(
@@ -138,9 +136,9 @@ def plan(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         model=workspace.model(name) if name else None,
         minutes=float(given.get("minutes", 3.0)),
         seed=int(given.get("seed", 0)),
+        out=workspace.new_path("takeaway", str(given["file"])),
     )
     tell(1.0, float("nan"))
-    write(found.recording, workspace.new_path("takeaway", str(given["file"])))
     return " ".join(plan_sentences(found))
 
 

@@ -52,7 +52,7 @@ def stoppable(folder: Path | None) -> Iterator[None]:
         if first:
             raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGINT, stop)
+    signal.signal(signal.SIGINT, stop)
     printed, sys.unraisablehook = sys.unraisablehook, _quiet(sys.unraisablehook)
     try:
         with _watched():
@@ -68,7 +68,7 @@ def stoppable(folder: Path | None) -> Iterator[None]:
                 raise InterruptionError(text) from None
     finally:
         sys.unraisablehook = printed
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done, but for printing
 
 
 @contextmanager

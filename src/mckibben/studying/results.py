@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from mckibben.control import Before, Tracked
     from mckibben.control.roles import Plant
     from mckibben.estimators.core.estimator import Estimator
+    from mckibben.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,8 @@ class Tracking:
         Whether the plant is a virtual rig.
     seed : int
     controller : Block or Controller
+    reference : Recording
+        As it was followed, in channels of the plant.
     notes : tuple of str
     file, controller_file : Path or None
         Recording and controller, where they were written.
@@ -89,6 +92,7 @@ class Tracking:
     virtual: bool
     seed: int
     controller: Any
+    reference: Recording
     notes: tuple[str, ...] = ()
     file: Path | None = None
     controller_file: Path | None = None

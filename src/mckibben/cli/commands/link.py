@@ -35,7 +35,7 @@ def link(
     from mckibben.files import write
     from mckibben.link import Link
     from mckibben.link.driving import drive
-    from mckibben.outputs import claim
+    from mckibben.outputs import claim_recording
     from mckibben.report import text
 
     if out is not None:
@@ -44,7 +44,7 @@ def link(
                 "a device that nobody drives does nothing", remedy="give `settings[NAME]=VALUE` with it",
                 parameter="out",
             )  # fmt: skip
-        claim(out, inputs=[], force=force)
+        claim_recording(out, inputs=[], force=force)
     with Link(port, baud=baud, fingerprint=fingerprint) as line:
         found = drive(line, settings, seconds, every if out else 0)
     if out is not None:

@@ -86,12 +86,12 @@ def run(
     """
     from mckibben.errors import DataError
     from mckibben.files import read, write
-    from mckibben.outputs import claim
+    from mckibben.outputs import claim_recording
     from mckibben.report import text
     from mckibben.rigs import load_rig
     from mckibben.studying.rig_runs import at_first_commands, commands
 
-    claim(out, inputs=[Path(name), *([] if inputs is None else [inputs])], force=force)
+    claim_recording(out, inputs=[Path(name), *([] if inputs is None else [inputs])], force=force)
     rig = load_rig(name).changed(changes)
     if bool(signal) == (inputs is not None):
         raise DataError(

@@ -41,13 +41,13 @@ def simulate(
     as_json: Json = False,
 ) -> None:
     from mckibben.files import write
-    from mckibben.outputs import claim
+    from mckibben.outputs import claim_recording
     from mckibben.reading import read_files
     from mckibben.report import text
     from mckibben.studying.simulating import simulated
     from mckibben.workflow import saved
 
-    claim(out, inputs=[model, file], force=force)
+    claim_recording(out, inputs=[model, file], force=force)
     found = simulated(
         saved(model, fields),
         lambda names: read_files(file, names, reading),

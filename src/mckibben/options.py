@@ -49,13 +49,17 @@ def given_options(
     ModelError
         On a name that is no field.
     """
+    from mckibben.signals.checking import generator
+
     base: Any = kind() if options is None else options
     if strange := [name for name in given if name not in base.__dataclass_fields__]:
         raise ModelError(
             f"there is no option {strange[0]!r}",
             remedy=f"use {', '.join(base.__dataclass_fields__)}",
         )
-    return replace(base, **given) if given else base
+    found = replace(base, **given) if given else base
+    generator(getattr(found, "seed", 0))  # refuses what is no seed
+    return found
 
 
 def parsed(option: Option, text: str, name: str) -> Any:

@@ -16,26 +16,18 @@ from pathlib import Path
 import click
 
 from mckibben.cli.output import InterruptionError, finish, say, visible
-from mckibben.cli.parameters import as_flag
+from mckibben.cli.parameters import COMMANDS, as_command, as_flag, plainly
 from mckibben.errors import (
     CacheWarning,
     DataError,
     DataWarning,
     MckibbenError,
     ModelWarning,
-    in_terms_of,
     rendered,
 )
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-
-COMMANDS = (
-    *("study", "characterize", "fit", "compare", "check", "calibrate", "simulate", "invert"),
-    *("track", "plan", "plot", "reproduce", "measured", "info", "link", "example", "export"),
-    *("rig", "muscles", "app"),
-)
-"""Each is a module of `mckibben.cli.commands`, with a command of its name, and its help as docstring."""
 
 
 class Commands(click.Group):
@@ -100,7 +92,7 @@ def run() -> None:
         warnings.simplefilter("ignore")
         for category in (CacheWarning, DataWarning, ModelWarning):
             warnings.simplefilter("always", category)
-        warnings.showwarning = lambda message, *_: say(f"Note: {_plain(str(message))}", error=True)
+        warnings.showwarning = lambda message, *_: say(f"Note: {plainly(str(message))}", error=True)
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, TextIOWrapper):  # whatever letters the terminal lacks
                 stream.reconfigure(errors="backslashreplace")
@@ -124,7 +116,7 @@ def _run() -> int:
     except InterruptionError as error:
         return _say(str(error), INTERRUPTED)
     except MckibbenError as error:
-        return _say(rendered(error, as_flag, _operation), BAD_INPUT)
+        return _say(rendered(error, as_flag, as_command), BAD_INPUT)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
@@ -146,11 +138,3 @@ def _say(message: str, code: int) -> int:
     with suppress(OSError, AttributeError, ValueError, MckibbenError):
         finish()
     return code
-
-
-def _plain(text: str) -> str:
-    return in_terms_of(" ".join(text.split()), as_flag, _operation)
-
-
-def _operation(name: str) -> str:
-    return f"mckibben {name}" if name in COMMANDS else f"{name}()"

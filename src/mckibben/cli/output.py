@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
+from mckibben.cli.parameters import plainly
 from mckibben.errors import MckibbenError
 from mckibben.system.atomic import to_json
 
@@ -83,7 +84,7 @@ def show(
     for line in lines():
         say(line)
     for note in notes:
-        say(f"Note: {note}")
+        say(f"Note: {plainly(note)}")
     if paths := [str(path) for path in written if path is not None]:
         say(f"Written: {', '.join(paths)}")
 

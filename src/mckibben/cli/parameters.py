@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import click
 
-from mckibben.errors import python_parameter
+from mckibben.errors import in_terms_of, python_operation, python_parameter
 from mckibben.options import Option, parsed
 
 
@@ -32,6 +32,13 @@ class Argument:
     metavar: str
     help: str
 
+
+COMMANDS = (
+    *("study", "characterize", "fit", "compare", "check", "calibrate", "simulate", "invert"),
+    *("track", "plan", "plot", "reproduce", "measured", "info", "link", "example", "export"),
+    *("rig", "muscles", "app"),
+)
+"""Each is a module of `mckibben.cli.commands`, with a command of its name, and its help as docstring."""
 
 _flags: dict[str, str] = {}
 """Of the command that runs: its flags by the names of their parameters."""
@@ -56,6 +63,16 @@ def as_flag(name: str, key: str | None = None, value: str | None = None) -> str:
         return python_parameter(name, key, value)
     word = value if key is None else f"{key}={value or 'VALUE'}"
     return flag if word is None else f"{flag} {shlex.quote(word)}"
+
+
+def as_command(name: str) -> str:
+    """Return an operation in an error as a command, or as Python has it."""
+    return f"mckibben {name}" if name in COMMANDS else python_operation(name)
+
+
+def plainly(text: str) -> str:
+    """Return a note in one line, its parameters as flags."""
+    return in_terms_of(" ".join(text.split()), as_flag, as_command)
 
 
 Files = Annotated[

@@ -20,6 +20,9 @@ from mckibben.recording import conversion
 FEWEST = 10
 """Fewest samples of a recording, or of a stretch of one, that can show a loop."""
 
+LONGEST = 1e6
+"""Rest length of a muscle [mm]."""
+
 Gaps = Literal["error", "split", "interpolate"]
 
 
@@ -98,7 +101,7 @@ class Request:
         if self.rate is not None and not 0 < self.rate < math.inf:
             problem = f"a rate of {self.rate:g} samples per second is impossible"
             raise error(problem, remedy="give a positive number with --rate")
-        if self.rest_length is not None and not 0 < self.rest_length < math.inf:
+        if self.rest_length is not None and not 0 < self.rest_length <= LONGEST:
             problem = f"a rest length of {self.rest_length:g} mm is impossible"
             raise error(problem, remedy="give a positive number of millimetres with --rest-length")
         for channel, (value, _) in self.constants.items():

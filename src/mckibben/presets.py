@@ -75,8 +75,8 @@ class Chosen:
         unknown = sorted(settings.keys() - self.__dataclass_fields__.keys())
         if unknown:
             raise TypeError(
-                f"{self._name!r} has no setting {unknown[0]!r}. "
-                f"Remedy: use one of {', '.join(sorted(self.__dataclass_fields__))}."
+                f"{self._name!r} has no setting {unknown[0]!r}: "
+                f"use one of {', '.join(sorted(self.__dataclass_fields__))}."
             )
         return self.of(**self.settings | settings)
 

@@ -32,7 +32,7 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
 """Units of the standard channels; ``pressure_2`` and ``pressure_extensor`` follow ``pressure``."""
 
 
-REST_LENGTH = 'the rest length (--rest-length MM, or meta["rest_length"] in Python)'
+REST_LENGTH = 'the rest length (`rest_length=MM`, or meta["rest_length"] in Python)'
 """How the length at which a displacement is 0 is stated."""
 
 PROVENANCE = ("file", "sha256")
@@ -192,7 +192,7 @@ class Recording(DrawsItself):
     def __getitem__(self, channel: str) -> Array:
         """Return the samples of one channel, shape (n,), read-only."""
         if channel not in self.channels:
-            remedy = f"name one of them, or map a column with --column {channel}=COLUMN"
+            remedy = f"name one of them, or map a column with `columns[{channel}]=COLUMN`"
             if any(conversion(channel, name, 1.0) for name in self.channels):
                 remedy = f"state {REST_LENGTH}, which makes it of another"
             raise DataError(
@@ -347,7 +347,7 @@ def _frozen(name: str, samples: ArrayLike) -> Array:
             f"the value is {values[bad[0]]}, and {bad.size} of {values.size} are not finite",
             channel=name,
             row=int(bad[0]) + 1,
-            remedy="cut those samples out, or read the file with --gaps split or interpolate",
+            remedy="cut those samples out, or read the file with `gaps=split` or `gaps=interpolate`",
         )
     values.flags.writeable = False
     return values

@@ -29,6 +29,12 @@ SETTINGS = [
 
 HARMLESS = {
     ("study", "--samples", "99999999999999999999"),
+    ("compare", "--samples", "99999999999999999999"),
+    *(
+        ("invert", name, value)
+        for name in ("--rate", "--rest-length", "--resample")
+        for value in NUMBERS
+    ),
     ("track", "--slew", "1e300"),
     ("export c", "--sample-time", "1e300"),
     ("export fmu", "--sample-time", "1e300"),

@@ -54,8 +54,8 @@ class Cache(Generic[Value]):
             except MckibbenError as error:
                 known = stamp, error, 1
             except Exception as error:  # of a file made to raise anything at all
-                text = f"{path}: damaged ({type(error).__name__}: {error}). Remedy: remove it."
-                known = stamp, ModelError(text), 1
+                problem = f"it is damaged ({type(error).__name__}: {error})"
+                known = stamp, ModelError(problem, file=path, remedy="remove it"), 1
         with self._lock:
             self._kept.pop(path, None)
             self._kept[path] = known  # the last used is the last to go

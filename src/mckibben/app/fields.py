@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
-from mckibben.errors import DataError
+from mckibben.errors import MckibbenError, in_terms_of, rendered
 
 LONGEST = 2000
 """Characters of a message that are shown."""
@@ -21,78 +19,60 @@ RAW = "Codes for missing samples, and wraps, as measured"
 READING = "How it was read"
 """What stands on the button that opens the dialog on a file."""
 
-_WAYS = (
-    (r"--gaps split or (--gaps )?interpolate", f"“{GAPS['split']}” or “{GAPS['interpolate']}”"),
-    (r"--gaps interpolate or split", f"“{GAPS['interpolate']}” or “{GAPS['split']}”"),
-    (r"--gaps split", f"“{GAPS['split']}”"),
-    (r"--gaps interpolate", f"“{GAPS['interpolate']}”"),
-    (r"--raw", f"“{RAW}”"),
-    (r"say --unit CHANNEL=UNIT", f"give units by “{READING}”"),
-    (r"say --unit (\w+)=UNIT", rf"give the unit of \1 by “{READING}”"),
-    (r"--unit (\w+)=UNIT", r"the field Unit of \1"),
-    (r"--unit (\w+)=(\S+\b)", r"the field Unit (\2, say, of \1)"),
-    (r"say --column CHANNEL=COLUMN", "change the field Channel"),
-    (r"--column CHANNEL=COLUMN", "the field Channel"),
-    (r"--column (\w+)=('[^']*'|\S+\b)", r"the field Channel (\1)"),
-    (r" \([^()]*--[a-z][^()]*(\([^()]*\)[^()]*)?\)", ""),  # what is to be done is said before
-    (r"--minutes (\d[\d.]*)", r"\1 minutes"),
-    (r"--(sample-time|resample) (SECONDS|\d[\d.]*)", "the field of the sample time"),
-    (r"--limits? (\w+)=\S+:[^\s.,]+", r"limits of \1"),
-    (r"--load (\w+)", r"\1 among the inputs"),
-    (r"--zero (\w+) (?:\(|and )mckibben\.signals\.zeroed\)?", r"“Zero \1 there”, under Data"),
-    (r"--zero (\w+)", r"the button that zeroes \1"),
-    (r"--set ", "the setting "),
-    (
-        r"give a path in a folder that can be written to, on a disk that is not full",
-        "make room on the disk, or see to the rights of the folder",
-    ),
-    (r"see mckibben info --models", "see the settings of the models"),
-)
-"""Options with their values, and what they are on a page."""
-
-_WORDS = {
-    "allow-shared": "“Allow the same data in training and test”",
+_CONTROLS = {
+    "allow_shared": "“Allow the same data in training and test”",
+    "calibration": f"“{READING}”",
     "check": "the check",
-    "column": f"“{READING}”",
-    "float32": "“single precision”",
+    "columns": "the field Channel",
+    "constants": f"“{READING}”",
     "force": "“replace”",
     "input": "the field Inputs",
+    "inputs": "the field Inputs",
     "inverse": "“its compensator”",
     "jobs": "fewer at a time",
     "limits": "the limits",
     "load": "the load",
-    "measured": "the topic measured",
-    "minutes": "minutes to record",
+    "minutes": "the minutes to record",
     "model": "the model",
-    "muscle": "the muscle",
-    "name": "name",
+    "most_samples": "the most samples",
     "output": "the field Outputs",
-    "overwrite": "replace it",
-    "plant": "the plant",
+    "outputs": "the field Outputs",
     "rate": f"samples per second (“{READING}”)",
+    "raw": f"“{RAW}”",
     "resample": "the button “Resample”",
-    "rig": "the rig",
-    "sample-time": "the time between steps",
-    "samples": "the most samples",
+    "rest_length": f"the rest length (“{READING}”)",
+    "sample_time": "the time between steps",
+    "settings": "the settings",
+    "single": "“single precision”",
     "test": "a test recording",
-    "unit": f"the field Unit (“{READING}”)",
+    "units": f"the field Unit (“{READING}”)",
+    "zero": "the button that zeroes it",
 }
-"""All other options, and what stands for them."""
+"""Parameters of operations, and what they are on a page."""
+
+
+def control(name: str, key: str | None = None, value: str | None = None) -> str:
+    """Return a parameter in an error as a control of a page.
+
+    >>> control("gaps", None, "split"), control("units", "force", "N")
+    ('“split there”', 'the field Unit (“How it was read”) of force (N)')
+    """
+    if name == "gaps" and value in GAPS:
+        return f"“{GAPS[value]}”"
+    shown = _CONTROLS.get(name, name.replace("_", " "))
+    of = f" of {key}" if key else ""
+    given = f" ({value})" if value and not value.isupper() else ""
+    return f"{shown}{of}{given}"
 
 
 def said(error: Exception | str) -> str:
-    """Return what is wrong, a file's folder aside, with fields instead of options."""
-    text = str(error)
-    if isinstance(error, DataError):
+    """Return what is wrong, a file's folder aside, with controls for parameters."""
+    if isinstance(error, MckibbenError):
+        text = rendered(error, control)
         text = text.replace(f"{error.file}, ", "").replace(f"{error.file}: ", "")
-    for option, field in _WAYS:
-        text = re.sub(option, field, text)
-    text = re.sub(r"(?<![\w-])--([a-z][a-z0-9-]*)", _word, text)
+    else:
+        text = in_terms_of(str(error), control)
     return text[:LONGEST].encode("utf-8", "replace").decode()
-
-
-def _word(option: re.Match[str]) -> str:
-    return _WORDS.get(option[1], option[0])
 
 
 def shortened(text: str, most: int) -> str:

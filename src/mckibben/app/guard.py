@@ -265,6 +265,6 @@ def checked_token(token: str) -> str:
     if not TOKEN.fullmatch(token):
         raise DataError(
             "the token is empty, short, long or has other characters than an address takes",
-            remedy="leave --token out, and one is made; or give 16 to 256 of A-Z a-z 0-9 _ . ~ -",
+            remedy="give 16 to 256 of A-Z a-z 0-9 _ . ~ -",
         )
     return token

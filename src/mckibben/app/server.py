@@ -29,7 +29,6 @@ def serve(
     *,
     host: str = "127.0.0.1",
     port: int = 8750,
-    token: str | None = None,
     show: bool = True,
     announce: Callable[[str], None] = _print,
 ) -> None:
@@ -44,8 +43,6 @@ def serve(
         Address to listen on.
     port : int
         To listen on; 0 for any free one.
-    token : str, optional
-        To demand of whoever connects, from this machine too; default a new one.
     show : bool
         Whether to open the page in a browser.
     announce : callable
@@ -56,7 +53,9 @@ def serve(
     DataError
         If the workspace cannot be made, the port is taken, or the token could be guessed.
     """
-    token = new_token() if token is None else checked_token(token)
+    # in the environment, not among the arguments that every process list shows
+    given = os.environ.get("MCKIBBEN_TOKEN")
+    token = new_token() if given is None else checked_token(given)
     os.umask(0o077)  # what is written is its user's alone
     workspace = Workspace(folder)
     port = _free(host, port)
@@ -103,5 +102,5 @@ def _free(host: str, port: int) -> int:
         reason = getattr(error, "strerror", None) or error
         raise DataError(
             f"{host}:{port} cannot be listened on ({reason})",
-            remedy="give another --port, or close the other workbench",
+            remedy="give another `port`, or close the other workbench",
         ) from None

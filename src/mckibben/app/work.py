@@ -44,7 +44,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     board = ranking.board
     (row,) = board.rows
     if row.reason is not None or row.block is None:
-        raise ModelError(row.reason or "it gave no model. Remedy: try other settings.")
+        raise ModelError(row.reason or "it gave no model", remedy="try other settings")
     name = str(given["name"])
     row.block.save(workspace.path("models", f"{name}.json"))
     banded = workspace.path("banded", f"{name}.json")  # with which it scatters as a plant

@@ -190,10 +190,8 @@ class Banded(Composition):
     """
 
     kind: ClassVar[str] = "banded"
-    no_inverse: ClassVar[str] = (
-        "is a model with a band and has no inverse: a band is of outputs. Remedy: invert the model that "
-        "was calibrated, or banded.forward."
-    )
+    no_inverse: ClassVar[str] = "is a model with a band and has no inverse: a band is of outputs"
+    instead: ClassVar[str] = "invert the model that was calibrated, or banded.forward"
     parameters: ClassVar[tuple[str, ...]] = ("forward", "band")
 
     forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]

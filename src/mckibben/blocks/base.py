@@ -103,10 +103,11 @@ class Block(DrawsItself, Parametrised):
     undoing: ClassVar[bool] = False
     """Whether blocks of this class undo another, which `forward_model` gives."""
 
-    no_inverse: ClassVar[str] = (
-        "has no exact inverse. Remedy: use an invertible model (pi, gpi, mpi)."
-    )
-    """Why it cannot be undone and what to do instead, if it cannot: behind its kind, as an error."""
+    no_inverse: ClassVar[str] = "has no exact inverse"
+    """Why it cannot be undone, if it cannot: behind its kind, as an error."""
+
+    instead: ClassVar[str] = "invert a hysteresis model (pi, gpi, mpi, cpi)"
+    """What to do then: the remedy of that error."""
 
     increasing: ClassVar[tuple[str, ...]] = ()
     """Fields of numbers in increasing order, which single precision must not make one."""
@@ -303,7 +304,7 @@ class Block(DrawsItself, Parametrised):
 
     def inverse(self) -> Block:
         """Return the block that undoes this one; a `ModelError` says why there is none."""
-        raise ModelError(f"{self.kind!r} {self.no_inverse}")
+        raise ModelError(f"{self.kind!r} {self.no_inverse}", remedy=self.instead)
 
     @property
     def forward_model(self) -> Block | None:
@@ -561,7 +562,7 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
     if sample_time is None or not sample_time > 0:
         raise ModelError(
             f"{kind!r} depends on rate and needs a sample time, but the data have no time",
-            remedy="read the recording with a time column or --rate, or give sample_time",
+            remedy="read the recording with a time column or `rate`, or give sample_time",
         )
     return sample_time
 

@@ -104,7 +104,8 @@ class PIDFeedback(Block):
     kernel: ClassVar[Step] = pid_step
     start_kernel: ClassVar[Start] = pid_start
     rate_dependent: ClassVar[bool] = True
-    no_inverse: ClassVar[str] = "has no inverse. Remedy: invert the model of the muscle."
+    no_inverse: ClassVar[str] = "has no inverse"
+    instead: ClassVar[str] = "invert the model of the muscle"
     parameters: ClassVar[tuple[str, ...]] = ("kp", "ki", "kd")
     notation: ClassVar[Notation] = Notation(
         r"p_i = p_{b,i} + k_{p,i} e_i + k_{i,i} \int e_i\, dt - k_{d,i} \dot{y}_i,\quad "

@@ -138,7 +138,7 @@ class Trial:
         try:
             attempt(*given)
         except kind as error:
-            named = about in str(error) and "Remedy:" in str(error)
+            named = about in str(error) and bool(getattr(error, "remedy", ""))
             self.demand(named, f"{str(error)!r} names {about!r} and ends with a remedy")
         else:
             self.demand(False, f"bad input raises a {kind.__name__} ({about})")
@@ -313,7 +313,7 @@ def _inverts(trial: Trial) -> None:
     try:
         inverse = block.inverse()
     except ModelError as error:
-        trial.demand("Remedy:" in str(error), "an error of inverse() ends with a remedy")
+        trial.demand(bool(error.remedy), "an error of inverse() ends with a remedy")
         return
     swapped = (*block.outputs, *block.inputs[trial.n_driven :])
     driven = block.inputs[: trial.n_driven]

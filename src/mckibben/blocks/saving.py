@@ -110,29 +110,22 @@ def load(path: str | Path) -> Block:
     ModelError
         If the file is absent, unreadable, too large, truncated, or anything but a saved model.
     """
+    from mckibben.files.formats import SOUGHT
+
     path = Path(path)
     try:
         text = read_text(path, most=LARGEST_FILE)
         return from_dict(json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique))
     except DataError as error:
-        raise ModelError(_recording(path) or str(error)) from None
-    except (ValueError, RecursionError) as error:
-        if told := _recording(path):
-            raise ModelError(told) from None
-        raise ModelError(
-            f"{path}: not readable as a model ({str(error)[:200]})", remedy="save the model again"
-        ) from None
+        problem, remedy = error.problem, error.remedy
     except ModelError as error:
-        raise ModelError(f"{path}: {error}") from None
-
-
-def _recording(path: Path) -> str:
-    """Return what to say of a file that is no JSON, if it is there and named as a recording."""
-    from mckibben.files.formats import SOUGHT
-
-    if path.suffix.casefold() not in SOUGHT or not path.is_file():
-        return ""
-    return f"{path}: this is a recording. Remedy: the model comes first, then recordings."
+        raise ModelError(error.problem, file=path, remedy=error.remedy) from None
+    except (ValueError, RecursionError) as error:
+        problem = f"it is not readable as a model ({str(error)[:200]})"
+        remedy = "save the model again"
+    if path.suffix.casefold() in SOUGHT and path.is_file():
+        problem, remedy = "this is a recording", "the model comes first, then recordings"
+    raise ModelError(problem, file=path, remedy=remedy)
 
 
 def _tuples(value: Any) -> Any:

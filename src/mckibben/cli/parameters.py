@@ -85,6 +85,11 @@ Force = Annotated[bool, Option("Replace files of yours, too; never what is read.
 Json = Annotated[bool, Option("Print the result as JSON on standard output.", flag="--json")]
 
 
+def repeated() -> str:
+    """Return the command as it was typed."""
+    return shlex.join(["mckibben", *sys.argv[1:]])
+
+
 def command(run: Callable[..., int | None]) -> click.Command:
     """Return a command that calls a function: its parameters are arguments and flags.
 

@@ -93,8 +93,8 @@ def outcomes(work: Work, common: Any, items: Sequence[Any]) -> Iterator[Outcome]
     except Exception as error:  # of the backend: what came before is kept
         failure = said(error)
     for index in sorted(left):
-        words = f"{failure}. Remedy: see how the workers are, and call it again."
-        yield Outcome(index, error=WorkerError(words))
+        remedy = "see how the workers are, and call it again"
+        yield Outcome(index, error=WorkerError(failure, remedy=remedy))
 
 
 def _called(work: Work, common: Any, index: int, item: Any) -> tuple[int, bytes]:

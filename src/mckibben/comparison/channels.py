@@ -154,7 +154,7 @@ def channels_of(
                     "there is no such channel to give the load",
                     file=recording.source,
                     channel=name,
-                    remedy="name it with --column, or leave --load out",
+                    remedy="name it with `columns[CHANNEL]=COLUMN`, or leave `load` out",
                 )
     return channels
 

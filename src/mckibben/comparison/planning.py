@@ -104,7 +104,7 @@ def plan_of(
     elif most_samples is not None:
         raise DataError(
             "recordings of several muscles, or under loads, are not thinned",
-            remedy="leave --samples out, or resample them to a longer sample time",
+            remedy="leave `most_samples` out, or resample them to a longer sample time",
         )
     split = split_of(recordings, tests, channels)
     parts, chosen_by = validation_folds(split.train, channels, n_folds, checks)
@@ -163,7 +163,7 @@ def _early(every: Sequence[Recording], channels: Channels, allow: bool) -> tuple
             file=every[0].source,
             channel=channels.outputs[0],
             remedy="check that columns are not swapped and clocks agree; or compare all the same with "
-            "--allow-early (allow_early=True)",
+            "`allow_early`",
         )
     return (f"{channels.outputs[0]} {moves}",)
 
@@ -178,7 +178,7 @@ def _checked(some: Sequence[Sequence[Recording]], channels: Channels) -> str:
     if len(set(units.values())) > 1:
         raise DataError(
             f"the outputs have different units: {units}, so that their errors have no mean",
-            remedy="compare models of each apart, with --output",
+            remedy="compare models of each apart, with `output`",
         )
     return next(iter(units.values()))
 

@@ -125,14 +125,14 @@ def check_shared(
         if allow is not None:
             remedy += (
                 "; to go on all the same (runs of a sensor with few levels may agree and be two), give "
-                "--allow-shared (allow_shared=True, or the tick beside Fit): every result will say so"
+                "`allow_shared`: every result states it"
             )
         raise DataError(sentences[0], file=listed[found[0].second][1].source, remedy=remedy)
     for (role, one), (other_role, other) in combinations(listed, 2):
         if not found and role != other_role and (again := _seeded(one, other)):
             warnings.warn(
                 f"{one.name} and {other.name} have the same sensor noise, as both were run with seed "
-                f"{one.meta['seed']}. Remedy: {again}",
+                f"{one.meta['seed']}: {again}",
                 DataWarning,
                 stacklevel=2,
             )
@@ -145,7 +145,7 @@ def _seeded(one: Recording, other: Recording) -> str:
     rig, seed = ([run.meta.get(key) for run in (one, other)] for key in ("rig", "seed"))
     if rig[0] is None or seed[0] is None or rig[0] != rig[1] or seed[0] != seed[1]:
         return ""
-    return f"run one of them again with --seed {int(seed[0]) + 1}"
+    return f"run one of them again with `seed={int(seed[0]) + 1}`"
 
 
 def without_copies(

@@ -87,8 +87,7 @@ def beyond_known(model: Block, recording: Recording) -> list[str]:
             ends = " to ".join(numeral(float(end), 3) for end in (values.min(), values.max()))
             notes.append(
                 f"in {recording.name}, {channel.name} goes from {ends} {channel.unit}, and the model "
-                f"was identified from {numeral(low, 3)} to {numeral(high, 3)}: it extrapolates. "
-                "Remedy: identify it on recordings that go there too"
+                f"was identified from {numeral(low, 3)} to {numeral(high, 3)}: it extrapolates"
             )
     return notes
 

@@ -157,7 +157,7 @@ def track(
     step = reference.sample_time
     if step is None:
         raise DataError(
-            "the reference has no time", file=reference.source, remedy="add a time column or --rate"
+            "the reference has no time", file=reference.source, remedy="add a time column or `rate`"
         )
     _check(approach, settle, noise, delay, slew, step)
     reference = asked(plant, reference, controller if isinstance(controller, Block) else None)

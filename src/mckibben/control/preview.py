@@ -59,7 +59,7 @@ def previewed(reference: Recording, preview: float) -> Recording:
     """
     if reference.sample_time is None:
         raise DataError(
-            "the reference has no time", file=reference.source, remedy="add a time column or --rate"
+            "the reference has no time", file=reference.source, remedy="add a time column or `rate`"
         )
     ahead = samples_ahead(preview, reference.sample_time)
     n = len(reference)

@@ -23,9 +23,7 @@ BEYOND = 0.25
 """Share of a model's range of pressure that a plant does not let through, and that is another muscle:
 recordings of one muscle begin and end a few tenths of a bar apart."""
 
-REMEDY = (
-    "Remedy: try it on a model of your own muscle (--plant model.json), where that was identified"
-)
+REMEDY = "try it on a model of your own muscle (`plant=model.json`), where that was identified"
 
 
 def of_itself(model: Block | None, plant: Plant) -> bool:
@@ -50,9 +48,9 @@ def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
         if isinstance(plant, Twin) and plant.scatters:
             return [f"{same}, with its band: errors without feedback are draws from the band"]
         return [
-            f"{same}, which makes it right by construction: only limits and rates show. Remedy: try it "
+            f"{same}, which makes it right by construction: only limits and rates show: try it "
             "on another model of the muscle, or give this one the band of recordings held back "
-            "(mckibben calibrate model.json FILES -o banded.json; --plant banded.json)"
+            "(`calibrate()`; `plant=banded.json`)"
         ]
     return [*_pressures(model, plant, rise), *_strokes(model, plant, rise)]
 
@@ -63,7 +61,7 @@ def doubts_of_feedback(law: str, plant: Plant) -> list[str]:
         return []
     return [
         "the plant is a model without time, which answers at once: feedback is better on it than it "
-        "will be on the muscle. Remedy: compare feedback on a model with time, such as balance of "
+        "will be on the muscle: compare feedback on a model with time, such as balance of "
         "recordings that have time"
     ]
 

@@ -171,7 +171,7 @@ class Twin:
         if name not in self._limits:
             raise ModelError(
                 f"{self.forward.title!r} does not say how far its {name} may go",
-                remedy=f"say it (--limits {name}=LOW:HIGH, or limits of a twin), or calibrate it",
+                remedy=f"give `limits[{name}]=LOW:HIGH`, or calibrate it",
             )
         return self._limits[name]
 

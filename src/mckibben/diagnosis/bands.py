@@ -193,7 +193,7 @@ def calibration(
         raise DataError(
             f"sample times differ, from {steps[0]:g} to {steps[-1]:g} s",
             file=recordings[0].source,
-            remedy="resample all to one (--resample)",
+            remedy="resample all to one (`resample`)",
         )
     for recording in recordings:
         for channel in model.outputs:

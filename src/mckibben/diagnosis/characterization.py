@@ -407,6 +407,6 @@ def _unit(runs: Sequence[Recording], channel: str) -> str:
         raise DataError(
             f"recordings have it in different units: {', '.join(sorted(units))}",
             channel=channel,
-            remedy="convert them, or read the files with --unit",
+            remedy="convert them, or read the files with `units[CHANNEL]=UNIT`",
         )
     return units.pop()

@@ -173,7 +173,7 @@ def excitation(
                 f"it is not among its channels, {', '.join(recording.channels)}",
                 file=recording.source,
                 channel=absent[0],
-                remedy="name them with --input and --output, or give recordings with the same channels",
+                remedy="name them with `input` and `output`, or give recordings with the same channels",
             )
     told = dict.fromkeys((*(found.scheduling or ()), *schedules(every, names)))
     loads = tuple(name for name in told if all(name in recording for recording in every))

@@ -97,7 +97,7 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
             "the channel is constant, so that nothing tells what the model does when it moves",
             file=source,
             channel=still[0],
-            remedy="record while it moves, or name another column with --column",
+            remedy="record while it moves, or name another column with `columns[CHANNEL]=COLUMN`",
         )
 
 
@@ -150,7 +150,7 @@ def _refuse(recording: Recording, block: Block, step: float | None) -> None:
         raise DataError(
             f"recordings differ in sample time: {said[0]} and {said[1]}",
             file=recording.source,
-            remedy="check them one by one, or resample them with --resample",
+            remedy="check them one by one, or resample them with `resample`",
         )
 
 

@@ -200,7 +200,7 @@ def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block |
         model = compensator.forward_model
     if model is None:
         raise ModelError(
-            "it is not known which model was in the loop", remedy="give the model too, with --model"
+            "it is not known which model was in the loop", remedy="give the model too, with `model`"
         )
     model = inside(model)
     if compensator is None:
@@ -225,7 +225,7 @@ def _check(logs: Sequence[Recording], model: Block, inputs: Sequence[str], follo
         raise DataError(
             f"there is no {name} beside what the model gives",
             file=logs[0].source if logs else None,
-            remedy=f"map its column, as in --column {name}=COLUMN",
+            remedy=f"map its column, as in `columns[{name}]=COLUMN`",
         )
     for log in logs:
         if log.sample_time is None:

@@ -65,7 +65,7 @@ def compile_c(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()
     if compiler is None:
         raise ModelError(
             "there is no C compiler on this machine",
-            remedy="install gcc or clang, or leave --check out and compile the folder elsewhere",
+            remedy="install gcc or clang, or leave `check` out and compile the folder elsewhere",
         )
     command = [compiler, *FLAGS, *options, "-o", str(out), *map(str, sources), "-lm"]
     run(command, "the exported C does not compile")

@@ -128,7 +128,7 @@ def column(name: str, unit: str | None, cells: Any, dialect: Dialect) -> tuple[C
     )
     if not wrong.any():
         wrong, problem = filled & (kinds != usual), "is not a number like the others"
-        remedy = "correct that cell, or leave it blank and use --gaps split or interpolate"
+        remedy = "correct that cell, or leave it blank and use `gaps=split` or `gaps=interpolate`"
     if wrong.any():
         at = int(np.argmax(wrong))
         flaw = Flaw(at, f"{words[codes[at]][:40]!r} {problem}", remedy)

@@ -107,7 +107,7 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
             first = named[channel].header
             raise source.error(
                 f"columns {first!r} and {column.header!r} both hold it",
-                f"name one, with --column {channel}={first!r}; the columns of a file need different "
+                f"name one, with `columns[{channel}]={first!r}`; the columns of a file need different "
                 "headers",
                 channel,
             )
@@ -128,7 +128,7 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
         if notes:
             source.warn(
                 f"no name identifies these columns, so they are read by their units: {listed(notes)}; "
-                "use --column CHANNEL=COLUMN where that is wrong"
+                "use `columns[CHANNEL]=COLUMN` where that is wrong"
             )
     _require(named, source)
     return named, left_out | dict(source.table.unread)
@@ -159,7 +159,7 @@ def find_column(wanted: str, channel: str, source: Source) -> Column:
             remedy = "save it as one vector of numbers"
             raise source.error(f"{place!r} cannot be read: {why}", remedy, channel)
     problem = f"there is no column {wanted!r}; there are {_headers(table)}"
-    raise source.error(problem, f"name one of them with --column {channel}=COLUMN", channel)
+    raise source.error(problem, f"name one of them with `columns[{channel}]=COLUMN`", channel)
 
 
 def matrix_hint(table: Table, *, time: bool) -> str:
@@ -172,7 +172,7 @@ def matrix_hint(table: Table, *, time: bool) -> str:
     steps = np.diff([] if first.values is None else first.values)
     usual = np.median(steps) if steps.size else 0.0
     if time and usual > 0 and np.all(np.abs(steps - usual) < 0.5 * usual):
-        hint += f"; {first.header} rises evenly, as time does: --column time={first.header}"
+        hint += f"; {first.header} rises evenly, as time does: `columns[time]={first.header}`"
     return hint
 
 
@@ -185,7 +185,7 @@ def _of_one_length(source: Source, fixed: Mapping[str, Column]) -> tuple[Source,
     if len(set(asked.values())) > 1:
         sizes = ", ".join(f"{channel} {size}" for channel, size in asked.items())
         problem = f"the columns asked for have unlike numbers of samples: {sizes}"
-        remedy = "name columns of one length with --column CHANNEL=COLUMN"
+        remedy = "name columns of one length with `columns[CHANNEL]=COLUMN`"
         raise source.error(problem, remedy, next(iter(asked)))
     found = Counter(column.size for column in columns if column.size > 1)
     if not found:
@@ -220,7 +220,7 @@ def _described(source: Source) -> dict[str, Column]:
             if table.own:
                 continue
             if time.sample_time is None if channel == "time" else request.asks_for(channel):
-                remedy = f"correct its column in {NAME}, or use --column {channel}=COLUMN"
+                remedy = f"correct its column in {NAME}, or use `columns[{channel}]=COLUMN`"
                 raise source.error(error.problem, remedy, channel) from None
             source.warn(f"channel {channel!r} is left out: {error.problem}")
     return found
@@ -256,11 +256,11 @@ def _require(named: Mapping[str, Column], source: Source) -> None:
         if channel not in named and channel not in source.derived(named):
             hint = matrix_hint(table, time="time" not in named)
             problem = f"there is no such channel; the columns are {_headers(table)}"
-            remedy = f"name its column with --column {channel}=COLUMN{hint}"
+            remedy = f"name its column with `columns[{channel}]=COLUMN`{hint}"
             if others := [name for name in named if conversion(channel, name, 1.0)]:
                 remedy = f"state {REST_LENGTH}, which makes it of {others[0]}"
             raise source.error(problem, remedy, channel)
-    for option, given in (("--calibrate", request.calibration), ("--unit", request.units)):
+    for option, given in (("calibration", request.calibration), ("units", request.units)):
         for channel in given:
             if channel not in named:
                 problem = f"it is not there; there are {', '.join(named)}"

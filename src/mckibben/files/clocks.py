@@ -57,7 +57,7 @@ def on_one(named: Mapping[str, Column], source: Source) -> tuple[dict[str, Colum
     if grid.size < 2:
         spans = [f"{name} from {t[0]:.6g} to {t[-1]:.6g} s" for name, t in needed.items()]
         problem = f"its channels have no time in common: {'; '.join(spans[:10])}"
-        remedy = "record them together, or name other columns with --column CHANNEL=COLUMN"
+        remedy = "record them together, or name other columns with `columns[CHANNEL]=COLUMN`"
         raise source.error(problem, remedy, slowest)
     if any(not np.array_equal(times, grid) for times in needed.values()):
         rates = ", ".join(f"{name} {1 / step:.4g}" for name, step in list(steps.items())[:10])

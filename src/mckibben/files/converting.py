@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -103,7 +102,7 @@ def in_package_units(source: Source) -> tuple[dict[str, Signal], Times | None, d
     assumed = ["time in s"] if times is not None and times.assumed else []
     assumed += [f"{name} in {one.unit}" for name, one in each if one.assumed]
     if assumed:
-        source.warn(f"{ASSUMED}{listed(assumed)}; use --unit CHANNEL=UNIT where that is wrong")
+        source.warn(f"{ASSUMED}{listed(assumed)}; use `units[CHANNEL]=UNIT` where that is wrong")
     absolute = [name for name, kind in references.items() if kind == "absolute"]
     if absolute:
         source.warn(f"absolute pressure, not gauge: {listed(absolute)}; no offset was removed")
@@ -196,7 +195,7 @@ def _signal(channel: str, column: Column, source: Source) -> Signal:
 def _numbers(channel: str, column: Column, source: Source) -> Array:
     """Return the samples of a column; `DataError` if it is text or has a flaw."""
     if column.values is None:
-        remedy = f"name a column of numbers with --column {channel}=COLUMN"
+        remedy = f"name a column of numbers with `columns[{channel}]=COLUMN`"
         raise source.error(f"column {column.header!r} holds text", remedy, channel, 0)
     if column.flaw is not None:
         flaw = column.flaw
@@ -240,7 +239,7 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
     if unit is None and asked is None and expected is None:
         return Unit(text, None), False
     if unit is None:
-        remedy = f"name it, as in --unit {channel}={expected or 'UNIT'}"
+        remedy = f"name it, as in `units[{channel}]={expected or 'UNIT'}`"
         raise source.error(f"the unit {text[:40]!r} is unknown", remedy, channel)
     if expected is None or unit.target == expected:
         return unit, False
@@ -249,11 +248,11 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
     elif expected == "" and unit.target == "mm":
         remedy = _in_mm(column)
     elif weight(text) != text:
-        remedy = f"where it is the weight of that mass, use --unit {channel}={weight(text)}"
+        remedy = f"where it is the weight of that mass, use `units[{channel}]={weight(text)}`"
     else:
         remedy = (
-            f"correct the unit with --unit {channel}={expected or '%'}, or name another column with "
-            f"--column {channel}=COLUMN"
+            f"correct the unit with `units[{channel}]={expected or '%'}`, or name another column with "
+            f"`columns[{channel}]=COLUMN`"
         )
     problem = f"in {text!r}, which does not convert to" if text else "without a unit: it is in"
     problem = f"it cannot be {problem} {expected or 'a pure number'}"
@@ -262,12 +261,12 @@ def _unit(channel: str, column: Column, values: Array, source: Source) -> tuple[
 
 def _in_mm(column: Column) -> str:
     """Return the remedy for a contraction in millimetres."""
-    named = shlex.quote(f"displacement={column.header}")
-    return f"read it by --column {named} --unit displacement=mm, and state {REST_LENGTH}"
+    read = f"`columns[displacement]={column.header}` and `units[displacement]=mm`"
+    return f"read it by {read}, and state {REST_LENGTH}"
 
 
 def _option(channel: str, column: Column, unit: str) -> str:
-    return f"--calibrate {shlex.quote(f'{channel}={column.header}:GAIN:OFFSET:{unit}')}"
+    return f"`calibration[{channel}]={column.header}:GAIN:OFFSET:{unit}`"
 
 
 def _stated(channel: str, column: Column, source: Source) -> str | None:
@@ -290,7 +289,7 @@ def _stated(channel: str, column: Column, source: Source) -> str | None:
     last = next(reversed(texts.values()), None)
     if len({(unit.name, unit.reference) for unit in units.values()}) > 1:
         differing = ", ".join(f"{text!r} in {place}" for place, text in texts.items())
-        remedy = f"name the right one, as in --unit {channel}={last}"
+        remedy = f"name the right one, as in `units[{channel}]={last}`"
         raise source.error(f"its unit is contradicted: {differing}", remedy, channel)
     return last
 
@@ -303,7 +302,7 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> Uni
     if expected and (ending := unknown_ending(column.label)):
         raise source.error(
             f"its unit is not certain: {column.label!r} has {ending!r}",
-            f"name its unit, as in --unit {channel}={expected}, or calibrate it, as in "
+            f"name its unit, as in `units[{channel}]={expected}`, or calibrate it, as in "
             f"{_option(channel, column, expected)}",
             channel,
         )
@@ -311,8 +310,8 @@ def _assumed(channel: str, column: Column, values: Array, source: Source) -> Uni
     plausible = quality.PLAUSIBLE[expected]
     if 0 < largest < plausible.least or largest > plausible.most:
         units = quality.fitting_units(largest, expected, expected)
-        options = " or ".join(f"--unit {channel}={unit}" for unit in units)
-        as_it_is = f"--unit {channel}={expected or 1} where that is right"
+        options = " or ".join(f"`units[{channel}]={unit}`" for unit in units)
+        as_it_is = f"`units[{channel}]={expected or 1}` where that is right"
         remedy = f"name its unit, as in {options}, or {as_it_is}"
         if expected == "":
             remedy += f"; where it is in mm, {_in_mm(column)}"

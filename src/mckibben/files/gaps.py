@@ -72,7 +72,7 @@ def pieces(
         size, jitter = timebase.common_step(time, spans if split else stretches)
         step = _judged_step(size, jitter, times, source)
         if cuts.size and (time[-1] - time[0]) / size > 100 * time.size:
-            raise source.error("its gaps are too long to bridge", "use --gaps split", "time")
+            raise source.error("its gaps are too long to bridge", "use `gaps=split`", "time")
     found = []
     for first, after in spans:
         t, bridged = time[first:after], holes[first:after] & (not split)
@@ -105,19 +105,19 @@ def _missing(channels: Channels, source: Source) -> dict[str, Mask]:
             source.warn(f"channel {name!r} is left out: {n} of its samples are missing")
             continue
         if n == missing.size:
-            remedy = f"name a column that holds numbers with --column {name}=COLUMN"
+            remedy = f"name a column that holds numbers with `columns[{name}]=COLUMN`"
             raise source.error("all of its samples are missing", remedy, name, 0)
         if n and source.request.gaps == "error":
             problem = f"{n} of {missing.size} samples are missing or not finite"
             remedy = (
-                "use --gaps interpolate to bridge them, --gaps split to cut them out, or --raw where "
+                "use `gaps=interpolate` to bridge them, `gaps=split` to cut them out, or `raw` where "
                 "they are numbers that were measured"
             )
             raise source.error(problem, remedy, name, int(np.argmax(missing)))
         found[name] = missing
     if not found:
         problem = "every column has samples missing"
-        raise source.error(problem, "use --gaps interpolate or split")
+        raise source.error(problem, "use `gaps=interpolate` or `gaps=split`")
     return found
 
 
@@ -147,7 +147,7 @@ def _judge_gaps(cuts: NDArray[np.intp], times: Times, source: Source) -> None:
     total = f"{len(cuts)} gap(s) in time, {lengths.sum():.6g} s in all"
     if source.request.gaps == "error":
         problem = f"there is a gap of {lengths[0]:.6g} s before this row ({total})"
-        remedy = "use --gaps split to cut there or --gaps interpolate to bridge them"
+        remedy = "use `gaps=split` to cut there or `gaps=interpolate` to bridge them"
         raise source.error(problem, remedy, "time", int(cuts[0]))
     source.warn(f"{total}, were interpolated over")
 
@@ -175,7 +175,7 @@ def _long_enough(spans: timebase.Spans, source: Source) -> timebase.Spans:
     if not long.size:
         raise source.error(
             f"no stretch without gaps has {fewest} samples",
-            "use --gaps interpolate, or give a recording with fewer gaps",
+            "use `gaps=interpolate`, or give a recording with fewer gaps",
         )
     if len(long) < len(spans):
         rows = [f"{source.table.row(first)}" for first in np.setdiff1d(spans[:, 0], long[:, 0])]

@@ -66,12 +66,12 @@ def seconds(texts: Sequence[str], source: Source) -> Array:
     if bad.size:
         like = "" if form is None or bad[0] == 0 else f" as {first[:40]!r} is"
         problem = f"{texts[bad[0]][:40]!r} is no time{like}"
-        remedy = "write times in seconds or as 2026-01-31T12:00:00.5, or give --rate"
+        remedy = "write times in seconds or as 2026-01-31T12:00:00.5, or give `rate`"
         raise source.error(problem, remedy, "time", int(bad[0]))
     for other in others:
         if not np.isnat(other).any() and np.any(other - other[0] != instants - instants[0]):
             problem = f"{first[:40]!r} may have the day first or the month"
-            remedy = "write dates as 2026-01-31, or with the day first and dots, or give --rate"
+            remedy = "write dates as 2026-01-31, or with the day first and dots, or give `rate`"
             raise source.error(problem, remedy, "time", 0)
     since: Array = (instants - instants[0]).astype(np.float64) * 1e-9
     if form is not None and form["first"] is None:  # times of day go on after midnight

@@ -85,7 +85,7 @@ def refuse_wraps(channel: str, recorded: Array, source: Source) -> None:
     if found is not None:
         raise source.error(
             f"it jumps by almost {found[0]:.0f} there: an integer counter that wraps",
-            f"add {found[0]:.0f} after each wrap, or use --raw where that was measured",
+            f"add {found[0]:.0f} after each wrap, or use `raw` where that was measured",
             channel,
             int(np.flatnonzero(finite)[np.flatnonzero(found[1])[0] + 1]),
         )
@@ -110,7 +110,7 @@ def without_codes(channel: str, values: Array, recorded: Array, source: Source) 
     source.warn(
         f"channel {channel!r}: {coded.sum()} sample(s) are {found}, a code for missing ones "
         f"(first in row {source.table.row(int(np.argmax(coded)))}); "
-        "use --raw where that was measured"
+        "use `raw` where that was measured"
     )
     return np.where(coded, np.nan, values)
 
@@ -163,7 +163,7 @@ def refuse_impossible(channel: str, values: Array, read_in: str, source: Source)
     excess = np.maximum(known - high, low - known)
     at = int(np.flatnonzero(finite)[np.argmax(excess if excess.max() > 0 else np.abs(known))])
     units = fitting_units(values[at], read_in, target)
-    options = " or ".join(f"--unit {channel}={unit}" for unit in units)
+    options = " or ".join(f"`units[{channel}]={unit}`" for unit in units)
     problem = f"{values[at]:.6g} {target} is impossible: is it in {' or '.join(units)}?"
     remedy = f"name its unit, as in {options}, or correct that cell"
     raise source.error(problem, remedy, channel, at)

@@ -84,8 +84,8 @@ class Request:
                     f"it was calibrated before, and is again by {NAME}",
                     file=path,
                     channel=name,
-                    remedy=f"remove it from {NAME}; or, if the values are raw ones, use --calibrate "
-                    f"{name}=COLUMN:GAIN:OFFSET:UNIT",
+                    remedy=f"remove it from {NAME}; or, if the values are raw ones, use "
+                    f"`calibration[{name}]=COLUMN:GAIN:OFFSET:UNIT`",
                 )
         for name, (value, unit) in self.constants.items():
             channels[name] = Channel(value=value, unit=unit.strip() or None)
@@ -100,10 +100,10 @@ class Request:
             raise error(problem, remedy=f"use one of {', '.join(get_args(Gaps))}")
         if self.rate is not None and not 0 < self.rate < math.inf:
             problem = f"a rate of {self.rate:g} samples per second is impossible"
-            raise error(problem, remedy="give a positive number with --rate")
+            raise error(problem, remedy="give a positive number with `rate`")
         if self.rest_length is not None and not 0 < self.rest_length <= LONGEST:
             problem = f"a rest length of {self.rest_length:g} mm is impossible"
-            raise error(problem, remedy="give a positive number of millimetres with --rest-length")
+            raise error(problem, remedy="give a positive number of millimetres with `rest_length`")
         for channel, (value, _) in self.constants.items():
             if not math.isfinite(value) or channel in ("", "time", *self.columns):
                 remedy = "give a finite number, to a channel that is no column and not time"

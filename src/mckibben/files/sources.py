@@ -224,7 +224,7 @@ def _joined(tables: Mapping[Path, Table], names: Mapping[Path, str], request: Re
         if problem:
             remedy = (
                 "save one signal in every file, and one column of times in all or in none, and "
-                f"use --rate; or leave the file out of join in {NAME}"
+                f"use `rate`; or leave the file out of join in {NAME}"
             )
             raise DataError(problem, file=path, channel=channel, remedy=remedy)
         signals.append(_named(found[0], names[path]))

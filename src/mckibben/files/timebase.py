@@ -54,7 +54,7 @@ def checked(time: Array, source: Source) -> Array:
     missing = np.flatnonzero(~np.isfinite(time))
     if missing.size:
         problem = f"the time is missing in {missing.size} row(s)"
-        remedy = "fill it in or delete the row; or delete the column and give --rate"
+        remedy = "fill it in or delete the row; or delete the column and give `rate`"
         raise source.error(problem, remedy, "time", int(missing[0]))
     wrapped = wraps(time)
     if wrapped is not None:
@@ -71,7 +71,7 @@ def checked(time: Array, source: Source) -> Array:
     remedy = "split the file there, or sort its rows by time"
     if steps[at] == 0:
         problem = f"the time {time[at]:.10g} is repeated"
-        remedy = "delete the repeated row; or, where times were rounded when saved, give --rate"
+        remedy = "delete the repeated row; or, where times were rounded when saved, give `rate`"
     raise source.error(problem, remedy, "time", at + 1)
 
 
@@ -92,11 +92,11 @@ def stated_step(source: Source) -> float | None:
         steps = np.where([_last(place) in STEPS for place in rates], given, 1.0 / given)
     if not (steps.min() >= 1e-12 and steps.max() < 1e11 and np.ptp(steps) <= 1e-3 * steps.min()):
         problem = f"{stated}: no rate or sample time, or not one alone"
-        remedy = "give the samples per second with --rate, or correct them in the file"
+        remedy = "give the samples per second with `rate`, or correct them in the file"
         raise source.error(problem, remedy, "time")
     source.warn(
         f"there are no times, so {stated} is read as {steps[0]:g} s between samples; "
-        "use --rate where that is wrong"
+        "use `rate` where that is wrong"
     )
     return float(steps[0])
 
@@ -138,12 +138,12 @@ def unit_by_size(time: Array, source: Source) -> str | None:
             f"the times have no unit; {time[0]:.12g} and the short steps may be days, as "
             "spreadsheets count them, or seconds"
         )
-        raise source.error(problem, "use --unit time=day or --unit time=s", "time", 0)
+        raise source.error(problem, "use `units[time]=day` or `units[time]=s`", "time", 0)
     for unit, (first, last) in _SINCE_1970.items():
         if first <= low and high < last:
             source.warn(
                 f"the times have no unit; by their size they are counted in {unit} since 1970; "
-                "use --unit time=UNIT where that is wrong"
+                "use `units[time]=UNIT` where that is wrong"
             )
             return unit
     step = float(np.median(steps))
@@ -156,8 +156,8 @@ def doubtful_unit(problem: str, step: float, source: Source) -> DataError:
     """Return the error for times in an uncertain unit, with those that make steps of 0.1 ms to 5 s."""
     shares = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
     fitting = [unit for unit, share in shares.items() if 1e-4 <= share * step <= 5.0] or ["ms"]
-    options = " or ".join(f"--unit time={unit}" for unit in fitting)
-    remedy = f"name its unit, as in {options}, or --unit time=s where that is right"
+    options = " or ".join(f"`units[time]={unit}`" for unit in fitting)
+    remedy = f"name its unit, as in {options}, or `units[time]=s` where that is right"
     return source.error(f"{problem}: is it in {' or '.join(fitting)}?", remedy, "time", 0)
 
 

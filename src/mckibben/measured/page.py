@@ -191,6 +191,7 @@ def measure(
     seed: int = 0,
     jobs: int | None = None,
     force: bool = False,
+    command: str = "",
     progress: Callable[[float, str], None] | None = None,
     found: Callable[[Outcome], None] | None = None,
 ) -> list[Outcome]:
@@ -206,6 +207,8 @@ def measure(
         As for `outcomes`.
     force : bool
         Whether files of the user's may be replaced.
+    command : str
+        By which the page is made.
     progress, found : callable, optional
         Called with the share done and words; and with every outcome.
 
@@ -236,9 +239,7 @@ def measure(
             if found is not None:
                 found(one)
         if results is not None:
-            named = models if isinstance(models, str) else ",".join(models)
-            words = "" if named == "all" else f" --models {named}"
-            results.write_text("measured.md", page(every, f"mckibben measured FOLDER{words}"))
+            results.write_text("measured.md", page(every, command))
             results.write_text("measured.csv", table(every).to_csv(index=False))
             results.commit()
         Checkpoints(out).clear()

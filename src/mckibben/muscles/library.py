@@ -172,9 +172,8 @@ def _load(path: Path) -> Muscle:
     except ValidationError as error:
         raise refused(error, path, "what a muscle's file holds") from None
     except ModelError as error:
-        problem, _, remedy = str(error).partition(". Remedy: ")
-        remedy = remedy.removesuffix(".") or "correct it"
-        raise DataError(f"its balance: {problem}", file=path, remedy=remedy) from None
+        remedy = error.remedy or "correct it"
+        raise DataError(f"its balance: {error.problem}", file=path, remedy=remedy) from None
     assert isinstance(balance, Balance)
     errors = np.concatenate(
         [np.array(found.uncertainty[name], dtype=np.float64) for name in GROUPS]

@@ -232,7 +232,7 @@ class Experiment:
             if channel not in one:
                 has = ", ".join(one.channels)
                 remedy = (
-                    f"--column {channel}=COLUMN, or take the file out if it is of something else"
+                    f"`columns[{channel}]=COLUMN`, or take the file out if it is of something else"
                 )
                 if any(conversion(channel, name, 1.0) for name in one.channels):
                     remedy = f"state {REST_LENGTH}"
@@ -467,7 +467,7 @@ def demand_rise(recordings: Sequence[Recording], by: str, channel: str) -> None:
 
 
 def _turned(problem: str, one: Recording, channel: str) -> DataError:
-    remedy = f"turn its sign: --calibrate {channel}=COLUMN:-1:0:{one.units[channel] or 1}"
+    remedy = f"turn its sign: `calibration[{channel}]=COLUMN:-1:0:{one.units[channel] or 1}`"
     return DataError(problem, file=one.source, channel=channel, remedy=remedy)
 
 

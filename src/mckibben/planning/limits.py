@@ -140,9 +140,9 @@ def check_possible(limits: Limits, seconds: float, rig: Rig | None) -> None:
                 f"at {limit.rate:.3g} {unit}/s, it takes {limit.crossing:.3g} s of {seconds:g} s from "
                 "end to end",
                 channel=name,
-                remedy=f"give --minutes {needed:g} or more, a higher rate, or limits closer together",
+                remedy=f"give `minutes={needed:g}` or more, a higher rate, or limits closer together",
             )
     if not any(limit.span > 0 for limit in limits.values()):
         raise DataError(
-            f"none of {', '.join(limits)} may move", remedy="give wider limits with --limits"
+            f"none of {', '.join(limits)} may move", remedy="give wider limits with `limits`"
         )

@@ -162,12 +162,12 @@ def plan(
     if (muscle is not None and recorded) or not (recorded or rig is not None or muscle is not None):
         raise DataError(
             "a plan is from recordings, or from a rig, a muscle or both",
-            remedy="give files, --rig or --muscle, but no --muscle with files",
+            remedy="give files, `rig` or `muscle`, but no `muscle` with files",
         )
     if muscle is not None and model is not None:
-        raise DataError("a muscle is a model itself", remedy="leave --model out")
+        raise DataError("a muscle is a model itself", remedy="leave `model` out")
     if not 0 < minutes <= MOST_MINUTES:
-        raise DataError(f"{minutes:g} minutes are impossible", remedy="give --minutes 3, or 60")
+        raise DataError(f"{minutes:g} minutes are impossible", remedy="give `minutes=3`, up to 60")
     generator(seed)  # refuses what is no seed
     plant = rig if isinstance(rig, Rig) or rig is None else load_rig(rig)
     block = inside(model) if isinstance(model, Block) else None
@@ -229,13 +229,13 @@ def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) ->
             raise DataError(
                 "the recording has no time, and a plan says how fast to go",
                 file=recording.source,
-                remedy="read it with a time column or --rate",
+                remedy="read it with a time column or `rate`",
             )
         if lacking := [name for name in needed if name not in recording]:
             raise DataError(
                 f"the recording lacks {', '.join(lacking)}, which the rig or the model has",
                 file=recording.source,
-                remedy="give recordings of this rig and model, or leave --rig or --model out",
+                remedy="give recordings of this rig and model, or leave `rig` or `model` out",
             )
     if block is None:
         return excitation(recordings, None if rig is None else rig.inputs)
@@ -243,7 +243,7 @@ def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) ->
     if rig is not None and not {*driven} & {*rig.inputs}:
         raise DataError(
             f"the model is driven by {', '.join(driven)}, and the rig by {', '.join(rig.inputs)}",
-            remedy="give a model of the rig's own inputs, or leave --model out",
+            remedy="give a model of the rig's own inputs, or leave `model` out",
         )
     known = excitation(recordings, driven, [one.name for one in block.outputs])
     return replace(known, loads=tuple(name for name in known.loads if name in driven))
@@ -327,7 +327,7 @@ def _parameters(
         if not (np.abs(flat) < LARGEST).all():
             raise ModelError(
                 f"{block.kind!r} does not run free within these limits",
-                remedy="identify it again, or plan with another --model",
+                remedy="identify it again, or plan with another `model`",
             )
         return flat.reshape(len(recording), len(outputs), -1)
 

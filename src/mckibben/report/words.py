@@ -591,7 +591,7 @@ def calibrated_on_blocks(found: Calibration) -> str:
     """Return what a band does not include whose units are blocks of runs."""
     return (
         f"{found.band.units} blocks of {found.runs} run(s) count as exchangeable, so differences "
-        "between runs are not in the band. Remedy: calibrate on 9 runs or more."
+        "between runs are not in the band: calibrate on 9 runs or more."
     )
 
 

@@ -51,7 +51,7 @@ class Commands:
             raise DataError(
                 "a recording without time cannot drive a rig",
                 file=inputs.source,
-                remedy="read it with --rate, or give Recording(..., sample_time=...)",
+                remedy="give `rate`, or Recording(..., sample_time=...)",
             )
         first = next(iter(self.ranges))
         remedy = f"give {', '.join(self.ranges)} and no others"

@@ -147,7 +147,7 @@ def made_manageable(
                 f"these recordings have {max(map(len, recordings))} samples at most, of which one in "
                 f"{factor} is too few",
                 file=recordings[0].source,
-                remedy="allow more samples with --samples, or give fewer recordings",
+                remedy="allow more samples with `most_samples`, or give fewer recordings",
             )
     if lost:
         notes.append(
@@ -161,7 +161,7 @@ def made_manageable(
             if now < before:
                 notes.append(
                     f"{total} samples are many: of {before} that could be {role}, {now} are used, in "
-                    f"{len(some)} stretches spread evenly, all samples in a row. --samples takes more."
+                    f"{len(some)} stretches spread evenly, all samples in a row; see `most_samples`"
                 )
     return parts[0], parts[1], tuple(notes)
 

@@ -70,7 +70,7 @@ def resample(recording: Recording, sample_time: float) -> Recording:
         If the recording has no time, the sample time is not positive, or fewer than two samples
         would be left.
     """
-    step = _step(recording, "be resampled", "read it with --rate")
+    step = _step(recording, "be resampled", "read it with `rate`")
     if not 0 < sample_time < np.inf:
         raise DataError(
             f"a sample time of {sample_time} s is impossible", remedy="give a positive time"

@@ -43,4 +43,4 @@ def check_on_test(
         check_usable(model, [run.recording for run in runs])
         return check_runs(model, runs, means=trained.mean(axis=0))
     except DataError as error:
-        return f"{error.problem}. Remedy: {error.remedy}."
+        return str(error)

@@ -196,7 +196,7 @@ def study(
     if rig is not None and channels.single:
         raise DataError(
             "loops are closed on a rig with recordings of several muscles, or under a load",
-            remedy="leave --rig out, or use mckibben track",
+            remedy="leave `rig` out, or use `track()`",
         )
     looped, loop = channels.inputs, None
     if len(channels.inputs) == len(channels.outputs) == 1:

@@ -139,7 +139,7 @@ class LoadEstimate(Block):
             raise ModelError(
                 "a load is told by measured pressures, and this balance knows "
                 f"{self.forward.given[0].name} in {self.forward.given[0].unit}",
-                remedy="identify it from the pressure (--input pressure)",
+                remedy="identify it from the pressure (`input=pressure`)",
             )
         if np.linalg.matrix_rank(loads) < n_loads:
             raise ModelError(

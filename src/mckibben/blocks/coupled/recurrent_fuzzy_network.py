@@ -153,10 +153,8 @@ class RecurrentFuzzyNetwork(Block):
         (Channel("force", "N"),),
         (Channel("displacement", "mm"),),
     )
-    no_inverse = (
-        "has no inverse: a sample of its input moves its output by next to nothing. "
-        "Remedy: invert balance, or close a loop."
-    )
+    no_inverse = "has no inverse: a sample of its input moves its output by next to nothing"
+    instead = "invert balance, or close a loop"
     parameters = ("centres", "widths", "feedbacks", "consequents")
     notation = Notation(
         r"y_t = \frac{\sum_r \omega_r\, (P_r \cdot x_t + c_r)}{\sum_r \omega_r},\quad "

@@ -190,10 +190,7 @@ class Narx(Block):
     """
 
     rate_dependent = True
-    no_inverse = (
-        "has no exact inverse: nothing keeps its output rising with its input. "
-        "Remedy: invert a hysteresis model (cpi, gpi, mpi)."
-    )
+    no_inverse = "has no exact inverse: nothing keeps its output rising with its input"
 
     output_lags: Lags
     input_lags: Lags

@@ -150,13 +150,14 @@ class ProcessModel(Block):
 
     n_fitted = order
 
+    instead = "invert a hysteresis model (cpi, gpi, mpi), or a transfer-function with delay 0"
+
     @property
     def no_inverse(self) -> str:  # type: ignore[override]
         """Which structure has none, and why."""
         return (
             f"({self.name}) has no exact inverse: its output lags its input, so following a reference "
-            "would take derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, mpi), or a "
-            "transfer-function identified with delay=0."
+            "would take derivatives of it"
         )
 
     @property

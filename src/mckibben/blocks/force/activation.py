@@ -26,10 +26,8 @@ from mckibben.errors import ModelError
 
 PORTS: Ports = ("input",), ("force",), ("output",)
 
-UNDOES_A_MUSCLE = (
-    "has no inverse here: it already gives the pressure for a contraction. Remedy: use it as the "
-    "compensator, or fit pressure to contraction by another model."
-)
+UNDOES_A_MUSCLE = "has no inverse here: it already gives the pressure for a contraction"
+INSTEAD = "use it as the compensator, or fit pressure to contraction by another model"
 
 
 # -- the published model ---------------------------------------------------------------------
@@ -116,6 +114,7 @@ class ActivationPressure(Block):
     start_kernel = published_start
     rate_dependent = True
     no_inverse = UNDOES_A_MUSCLE
+    instead = INSTEAD
     parameters = ("contractions", "pressures", "phi", "gamma")
     typical = (
         (*[0.0] * 3, -1.0, *[0.0] * 2, 0.01, 6.0, *[0.0] * 3, 2.0, 0.0, 0.001, 0.0, 4.0),
@@ -266,6 +265,7 @@ class ActivationMemory(Block):
     start_kernel = remembering_start
     rate_dependent = True
     no_inverse = UNDOES_A_MUSCLE
+    instead = INSTEAD
     parameters = ("surface", "friction", "viscosity", "relaxation")
     typical = (
         *((2.0, 0.5, 1.5, 0.1, 0.2, 0.0), (0.2, 0.8), (0.3, 0.2, 0.1, 0.0), (0.05, 0.01)),

@@ -38,10 +38,8 @@ class ForceLaw(Block):
     """A static force law: driven by length [mm], scheduled by pressure [bar], giving force [N]."""
 
     ports = ("input",), ("pressure",), ("output",)
-    no_inverse = (
-        "has no inverse by length, since more than one may give a force. Remedy: for the pressure that "
-        "gives a force at a length, use ForceFeedforward(law)."
-    )
+    no_inverse = "has no inverse by length, since more than one may give a force"
+    instead = "for the pressure that gives a force at a length, use ForceFeedforward(law)"
 
     input: fields.Channel
     pressure: fields.Channel

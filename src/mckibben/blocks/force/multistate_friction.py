@@ -171,10 +171,8 @@ class MultistateFriction(Block):
             *(34.738, 1.006e-3, 13.431, 1e-4, 0.988e-3, 1.256),
         ),
     )
-    no_inverse = (
-        "has no inverse: while it slips, one force belongs to many lengths. Remedy: compensate it by "
-        "ForceFeedforward(law, friction), in closed form."
-    )
+    no_inverse = "has no inverse: while it slips, one force belongs to many lengths"
+    instead = "compensate it by ForceFeedforward(law, friction), in closed form"
     n_states = one_per("elements", 1)  # deflections, and the previous length
     n_scratch = one_per("elements")  # what single precision loses of the deflections
     notation = Notation(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from mckibben.cli.output import progress_bar, say, show
-from mckibben.cli.parameters import Argument, Force, Json, Quick, command
+from mckibben.cli.parameters import Argument, Force, Json, Quick, command, repeated
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Jobs, Option, Seed, names
 
@@ -45,12 +45,19 @@ def measured(
         if not as_json:
             say(f"{one.label}: {one.failed or (words.chosen(one.board) if one.board else '')}")
 
-    chosen = "quick" if quick else models
     with stoppable(out), progress_bar("measured:", plainly=True) as tell:
         found = measure(
-            folder, out, only=only, models=chosen, seed=seed, jobs=jobs, force=force, progress=tell,
+            folder,
+            out,
+            only=only,
+            models="quick" if quick else models,
+            seed=seed,
+            jobs=jobs,
+            force=force,
+            command=repeated(),
+            progress=tell,
             found=done,
-        )  # fmt: skip
+        )
     written = [out / "measured.md", out / "measured.csv"]
     show({one.label: one.to_dict() for one in found}, list, as_json, written=written)
     if all(one.failed for one in found):

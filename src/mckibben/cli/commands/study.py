@@ -13,14 +13,12 @@ Ctrl-C stops at once, and the same command goes on from there.
 
 from __future__ import annotations
 
-import shlex
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from mckibben.cli.output import progress_bar, say, show
-from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command
+from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command, repeated
 from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import Option, StudyOptions
 from mckibben.reading import ReadOptions
@@ -59,7 +57,7 @@ def study(
             reading=reading,
             out=out,
             force=force,
-            command=shlex.join(["mckibben", *sys.argv[1:]]),
+            command=repeated(),
             progress=tell,
             found=begun,
         )

@@ -232,7 +232,7 @@ class TrainingData:
         if self.sample_time is None:
             raise DataError(
                 f"the recordings have no time, and {why}",
-                remedy="read them with a time column or --rate" + instead,
+                remedy="read them with a time column or `rate`" + instead,
             )
         return self.sample_time
 
@@ -341,7 +341,7 @@ def training_data(
         raise DataError(
             "input and output are the same channel",
             channel=min(same),
-            remedy="choose two channels with --input and --output",
+            remedy="choose two channels with `input` and `output`",
         )
     masks = [np.ones(len(r), dtype=bool) for r in every] if rows is None else list(rows)
     if len(masks) != len(every) or any(
@@ -398,7 +398,7 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
                 f"{first.source or first.name}",
                 file=recording.source,
                 channel=name,
-                remedy="convert one of the recordings, or name its unit with --unit",
+                remedy="convert one of the recordings, or name its unit with `units[CHANNEL]=UNIT`",
             )
         absolute = [_is_absolute(one, name) for one in (recording, first)]
         if absolute[0] != absolute[1]:
@@ -407,20 +407,20 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
                 file=(recording if absolute[0] else first).source,
                 channel=name,
                 remedy="subtract the atmosphere, as in "
-                f"--calibrate {name}=COLUMN:GAIN:-1.01325:bar, with a GAIN of 1 for bar, 0.01 for kPa",
+                f"`calibration[{name}]=COLUMN:GAIN:-1.01325:bar`, the gain 1 for bar, 0.01 for kPa",
             )
     ours, theirs = recording.sample_time, first.sample_time
     if (ours is None) != (theirs is None):
         raise DataError(
             "some recordings have time and others have none",
             file=recording.source,
-            remedy="give --rate for those without, or fit them apart",
+            remedy="give `rate` for those without, or fit them apart",
         )
     if one_rate and ours is not None and theirs is not None and abs(ours - theirs) > 1e-3 * theirs:
         raise DataError(
             f"the sample time is {ours:g} s here and {theirs:g} s in {first.source or first.name}",
             file=recording.source,
-            remedy=f"say --resample {max(ours, theirs):.3g}, or use mckibben.signals.resample",
+            remedy=f"give `resample={max(ours, theirs):.3g}`, or use mckibben.signals.resample",
         )
 
 

@@ -202,8 +202,8 @@ class Estimator(ABC):
         unknown = settings.keys() - set(self._names())
         if unknown:
             raise ValueError(
-                f"{sorted(unknown)[0]!r} is no setting of {type(self).__name__}. "
-                f"Remedy: choose among {', '.join(self._names())}."
+                f"{sorted(unknown)[0]!r} is no setting of {type(self).__name__}: "
+                f"choose among {', '.join(self._names())}."
             )
         for name, value in settings.items():
             setattr(self, name, value)

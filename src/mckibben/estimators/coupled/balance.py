@@ -213,8 +213,7 @@ class BalanceEstimator(CoupledEstimator):
         """Return the block found, and the data without what tells nothing."""
         data, names = without_held(data)
         tracker.notes += [
-            f"in {name} nothing moves and no force was measured: it is left out. Remedy: record the "
-            "force"
+            f"in {name} nothing moves and no force was measured: it is left out: record the force"
             for name in names
         ]
         return super().find(data, tracker)
@@ -228,7 +227,7 @@ class BalanceEstimator(CoupledEstimator):
             )
         data, names = varying(data)
         tracker.notes += [
-            f"{name} is about the same in all recordings, and is left out. Remedy: record at other "
+            f"{name} is about the same in all recordings, and is left out: record at other "
             "values too"
             for name in names
         ]
@@ -248,7 +247,7 @@ class BalanceEstimator(CoupledEstimator):
         if still and self.n_lags and self.lags is None:
             tracker.notes.append(
                 "all moves at about one speed: relaxation and friction cannot be distinguished, and "
-                "relaxation is left out. Remedy: record at other speeds too, or give lags"
+                "relaxation is left out: record at other speeds too, or give lags"
             )
         structure = self.widest(bench, timed=not still or self.lags is not None)
         with tracker.searching():

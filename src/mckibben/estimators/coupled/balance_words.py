@@ -159,10 +159,10 @@ def _of_runs(search: Search, z: Array) -> list[str]:
     if whole > POOR:
         found.append(
             f"errors are {100 * whole:.2g} % of the range: this model does not explain these "
-            "recordings. Remedy: check channels, units, signs and zeros, recording by recording"
+            "recordings: check channels, units, signs and zeros, recording by recording"
         )
     found += [
-        f"{run.name} does not begin at rest: its first part does not count. Remedy: begin recordings "
+        f"{run.name} does not begin at rest: its first part does not count: begin recordings "
         "without pressure"
         for run in problem.runs
         if not (structure.settled or held(problem.data, run) or at_rest(problem.data, run))
@@ -178,7 +178,7 @@ def _of_loads(search: Search, z: Array, others: list[Array], balance: Balance) -
         if (share < 0.0).all():
             found.append(
                 f"{channel.name} acts as if it helped the muscles: the more it is, the further they "
-                "move at equal pressures. If it pulls against them, its sign is wrong. Remedy: give "
+                "move at equal pressures. If it pulls against them, its sign is wrong: give "
                 "loads that pull muscles longer as positive"
             )
     listed = {}
@@ -193,6 +193,6 @@ def _of_loads(search: Search, z: Array, others: list[Array], balance: Balance) -
         unit = "N" if balance.areas[0][0] != 1.0 else f"{balance.given[0].unit} on the area at rest"
         found.append(
             f"constant loads that were not measured [{unit}], beyond those of the others: "
-            f"{', '.join(listed.values())}. Remedy: record the force of all"
+            f"{', '.join(listed.values())}: record the force of all"
         )
     return found

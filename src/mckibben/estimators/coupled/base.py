@@ -148,7 +148,7 @@ class CoupledEstimator(Estimator):
                 raise DataError(
                     f"there is no channel {what}_1, nor {what}",
                     file=first.source,
-                    remedy=f"name the columns {what}_1, {what}_2 and so on, or use --column",
+                    remedy=f"name the columns {what}_1, {what}_2 ..., or use `columns[CHANNEL]=COLUMN`",
                 )
         loads = loads_among(every, inputs)
         inputs = tuple(name for name in inputs if name not in loads)

@@ -157,7 +157,7 @@ class AirEstimator(SeparableEstimator):
             raise DataError(
                 "the pressure does not rise with the command",
                 channel=data.input,
-                remedy="choose the command with --input, and the pressure it makes with --output",
+                remedy="choose the command with `input`, and the pressure it makes with `output`",
             )
         return best
 

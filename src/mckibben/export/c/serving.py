@@ -76,7 +76,7 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     if unknown:
         raise ModelError(
             f"the model does not know between what limits {', '.join(unknown)} may be",
-            remedy=f"say it for each of them, --limit {unknown[0]}=LOW:HIGH",
+            remedy=f"give it for each of them, `limits[{unknown[0]}]=LOW:HIGH`",
         )
     for name, a, b in zip(names, low, high, strict=True):
         if not a < b:
@@ -122,7 +122,7 @@ def served(
     if n * content["bytes"] + 6 > ROOM:
         raise ModelError(
             f"{n} channels do not fit into a frame of the wire",
-            remedy="export in single precision, --float32, or fewer channels",
+            remedy="export in single precision, `single`, or fewer channels",
         )
     told = {
         "period": period,
@@ -159,7 +159,7 @@ def _ticks(serving: Serving, period: float | None) -> int:
     if period is None or not 1 <= 1e6 * period <= MOST_MICROSECONDS:
         raise ModelError(
             f"a served model ticks, and its time between steps is {period}",
-            remedy=f"give --sample-time SECONDS, from 1e-6 to {1e-06 * MOST_MICROSECONDS:.0f}",
+            remedy=f"give `sample_time=SECONDS`, from 1e-6 to {1e-06 * MOST_MICROSECONDS:.0f}",
         )
     ticks = serving.watchdog / period if math.isfinite(serving.watchdog) else math.inf
     if not 1 <= ticks <= MOST_TICKS:

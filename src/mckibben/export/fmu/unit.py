@@ -127,7 +127,7 @@ def export_fmu(
     if platforms is None and not wanted:
         raise ModelError(
             "there is no C compiler on this machine, so the FMU would hold no library",
-            remedy="install one, or ask for no platforms (--platforms none): importers can "
+            remedy="install one, or ask for no platforms (`platforms=none`): importers can "
             "build the sources",
         )
     files = fmu_files(block, name=name, sample_time=sample_time)

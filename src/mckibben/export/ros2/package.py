@@ -67,13 +67,13 @@ def ros2_files(
     if not re.fullmatch(r"[a-z](_?[a-z0-9])+", name):
         raise ModelError(
             f"{name!r:.60} cannot name a package of ROS 2",
-            remedy="give --name small letters, digits and single underscores, starting with "
+            remedy="give `name` small letters, digits and single underscores, starting with "
             "a letter",
         )
     if any(channel.unit != "bar" for channel in block.outputs):
         raise ModelError(
             f"{block.title!r} gives {block.outputs[0].name}, not pressures",
-            remedy="export the compensator, --inverse",
+            remedy="export the compensator, `inverse`",
         )
     n_driven = len(block.inputs) - len(block.scheduling)
     content = described(block, name=name, sample_time=sample_time, single=False)

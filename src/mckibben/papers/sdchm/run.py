@@ -256,7 +256,7 @@ def sort(recordings: Sequence[Recording]) -> list[Labels | None]:
     needed = [*muscles, *(m.replace("pressure", "displacement") for m in muscles), EXTENSOR]
     for one, name in product(recordings, needed):
         if name not in one:
-            remedy = f"--column {name}=COLUMN; what was held: --constant '{name}=0 bar'"
+            remedy = f"`columns[{name}]=COLUMN`; what was held: `constants[{name}]=0 bar`"
             raise DataError("it is missing", file=one.source, channel=name, remedy=remedy)
     swings = np.array([[_swing(one[name]) for name in muscles] for one in recordings])
     least, gap = MOVES * swings.max(), ONE * swings.max()

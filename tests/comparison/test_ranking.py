@@ -195,7 +195,7 @@ def test_first_sample_of_a_test_that_continues_nothing_is_not_scored(train: Reco
     later = replace(train, start_time=float(train.time[-1]) + 0.02)
     assert not given_split([train], [train]).test_rows[0][0]
     assert given_split([train], [later]).test_rows[0][0]
-    with pytest.raises(DataError, match="--test"):
+    with pytest.raises(DataError, match="with test"):
         held_out_part([train.slice(0, 20)], CHANNELS, 0.25)
 
 

@@ -123,8 +123,8 @@ def test_runs_of_a_virtual_rig_with_one_seed_share_its_noise() -> None:
         return recorded(wave, seed, 0.02).with_meta(rig="bench v1", seed=seed)
 
     one, other = virtual(1, 3), virtual(2, 3)
-    with pytest.warns(DataWarning, match="same sensor noise.*--seed 4"):
+    with pytest.warns(DataWarning, match="same sensor noise.*seed=4"):
         assert not check_shared({"fit": [one], "test": [other]}, *CHANNELS)
     assert not check_shared({"fit": [one, other], "test": [virtual(2, 4)]}, *CHANNELS)
-    with pytest.raises(DataError, match="run one of them again with --seed 4"):
+    with pytest.raises(DataError, match="run one of them again with seed=4"):
         check_shared({"fit": [one], "test": [one]}, *CHANNELS)

@@ -346,7 +346,7 @@ def test_an_estimate_is_made_of_what_it_names(seen: Seen) -> None:
     ("block", "plant", "channel", "remedy"),
     [
         (named(PI.example(), "pressure", "contraction").inverse(), "twin of unknown length",
-         "contraction", "--rest-length"),
+         "contraction", "rest_length"),
         (named(PI.example(), "voltage", "displacement").inverse(), "twin", "voltage", "under that name"),
         (PI.example().inverse(), "twin of voltage", "pressure", "under that name"),
         (replace(PI.example(), output=Channel("displacement", "cm")).inverse(), "twin",
@@ -373,7 +373,7 @@ def test_refusals_name_the_channel_and_a_remedy(
 def test_a_reference_that_only_a_rest_length_makes_measured_is_refused_without_one() -> None:
     plant = PLANTS["twin of unknown length"]()
     reference = wanted(plant, "contraction")
-    with pytest.raises(DataError, match="--rest-length"):
+    with pytest.raises(DataError, match="rest_length"):
         closed(PI.example().inverse(), plant, reference)
     found = closed(PI.example().inverse(), plant, reference.with_meta(rest_length=200.0))
     assert found.recording["reference_displacement"][-1] == pytest.approx(20.0)

@@ -143,7 +143,7 @@ STILL = np.full(600, 2.0)
         ([GOOD, recording(cycles(5), cycles(5))], "5"),
         ([recording(STILL, GOOD["displacement"])], "pressure"),
         ([recording(GOOD["pressure"], STILL)], "displacement"),
-        ([GOOD, Recording(dict(GOOD.channels), 0.05)], "--resample"),
+        ([GOOD, Recording(dict(GOOD.channels), 0.05)], "resample"),
         ([GOOD, Recording(dict(GOOD.channels))], "without time"),
     ],
 )

@@ -130,7 +130,7 @@ def test_what_is_no_log_is_refused() -> None:
     ):
         with pytest.raises(DataError, match=said):
             review(bad, model=MUSCLE)
-    with pytest.raises(ModelError, match="--model"):
+    with pytest.raises(ModelError, match="with model"):
         review(log)
 
 

@@ -112,7 +112,7 @@ def test_impossible_scalars_are_refused_where_they_count(
     error = refused(path)
     last, value = [*scalars.items()][-1]
     assert f"{last} = {value}" in error.problem
-    assert "--rate" in error.remedy
+    assert "`rate`" in error.remedy
     check(one(path, rate=50))
     check(one(write(path, p_kPa=P, disp_cm=X, time_s=T, **scalars)))
 

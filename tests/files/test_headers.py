@@ -123,4 +123,4 @@ def test_an_unknown_ending_is_asked_about(tmp_path: Path, ending: str) -> None:
     path.write_text("\n".join([f"time_s,pressure_{ending},displacement_mm", *rows]))
     error = refused(path, channels=["pressure"], columns={"pressure": f"pressure_{ending}"})
     assert error.channel == "pressure"
-    assert "--unit pressure=" in error.remedy or "--calibrate" in error.remedy
+    assert "units[pressure]=" in error.remedy or "calibration" in error.remedy

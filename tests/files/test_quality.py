@@ -66,7 +66,7 @@ def test_a_cell_without_a_number_is_refused_by_its_row(
         error = refused(path, channels=channels)
         assert (error.channel, error.row) == ("pressure", at + 2)
         assert (cell if cell in WORDS else "1 of 400") in error.problem
-        assert cell in WORDS or "--gaps interpolate" in error.remedy
+        assert cell in WORDS or "gaps=interpolate" in error.remedy
 
 
 def test_other_columns_with_such_cells_are_left_out(tmp_path: Path) -> None:
@@ -146,7 +146,7 @@ def test_what_was_measured_is_read(tmp_path: Path, name: str) -> None:
 
 def test_zeros_that_were_measured_are_read_raw(tmp_path: Path) -> None:
     path = table(tmp_path, "pressure_bar,displacement_mm", NOISY, MOVED)
-    assert "--raw" in refused(path).remedy
+    assert "`raw`" in refused(path).remedy
     recording = one(path, raw=True)
     assert recording["pressure"] == pytest.approx(NOISY)
     assert recording["displacement"] == pytest.approx(MOVED)

@@ -148,17 +148,17 @@ def test_counts_since_1970_are_recognised_and_noted(
 ) -> None:
     times = [1_750_000_000 * per_second + k * per_second // 100 for k in range(N)]
     assumed = one(written(tmp_path, times))
-    assert "--unit time=" in " ".join(assumed.notes)
+    assert "units[time]=" in " ".join(assumed.notes)
     stated = one(written(tmp_path, times, f"time_{unit}"))
     for recording in (assumed, stated):
         assert recording.sample_time == pytest.approx(0.01, rel=1e-3)
-    assert f"--unit time={unit}" in refused(written(tmp_path, times, "time_s")).remedy
+    assert f"units[time]={unit}" in refused(written(tmp_path, times, "time_s")).remedy
 
 
 @pytest.mark.parametrize("first", [45000, 739000])
 def test_days_are_not_taken_for_seconds(tmp_path: Path, first: int) -> None:
     path = written(tmp_path, [f"{first + k * 1e-5:.5f}" for k in range(N)])
-    assert "--unit time=day or --unit time=s" in refused(path).remedy
+    assert "`units[time]=day` or `units[time]=s`" in refused(path).remedy
     assert one(path, units={"time": "day"}).sample_time == pytest.approx(0.864)
     assert one(path, units={"time": "s"}).sample_time == 1e-5
 

@@ -64,26 +64,26 @@ def test_what_is_no_unit_of_a_channel(tmp_path: Path, unit: str) -> None:
 @pytest.mark.parametrize(
     ("header", "size", "remedy"),
     [
-        ("pressure (mPa)", 0.01, "--unit pressure=MPa"),
-        ("pressure (bar)", 1e300, "--unit pressure="),
-        ("pressure (kPa)", 1e300, "--unit pressure="),
-        ("pressure (MPa)", 300.0, "--unit pressure="),
-        ("pressure (bar)", 4.9e5, "--unit pressure=Pa"),
-        ("pressure (bar)", 100.0, "--unit pressure=kPa"),
-        ("pressure (MPa)", 100.0, "--unit pressure=kPa"),
-        ("displacement (mm)", 1e9, "--unit displacement="),
-        ("displacement (mm)", 1e4, "--unit displacement=um"),
-        ("displacement (km)", 1e3, "--unit displacement="),
-        ("force (GN)", 1.0, "--unit force="),
-        ("force (N)", 1e7, "--unit force=mN"),
-        ("temperature (°C)", 1e6, "--unit temperature="),
-        ("displacement_px", 1.0, "--calibrate displacement="),
-        ("pressure_counts", 1.0, "--calibrate pressure="),
-        ("FORCE_NM", 1.0, "--unit force="),
-        ("pressure", 10.0, "--unit pressure="),
-        ("angle", 23.0, "--unit angle="),
-        ("contraction", 6.0, "--unit contraction="),
-        ("displacement", 0.008, "--unit displacement="),
+        ("pressure (mPa)", 0.01, "units[pressure]=MPa"),
+        ("pressure (bar)", 1e300, "units[pressure]="),
+        ("pressure (kPa)", 1e300, "units[pressure]="),
+        ("pressure (MPa)", 300.0, "units[pressure]="),
+        ("pressure (bar)", 4.9e5, "units[pressure]=Pa"),
+        ("pressure (bar)", 100.0, "units[pressure]=kPa"),
+        ("pressure (MPa)", 100.0, "units[pressure]=kPa"),
+        ("displacement (mm)", 1e9, "units[displacement]="),
+        ("displacement (mm)", 1e4, "units[displacement]=um"),
+        ("displacement (km)", 1e3, "units[displacement]="),
+        ("force (GN)", 1.0, "units[force]="),
+        ("force (N)", 1e7, "units[force]=mN"),
+        ("temperature (°C)", 1e6, "units[temperature]="),
+        ("displacement_px", 1.0, "calibration[displacement]="),
+        ("pressure_counts", 1.0, "calibration[pressure]="),
+        ("FORCE_NM", 1.0, "units[force]="),
+        ("pressure", 10.0, "units[pressure]="),
+        ("angle", 23.0, "units[angle]="),
+        ("contraction", 6.0, "units[contraction]="),
+        ("displacement", 0.008, "units[displacement]="),
     ],
 )
 def test_impossible_values_are_refused_and_the_proposed_unit_is_read(
@@ -92,7 +92,7 @@ def test_impossible_values_are_refused_and_the_proposed_unit_is_read(
     cells = size * (1 + np.arange(20) / 7)
     path = put(tmp_path / "a.csv", f"t_s;{header}", range(20), cells, separator=";")
     error = refused(path)
-    channel, _, unit = remedy.split()[1].partition("=")
+    channel, unit = remedy.partition("[")[2].split("]=")
     assert error.channel == channel
     assert remedy in error.remedy
     if unit:
@@ -136,7 +136,7 @@ def test_the_rest_length_makes_each_measure_of_a_motion_of_another(
         mckibben.write(found, tmp_path / "own.csv")
         assert one(tmp_path / "own.csv", channels=[*measures])[channel] == pytest.approx(expected)
         if channel not in one(path):
-            assert "--rest-length" in refused(path, channels=[channel]).remedy
+            assert "rest length" in refused(path, channels=[channel]).remedy
 
 
 def test_millimetres_called_a_contraction_are_refused_with_what_reads_them(tmp_path: Path) -> None:
@@ -144,8 +144,8 @@ def test_millimetres_called_a_contraction_are_refused_with_what_reads_them(tmp_p
     path = put(tmp_path / "a.csv", "t_s,contraction", range(20), displacement)
     for options in ({}, {"units": {"contraction": "mm"}}):
         remedy = refused(path, **options).remedy
-        assert "--column displacement=contraction --unit displacement=mm" in remedy
-        assert "--rest-length" in remedy
+        assert "`columns[displacement]=contraction` and `units[displacement]=mm`" in remedy
+        assert "rest length" in remedy
     named = {"columns": {"displacement": "contraction"}, "units": {"displacement": "mm"}}
     found = one(path, channels=["contraction"], rest_length=500.0, **named)
     assert found["contraction"] == pytest.approx(displacement / 500)

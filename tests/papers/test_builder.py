@@ -190,7 +190,7 @@ def test_sines_and_random_waves_are_seen_without_their_names(scale: float) -> No
         rerun.sort([one for labels, one in made if labels["stage"] == "random"])
     bare = [one.select(["pressure", "displacement", "force"]) for _, one in made]
     bare = [replace(one, meta={}) for one in bare]
-    with pytest.raises(DataError, match="--rest-length"):
+    with pytest.raises(DataError, match="rest_length"):
         reproduce("activation-pressure", data=bare)
     with pytest.raises(DataError, match="slow cycle"):
         rerun.sort([one for labels, one in made if labels["stage"] != "static"])

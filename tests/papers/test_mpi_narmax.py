@@ -135,14 +135,14 @@ def test_what_is_needed_is_named(slim: Rig) -> None:
         sort([pulled])
     with pytest.raises(DataError, match="varying force"):
         sort([alone])
-    with pytest.raises(DataError, match=r"force.*--column force"):
+    with pytest.raises(DataError, match=r"force.*columns=.'force'"):
         reproduce("mpi-narmax", data=[alone.select(["voltage", "displacement"]), pulled])
     with pytest.raises(DataError, match="pressure"):
         sort([alone.select(["voltage", "displacement", "force"]), pulled.select(OTHERS)])
     with pytest.raises(DataError, match="another load"):
         sort([alone, pulled])
     turned = alone.with_channels(displacement=-alone["displacement"])
-    with pytest.raises(DataError, match="--calibrate displacement"):
+    with pytest.raises(DataError, match="calibration=.'displacement'"):
         sort([turned, pulled])
 
 

@@ -139,11 +139,11 @@ def test_what_goes_beyond_recordings_is_told(play: Block) -> None:
         ({"limits": {"pressure": (0.5, 4.0, 0.0)}}, "pressure"),
         ({"limits": {"pressure": (2.0, 2.0)}}, "pressure"),
         ({"limits": {"force": (0.0, 2.0)}}, "force"),
-        ({"minutes": 0.01}, "--minutes"),
+        ({"minutes": 0.01}, "minutes"),
         ({"minutes": float("nan")}, "nan"),
         ({"rig": "rail"}, "voltage"),
-        ({"muscle": "rail"}, "--muscle"),
-        ({"sample_time": None}, "--rate"),
+        ({"muscle": "rail"}, "muscle"),
+        ({"sample_time": None}, "rate"),
     ],
 )
 def test_the_impossible_is_refused(play: Block, how: dict[str, Any], said: str) -> None:

@@ -77,3 +77,12 @@ def duration(seconds: float) -> str:
     if seconds < 100:
         return f"{max(5 * round(seconds / 5), 5)} s"
     return f"{round(seconds / 60)} min"
+
+
+def counted(count: int, what: str) -> str:
+    """Return a count with its noun, in the plural where it is not one.
+
+    >>> counted(1, "part"), counted(3, "part")
+    ('1 part', '3 parts')
+    """
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -119,9 +119,8 @@ def check(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         recordings, on = train, f"Test recordings tell too little: {error} {TRAINED_ON}"
         found = judged(model, recordings)
     tell(0.6, float("nan"))
-    if found.description is not None:
-        page = check_page(found, found.description, f"models/{name}.json")
-        write_text(workspace.new_path("takeaway", str(given["file"])), page)
+    page = check_page(found, f"models/{name}.json")
+    write_text(workspace.new_path("takeaway", str(given["file"])), page)
     return " ".join([on, check_verdict(found), *check_sentences(found)])
 
 

@@ -20,6 +20,7 @@ from mckibben.comparison.splits import Split, split_of, validation_folds
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.catalogue import declared, default_model
 from mckibben.estimators.core.estimator import Estimator
+from mckibben.numerals import counted
 from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
 
@@ -110,7 +111,9 @@ def plan_of(
     parts, chosen_by = validation_folds(split.train, channels, n_folds, checks)
     described = split.described
     if chosen_by == "cross-validation":
-        described += f", cross-validated on {len(parts)} part(s) within the range of the rest"
+        described += (
+            f", cross-validated on {counted(len(parts), 'part')} within the range of the rest"
+        )
     names, left_out = _chosen(models, every, channels)
     unloaded = replace(channels, scheduling=None)
     alone = [default_model("load")] if channels.scheduling else []

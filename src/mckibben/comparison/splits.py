@@ -12,6 +12,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.free_run import Mask, predecessor
 from mckibben.comparison.channels import Channels, held_at_levels
 from mckibben.errors import DataError
+from mckibben.numerals import counted
 from mckibben.recording import Recording
 from mckibben.signals import reversals, split_cycles
 
@@ -80,7 +81,7 @@ def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
         mask = np.ones(len(recording), dtype=bool)
         mask[0] = predecessor(recording, train) is not None
         rows.append(mask)
-    described = f"{len(train)} recording(s) to fit, {len(test)} to test"
+    described = f"{counted(len(train), 'recording')} to fit, {len(test)} to test"
     return Split(tuple(train), tuple(test), tuple(rows), described)
 
 
@@ -190,7 +191,7 @@ def _tail(recordings: Sequence[Recording], channel: str, travel: float, rest: st
     if whole:
         given = given_split(train, whole)
         tests, rows = [*tests, *given.test], [*rows, *given.test_rows]
-        described.append(f"the last {len(whole)} recording(s)")
+        described.append(f"the last {counted(len(whole), 'recording')}")
     words = f"{' and '.join(described)} to test, {rest} to fit"
     return Split(tuple(train), tuple(tests), tuple(rows), words)
 

@@ -1,24 +1,18 @@
-"""The page of a check: one HTML file that needs nothing but itself."""
+"""The page of a check, and its numbers as JSON."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from mckibben.diagnosis.check import LEVEL
 from mckibben.recording import notes_by_file
-from mckibben.report import (
-    check_subjects,
-    description_subjects,
-    interactive,
-    subjects,
-    templating,
-    words,
-)
+from mckibben.report import check_subjects, interactive, subjects, words
+from mckibben.report.builder import Figure, Page, Section, Table, Text, Tile
+from mckibben.report.description_page import model_items
 from mckibben.system.atomic import to_json
 
 if TYPE_CHECKING:
-    from mckibben.diagnosis.check import Validation
-    from mckibben.diagnosis.description import ModelDescription
+    from mckibben.diagnosis.check import OutputCheck, Validation
+    from mckibben.diagnosis.free_runs import Run
     from mckibben.outputs import Results
 
 MOST_RECORDINGS = 4
@@ -26,8 +20,6 @@ MOST_RECORDINGS = 4
 
 MOST_OUTPUTS = 6
 """Outputs with figures of their own; the others have their numbers."""
-
-MODEL = "model"
 
 
 def check_json(found: Validation, model_file: str) -> dict[str, Any]:
@@ -43,46 +35,86 @@ def check_json(found: Validation, model_file: str) -> dict[str, Any]:
 def write_check(results: Results, found: Validation, model_file: str) -> None:
     """Write ``validation.json`` and ``report.html``."""
     results.write_text("validation.json", to_json(check_json(found, model_file)) + "\n")
-    if found.description is not None:
-        results.write_text("report.html", check_page(found, found.description, model_file))
+    results.write_text("report.html", check_page(found, model_file))
 
 
-def check_page(found: Validation, description: ModelDescription, model_file: str) -> str:
-    """Return a check as HTML.
-
-    Parameters
-    ----------
-    found : Validation
-    description : ModelDescription
-        Of the same model, on the same recordings.
-    model_file : str
-        Where the model was read from, to say so.
-    """
+def check_page(found: Validation, model_file: str) -> str:
+    """Return a check as HTML; ``model_file`` is where the model was read from."""
     longest = sorted(found.runs, key=lambda run: -len(run.inputs))[:MOST_RECORDINGS]
     runs = [run for run in found.runs if run in longest]
-    figures: dict[str, list[list[interactive.Json]]] = {}
-    for place, one in enumerate(found.outputs[:MOST_OUTPUTS]):
-        figures[f"autocorrelation-{place}"] = [
-            interactive.plots(check_subjects.autocorrelation(one))
-        ]
-        panels = [interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns]
-        figures[f"patterns-{place}"] = [panels]
-        first = one.patterns[0].channel
-        figures[f"fit-{place}"], figures[f"residuals-{place}"] = [], []
-        for run in runs:
-            outputs = {MODEL: run.modelled[:, place]}
-            about = (run.recording, one.output, outputs)
-            figures[f"fit-{place}"].append(interactive.plots(subjects.fit_over_time(*about)))
-            drawing = subjects.residuals(run.recording, first, one.output, outputs)
-            figures[f"residuals-{place}"].append(interactive.plots(drawing))
-    return templating.page(
-        "check.html.j2",
-        figures | description_subjects.figures(description),
-        found=found,
-        description=description,
-        model_file=model_file,
-        drawn=runs,
-        words=words,
-        level=LEVEL,
-        versions=templating.versions(),
+    names = [run.recording.name for run in runs]
+    sections = [
+        Section(f"output-{k}", f"Residual of {one.output}", _output(one, k, runs), names)
+        for k, one in enumerate(found.outputs)
+    ]
+    if found.description is not None:
+        sections.append(Section("model", "Model", model_items(found.description)))
+    untested = [f"Too short to be tested: {', '.join(found.untested)}."] * bool(found.untested)
+    verdict = Section(
+        "verdict", "", [Text([*words.check_sentences(found), *untested], listed=True)]
     )
+    more = len(found.recordings) - 6
+    listed = ", ".join(found.recordings[:6]) + (f" and {more} more" if more > 0 else "")
+    return Page(
+        words.check_verdict(found),
+        f"{model_file} ({found.model}), running free on {listed}",
+        [verdict, *sections],
+        [
+            Tile(one.output, f"{words.size(one.unit, one.rmse)}", "RMS residual", f"output-{k}")
+            for k, one in enumerate(found.outputs[:4])
+        ],
+    ).html()
+
+
+def _output(one: OutputCheck, place: int, runs: list[Run]) -> list[Any]:
+    """Return what a page shows of an output: what is missed, residuals, and all tests."""
+    missing = [
+        [words.missed(one, each), f"{100 * each.share:.2g}", each.size, _p(each.p_value)]
+        for each in one.missing
+    ]
+    items: list[Any] = []
+    if missing:
+        headings = ["Missed", "Share of the variance [%]", f"RMS [{one.unit}]", "p"]
+        items.append(Table(headings, missing))
+    if place < MOST_OUTPUTS:
+        first, fits, residuals = one.patterns[0].channel, [], []
+        for run in runs:
+            about = (run.recording, one.output, {"model": run.modelled[:, place]})
+            fits.append(interactive.plots(subjects.fit_over_time(*about)))
+            drawing = subjects.residuals(run.recording, first, *about[1:])
+            residuals.append(interactive.plots(drawing))
+        panels = [interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns]
+        white = [interactive.plots(check_subjects.autocorrelation(one))]
+        items += [
+            Figure(f"fit-{place}", fits, "Measured and modelled output over time"),
+            Figure(
+                f"residuals-{place}",
+                residuals,
+                "Residuals over input and over time",
+                "Measured − modelled.",
+                columns=2,
+            ),
+            Figure(
+                f"patterns-{place}",
+                [panels],
+                "Mean residuals with intervals",
+                "Mean residuals, with 95 % intervals that allow for autocorrelation.",
+                columns=2,
+            ),
+            Figure(
+                f"autocorrelation-{place}",
+                white,
+                "Autocorrelation of the residual",
+                "Autocorrelation of the residual; band: white noise.",
+            ),
+        ]
+    tests = [
+        [words.missed(one, each), f"{100 * each.share:.2g}", _p(each.p_value)]
+        for each in one.suspects
+    ]
+    items.append(Table(["Test", "Share of the variance [%]", "p"], tests, summary="All tests"))
+    return items
+
+
+def _p(value: float | None) -> str:
+    return "–" if value is None else "< 0.000001" if value < 1e-6 else f"{value:.2g}"

@@ -37,7 +37,7 @@ def pattern(one: OutputCheck, against: Pattern) -> Drawing:
         curves += _means(bins, label, colour)
     what = "modelled " if against.against == "output" else ""
     x_label = axis_label(f"{what}{against.channel}", against.unit)
-    y_label = axis_label("recorded − model", one.unit)
+    y_label = axis_label("measured − model", one.unit)
     return Drawing((Panel(x_label, y_label, tuple(curves), zero=True),))
 
 

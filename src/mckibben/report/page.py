@@ -1,4 +1,4 @@
-"""The report of a study: one HTML file that needs nothing but itself."""
+"""The report of a study, as a page."""
 
 from __future__ import annotations
 
@@ -7,44 +7,53 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mckibben.comparison.channels import any_moves, held_at_levels
+from mckibben.diagnosis.check import Validation
+from mckibben.numerals import number, numeral, percent
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
     check_subjects,
     coupling_subjects,
-    description_subjects,
     interactive,
     model_subjects,
     review_subjects,
     subjects,
-    templating,
     words,
 )
+from mckibben.report.builder import (
+    Code,
+    Figure,
+    Page,
+    Section,
+    Table,
+    Text,
+    Tile,
+    Variants,
+)
+from mckibben.report.columns import columns_of_board
+from mckibben.report.commands import commands
+from mckibben.report.description_page import model_items
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
-    from mckibben.comparison.leaderboard import Leaderboard, Row
-    from mckibben.diagnosis.check import OutputCheck
+    from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.recording import Recording
     from mckibben.studying.study import Study
 
 N_VALUES = 180_000
 """Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""
 
-MOST_CHECKED = 3
-"""Outputs whose residuals have figures of their own."""
-
-LEAD_POINTS = 1500
-"""Points of a curve on the first screen."""
-
 FEWEST_POINTS = 400
 """Points left to a curve at least, however many curves there are."""
 
-Plots = dict[str, list[list[interactive.Json]]]
-"""Figure -> for each recording shown, or once for all -> its plots side by side."""
+COLUMNS = ("chosen", "test", "interval", "rank", "gap", "parameters", "inverse", "step")
+"""Columns of the leaderboard on the page, beside those of each output; the files have all."""
+
+MOST_CHECKED = 3
+"""Outputs whose residuals have figures of their own."""
 
 
-def write_report(study: Study, path: str | Path) -> None:
+def write_report(study: Study, path: str | Path, *, title: str = "") -> None:
     """Write the report of a study as one HTML file that opens without a network.
 
     Parameters
@@ -53,189 +62,314 @@ def write_report(study: Study, path: str | Path) -> None:
         What was found.
     path : path
         File to write; a failure on the way leaves what was there before.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
+    title : str
+        Of the page; default the recording's name.
     """
     from mckibben.system.atomic import write_text
 
-    write_text(path, page(study))
+    write_text(path, page(study, title=title))
 
 
 def page(study: Study, command: str = "", *, title: str = "") -> str:
     """Return the report of a study as HTML, with how it is repeated, and its title."""
-    from mckibben.report.columns import columns_of_board
-    from mckibben.report.commands import commands
-
-    every = shown(study)
+    board, every = study.leaderboard, shown(study)
     pictured = drawn(every)
-    figures, left_out = _figures(study, pictured)
-    measured = [one.recording for one in unique(every)]
-    coupled = _coupled(study, measured)
-    fullest = coupling_subjects.fullest(measured, study.leaderboard.inputs)
-    if coupled is not None:
-        figures["coupling"] = [interactive.plots(coupling_subjects.matrix(fullest, coupled))]
-    return templating.page(
-        "report.html.j2",
-        figures,
-        study=study,
-        board=study.leaderboard,
-        source=pictured[0].recording.origin,
-        shown=unique(every),
-        listed_drawn=unique(pictured),
-        drawn=pictured,
-        left_out=left_out,
-        models=_models(study.leaderboard),
-        explained=_explained(study.leaderboard),
-        coupling=coupled,
-        coupling_of=fullest.name,
-        bars=_bars(study.leaderboard),
-        columns=columns_of_board(study.leaderboard),
-        words=words,
-        reading=notes_by_file(measured),
-        notes=[note for note in study.notes if note not in reading_notes(measured)],
-        versions=templating.versions(),
-        command=command,
-        title=title,
-        commands=commands(study, command),
-        answers=words.answers(study),
-        checked=checked(study),
-        description=study.description,
-        review=study.review,
-        reviewed=[] if study.review is None else words.reviewed(study.review),
+    first = pictured[0]
+    n_models = min(N_COLOURS, len(study.predictions))
+    n_values = len(pictured) * 2 * (3 + 3 * n_models)
+    view = _View(pictured, max(FEWEST_POINTS, min(POINTS, N_VALUES // n_values)))
+    sections = (
+        _review(study, view.points),
+        _leaderboard(board),
+        _model(study, view),
+        _checks(study, view),
+        _recordings(study, every, view),
+        _method(study, command),
+    )
+    names = [one.recording.name for one in unique(pictured)]
+    more = len(unique(every)) - len(names)
+    return Page(
+        title or first.recording.name,
+        f"Hysteresis of {study.output} over {study.input if first.several else first.input}: "
+        f"{', '.join(names)}{f' and {more} more' if more else ''}",
+        [one for one in sections if one is not None],
+        tiles(study),
+        _lead(first, board),
+        words.answers(study),
+    ).html()
+
+
+class _View:
+    """The recordings that are drawn, and with how many points."""
+
+    def __init__(self, pictured: Sequence[Shown], points: int) -> None:
+        self.pictured, self.points = pictured, points
+        self.names = [f"{one.name} ({one.role})" for one in pictured]
+
+    def each(self, draw: Callable[[Shown], Drawing]) -> Variants:
+        """Return a figure for every recording."""
+        return [interactive.plots(draw(one)) for one in self.pictured]
+
+
+def tiles(study: Study) -> tuple[Tile, ...]:
+    """Return the numbers of the first screen: loop, model, inverse, data gaps."""
+    board, found, best = study.leaderboard, study.characterization, study.leaderboard.best
+    loop = Tile("Loop width", "–", "of several muscles, see Recordings", "recordings")
+    if found is not None and found.loop_width is not None:
+        width = f"{numeral(found.mid_width, 2)} {found.output_unit} at mid {found.input}"
+        loop = Tile("Loop width", f"{numeral(found.loop_width, 2)} %", width, "recordings")
+    elif found is not None:
+        loop = Tile("Loop width", "–", "no loop is shown", "recordings")
+    model = Tile(
+        "Best model", "–", "fitting" if board.pending else "none recommended", "leaderboard"
+    )
+    if best is not None:
+        error, share = numeral(best.test_error, 2), _share(study)
+        of = f" ({share} of the range)" if share else ""
+        model = Tile(
+            "Best model", best.model, f"{error} {board.unit} RMSE on the test{of}", "leaderboard"
+        )
+    inverse, check = Tile("Inverse", "–", "none", "checks"), study.inverse
+    if check is not None:
+        plain = check.uncompensated_error
+        against = "" if plain is None else f"; static map: {percent(plain)}"
+        note = f"{check.model}, error on the model itself{against}"
+        inverse = Tile("Inverse", percent(check.error), note, "checks")
+    gaps = [words.gap_name(gap) for gap in study.data_gaps]
+    listed = ", ".join(gaps[:3]) + " ..." * (len(gaps) > 3)
+    return loop, model, inverse, Tile("Data gaps", str(len(gaps)), listed, "recordings")
+
+
+def _share(study: Study) -> str:
+    """Return the chosen model's error over the range of what it is tested on."""
+    if not isinstance(study.check, Validation) or len(study.check.outputs) > 1:
+        return ""
+    (one,) = study.check.outputs
+    return percent(one.rmse / one.span) if one.span else ""
+
+
+def _lead(one: Shown, board: Leaderboard) -> Figure:
+    """Return the measured loop with the chosen model's; over time where several inputs move."""
+    moving = [name for name in board.inputs if any_moves([one.recording], (name,))]
+    best = dict(list(one.outputs.items())[:1])
+    caption = one.name + (f", and {next(iter(best))} running free" if best else "")
+    if len(moving) > 1 and one.recording.sample_time is not None:
+        drawing = subjects.fit_over_time(one.recording, one.output, best, one.test_from, POINTS)
+    elif best:
+        drawing = subjects.fit_loops(one.recording, one.input, one.output, best, POINTS)
+    else:
+        drawing = subjects.loop([one.recording], one.input, one.output, POINTS)
+    return Figure("lead", [interactive.plots(drawing)], "Loop, measured and modelled", caption)
+
+
+def _review(study: Study, points: int) -> Section | None:
+    if study.review is None:
+        return None
+    figures = [
+        Figure(
+            f"review {one.output}",
+            [interactive.plots(review_subjects.parts(one, points))],
+            f"Reference, measured motion, and parts of the error of {one.output}",
+            "The parts add up to the error: model, pressure (measured less commanded), command.",
+            "stacked",
+        )
+        for one in study.review.outputs
+    ]
+    return Section("review", "Closed loop", [Text(words.reviewed(study.review)), *figures])
+
+
+def _leaderboard(board: Leaderboard) -> Section:
+    columns = [
+        one for one in columns_of_board(board) if one.key in COLUMNS or one.key in board.outputs
+    ]
+    ranked = [row for row in board.ranking if row.reason is None and row.test and row.train]
+    given = [row.to_dict() for row in ranked]
+    names = [
+        row.model + " ≈" * (row.model in board.level) + "*" * bool(row.caution) for row in ranked
+    ]
+    flags = [" ".join(filter(None, (one.flag(each) for one in columns))) for each in given]
+    table = Table(
+        ["Model", *(f"{one.heading} [{one.unit}]" if one.unit else one.heading for one in columns)],
+        [
+            [name, *(one.text(each) for one in columns)]
+            for name, each in zip(names, given, strict=True)
+        ],
+        best=next((k for k, row in enumerate(ranked) if row is board.best), None),
+        titles=[
+            f"{_summary(row.model)} {flag}".strip() for row, flag in zip(ranked, flags, strict=True)
+        ],
+        keys=[[row.model, *(one.sorted_by(each) for one in columns)]
+              for row, each in zip(ranked, given, strict=True)],
+    )  # fmt: skip
+    by = words.CHOICES[board.chosen_by][1]
+    notes = [f"≈ {words.LEVEL}."] * bool(board.level)
+    notes += [f"* {words.CAREFUL}."] * any(row.caution for row in ranked)
+    failed = [f"{', '.join(some)}: failed, {reason}" for reason, some in board.failures.items()]
+    chart = None
+    if ranked:
+        drawing = model_subjects.leaderboard(board)
+        chart = Figure(
+            "leaderboard",
+            [interactive.plots(drawing)],
+            "Errors of all models with intervals",
+            "Test errors with 95 % intervals; strokes: on the data fitted; rings: validation.",
+            height=4 + 1.4 * len(board.rows),
+        )
+    return Section(
+        "leaderboard",
+        "Leaderboard",
+        [
+            Text(
+                [
+                    f"{board.split[0].upper()}{board.split[1:]}. Ordered by {by}; all models run free."
+                ]
+            ),
+            table
+            if ranked
+            else Text(["No model is fitted yet."] if board.pending else ["No model worked."]),
+            Text([*notes, *words.comparison(board), *words.not_validated(board)], "note"),
+            Text(failed, "failed", listed=True) if failed else None,
+            chart,
+        ],
     )
 
 
-def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
-    """Return the plots of every figure, and which weights are left out."""
-    n_models = min(N_COLOURS, len(study.predictions))
-    # A recording has two panels over time and its loop, then each model in four panels more.
-    n_values = len(pictured) * 2 * (5 + 4 * n_models)
-    points = max(FEWEST_POINTS, min(POINTS, N_VALUES // n_values))
-
-    def each(draw: Callable[[Shown], Drawing]) -> list[list[interactive.Json]]:
-        return [interactive.plots(draw(one)) for one in pictured]
-
-    figures: Plots = {
-        "time": each(
-            lambda one: subjects.time_course([one.recording], (one.input, one.output), points)
-        ),
-        "loop": each(lambda one: subjects.loop([one.recording], one.input, one.output, points)),
-    }
-    if n_models:
-        figures["leaderboard"] = [interactive.plots(model_subjects.leaderboard(study.leaderboard))]
-        figures["fit"] = each(
-            lambda one: subjects.fit_over_time(
-                one.recording, one.output, one.outputs, one.test_from, points
-            )
-        )
-        figures["loops"] = each(
-            lambda one: subjects.fit_loops(
-                one.recording, one.input, one.output, one.outputs, points
-            )
-        )
-        figures["residuals"] = each(
-            lambda one: subjects.residuals(
-                one.recording, one.input, one.output, one.outputs, one.test_from, points
-            )
-        )
-    figures["lead"] = [interactive.plots(_lead(pictured[0], study.leaderboard.inputs))]
-    if study.load is not None and all(study.load in one.recording.channels for one in pictured):
-        load = study.load
-        runs = [one.recording for one in pictured]
-        held = held_at_levels(runs, load)
-        figures["levels"] = each(
-            lambda one: coupling_subjects.loop_by(
-                runs if held else [one.recording], one.input, one.output, load, points
-            )
-        )[: 1 if held else None]
-    blocks = {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
-    left_out = ""
-    if any(any(model_subjects.operator_sums(block)) for block in blocks.values()):
-        drawing = model_subjects.weights(blocks)
-        figures["weights"], left_out = [interactive.plots(drawing)], drawing.note
-    if study.description is not None:
-        figures |= description_subjects.figures(study.description)
-    for one in checked(study):
-        patterns = [
-            interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns
-        ]
-        figures[f"patterns {one.output}"] = [patterns]
-        drawing = check_subjects.autocorrelation(one)
-        figures[f"autocorrelation {one.output}"] = [interactive.plots(drawing)]
-    if study.inverse is not None and study.inverse.reachable is not None:
-        timed = study.train[0].sample_time is not None
-        figures["inverse"] = [interactive.plots(model_subjects.inverse_check(study.inverse, timed))]
-    for followed in () if study.review is None else study.review.outputs:
-        figures[f"review {followed.output}"] = [
-            interactive.plots(review_subjects.parts(followed, points))
-        ]
-    for name in study.leaderboard.outputs if study.loops else ():
-        drawing = model_subjects.tracking(study.loops, name, points)
-        figures[f"tracking {name}"] = [interactive.plots(drawing)]
-    return figures, left_out
-
-
-def _lead(one: Shown, inputs: Sequence[str]) -> Drawing:
-    """Draw the measured loop with the chosen model's, or from early to late where there is none.
-
-    Where several inputs move, a path over one of them is no loop: that is drawn over time.
-    """
-    moving = [name for name in inputs if any_moves([one.recording], (name,))]
-    best = dict(list(one.outputs.items())[:1])
-    if len(moving) > 1 and one.recording.sample_time is not None:
-        return subjects.fit_over_time(one.recording, one.output, best, one.test_from, LEAD_POINTS)
-    if not best:
-        return subjects.loop([one.recording], one.input, one.output, LEAD_POINTS)
-    return subjects.fit_loops(one.recording, one.input, one.output, best, LEAD_POINTS)
-
-
-def _coupled(study: Study, recordings: list[Recording]) -> coupling_subjects.Coupling | None:
-    """Return how inputs move outputs of all recordings, where there are several."""
-    inputs, outputs = study.leaderboard.inputs, study.leaderboard.outputs
-    if not recordings or len(inputs) == len(outputs) == 1:
-        return None
-    return coupling_subjects.coupling(recordings, inputs, outputs)
-
-
-def _explained(board: Leaderboard) -> dict[str, str]:
-    """Return the full name of every model of a leaderboard and what it can; nothing of unknown ones."""
+def _summary(model: str) -> str:
+    """Return the full name of a model and what it can; nothing of unknown ones."""
     from mckibben import registry
     from mckibben.estimators.catalogue import summary
 
-    known = registry.names("estimators")
-    return {row.model: summary(row.model) for row in board.ranking if row.model in known}
+    return summary(model) if model in registry.names("estimators") else ""
 
 
-def checked(study: Study) -> tuple[OutputCheck, ...]:
-    """Return what the chosen model leaves of the first outputs, where that was checked."""
-    return () if isinstance(study.check, str | None) else study.check.outputs[:MOST_CHECKED]
-
-
-def _models(board: Leaderboard) -> list[dict[str, str]]:
-    """Return the models that figures show, the chosen one first, each with its colour."""
+def _model(study: Study, view: _View) -> Section | None:
+    board = study.leaderboard
+    if not study.predictions:
+        return None
     ranked = [row.model for row in board.rows if row.reason is None][:N_COLOURS]
-    return [{"name": name, "colour": series_colour(place)} for place, name in enumerate(ranked)]
+    fit = view.each(
+        lambda one: subjects.fit_over_time(
+            one.recording, one.output, one.outputs, one.test_from, view.points
+        )
+    )
+    items: list[Any] = [Figure("fit", fit, "Measured and modelled output over time", toggled=True)]
+    if study.description is not None:
+        items += model_items(study.description)
+    name = "Model" if board.best is None else f"Model: {board.best.model}"
+    models = [{"name": one, "colour": series_colour(k)} for k, one in enumerate(ranked)]
+    return Section("model", name, items, view.names, models)
 
 
-def _bars(board: Leaderboard) -> dict[str, dict[str, float]]:
-    """Return for each model its test RMSE and interval as percentages of the widest."""
+def _checks(study: Study, view: _View) -> Section | None:
+    board, items = study.leaderboard, list[Any]()
+    if study.predictions:
+        residuals = view.each(
+            lambda one: subjects.residuals(
+                one.recording, one.input, one.output, one.outputs, one.test_from, view.points
+            )
+        )
+        label = "Residuals over input and over time"
+        items.append(
+            Figure("residuals", residuals, label, "Measured − modelled.", "", 2, toggled=True)
+        )
+    if isinstance(study.check, Validation):
+        items.append(Text(words.check_sentences(study.check), listed=True))
+        for one in study.check.outputs[:MOST_CHECKED]:
+            panels = [
+                interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns
+            ]
+            caption = f"Mean residual of {one.output} on the test, with 95 % intervals."
+            items.append(Figure(f"patterns {one.output}", [panels], caption, caption, "", 2))
+    check = study.inverse
+    if check is not None and check.reachable is not None:
+        low, high = (numeral(end, 3) for end in check.reachable)
+        drawing = model_subjects.inverse_check(check, study.train[0].sample_time is not None)
+        caption = f"The inverse of {check.model} on the model, {low} to {high} {board.unit}."
+        items.append(Figure("inverse", [interactive.plots(drawing)], caption, caption, "tall"))
+    if study.loops:
+        rows = [
+            [name, *(one.rmse[output] for output in board.outputs), one.clipped]
+            for name, one in study.loops.items()
+        ]
+        headings = [f"{name} RMSE [{board.unit}]" for name in board.outputs]
+        items.append(Text([f"A measured motion, followed on the virtual rig {study.plant}."]))
+        items.append(Table(["Controller", *headings, "Samples clipped"], rows))
+        for name in board.outputs:
+            drawing = model_subjects.tracking(study.loops, name, view.points)
+            label = f"Reference and followed {name}"
+            items.append(
+                Figure(f"tracking {name}", [interactive.plots(drawing)], label, f"{label}.")
+            )
+    elif study.not_looped:
+        items.append(Text([f"No loop was closed: {study.not_looped}"]))
+    return Section("checks", "Checks", items, view.names) if items else None
 
-    def ends(row: Row) -> tuple[float, float]:
-        rmse = 0.0 if row.test is None else row.test.rmse
-        return row.rmse_interval or (rmse, rmse)
 
-    scored = [row for row in board.rows if row.test is not None]
-    widest = max((ends(row)[1] for row in scored), default=1.0) or 1.0
-    bars: dict[str, Any] = {}
-    for row in scored:
-        low, high = ends(row)
-        middle = 0.0 if row.test is None else row.test.rmse
-        bars[row.model] = {
-            "low": 100 * low / widest,
-            "high": 100 * high / widest,
-            "middle": 100 * middle / widest,
-        }
-    return bars
+def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
+    board = study.leaderboard
+    listed = [
+        [one.recording.name, one.recording.source or "–", words.duration(one.recording), one.role]
+        for one in unique(every)
+    ]
+    measured = [one.recording for one in unique(every)]
+    time = view.each(
+        lambda one: subjects.time_course([one.recording], (one.input, one.output), view.points)
+    )
+    items: list[Any] = [
+        Table(["Recording", "File", "Length", "Used to"], listed),
+        Figure("time", time, "Input and output over time", "", "stacked"),
+    ]
+    if study.data_gaps:
+        gaps = [[words.gap_sentence(gap), words.gap_run(gap)] for gap in study.data_gaps]
+        items.append(Table(["Data gap", "Run that closes it"], gaps))
+    if study.characterization is not None:
+        rows = [
+            [quantity, value, " to ".join(map(number, limits or ())), unit]
+            for quantity, value, limits, unit, _ in words.characterization_rows(
+                study.characterization
+            )
+            if value is not None
+        ]
+        items.append(
+            Table(["Quantity", "Value", "95 % interval", "Unit"], rows, summary="Characterization")
+        )
+    if not (len(board.inputs) == len(board.outputs) == 1):
+        items += _coupling(board, measured)
+    load = study.load
+    if load is not None and all(load in one.recording.channels for one in view.pictured):
+        runs = [one.recording for one in view.pictured]
+        held = held_at_levels(runs, load)
+        levels = view.each(
+            lambda one: coupling_subjects.loop_by(
+                runs if held else [one.recording], one.input, one.output, load, view.points
+            )
+        )[: 1 if held else None]
+        label = f"Output over input, coloured by {load}"
+        items.append(Figure("levels", levels, label, f"{label}.", "square"))
+    notes = [f"{file}: {'; '.join(said)}." for file, said in notes_by_file(measured).items()]
+    notes += [note for note in study.notes if note not in reading_notes(measured)]
+    items.append(Text(notes, "note", listed=True) if notes else None)
+    return Section("recordings", "Recordings", items, view.names)
+
+
+def _coupling(board: Leaderboard, recordings: Sequence[Recording]) -> list[Any]:
+    """Return how inputs move outputs, where there are several."""
+    found = coupling_subjects.coupling(list(recordings), board.inputs, board.outputs)
+    fullest = coupling_subjects.fullest(list(recordings), board.inputs)
+    label = f"Every output over every input, of {fullest.name}"
+    rows: list[list[Any]] = [
+        [f"{output} [{found.units[k]}]", *found.effects[k].tolist(), 100 * found.explained[k]]
+        for k, output in enumerate(found.outputs)
+    ]
+    plots = interactive.plots(coupling_subjects.matrix(fullest, found))
+    return [
+        Figure("coupling", [plots], label, f"{label}.", "matrix", min(len(found.inputs), 6)),
+        Table(["Effect of the whole range of", *found.inputs, "explained [%]"], rows),
+    ]
+
+
+def _method(study: Study, command: str) -> Section:
+    board = study.leaderboard
+    facts = f"{board.n_train} samples to fit, {board.n_test} to test; seed {board.seed}."
+    lines = [Code(what, line) for what, line in commands(study, command)]
+    return Section("method", "How to repeat", [Text([facts]), *lines])

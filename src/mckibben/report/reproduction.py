@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mckibben.numerals import numeral
-from mckibben.report import interactive, templating
+from mckibben.report import builder, interactive
+from mckibben.report.builder import Code, Page, Section, Text
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Mark, Panel, Style
 
 if TYPE_CHECKING:
@@ -34,18 +35,49 @@ def heading(one: Table | Figure, *, quick: bool = False) -> str:
 
 
 def reproduction_page(found: Reproduction) -> str:
-    """Return the report of a re-run as HTML: what is printed beside ours first, raw signals last."""
+    """Return the report of a re-run as HTML: what is printed beside ours first, figures last."""
+    paper = found.paper
+    quick = ["A quick run: what takes long was left out, so figures are rougher."] * found.quick
     pictured = [table for table in found.tables if table.text.drawn]
-    drawings = {f"beside-{place}": beside(table) for place, table in enumerate(pictured)}
-    drawings |= {f"figure-{place}": drawing(figure) for place, figure in enumerate(found.figures)}
-    return templating.page(
-        "reproduction.html.j2",
-        {name: [interactive.plots(each)] for name, each in drawings.items()},
-        found=found,
-        pictured=pictured,
-        heading=lambda one: heading(one, quick=found.quick),
-        versions=templating.versions(),
-    )
+    published = ". ".join(filter(None, (paper.authors, paper.published, paper.doi)))
+    charts = [
+        chart(f"beside-{k}", beside(table), heading(table), "tall" * (len(table.rows) > 12))
+        for k, table in enumerate(pictured)
+    ]
+    tables: list[Any] = []
+    for one in found.tables:
+        tables += [Text([heading(one)], "lead"), builder.Table(one.columns, one.rows)]
+        tables.append(Text([one.text.note], "note") if one.text.note else None)
+    figures = [
+        chart(f"figure-{k}", drawing(one), heading(one), "square", min(len(one.panels), 3))
+        for k, one in enumerate(found.figures)
+    ]
+    command = f"mckibben reproduce {found.name}{' --quick' if found.quick else ''}"
+    code = Code("", f"{command} --seed {found.seed} -o {found.name}")
+    return Page(
+        paper.title,
+        published,
+        [
+            Section(
+                "question",
+                "",
+                [Text([paper.question, f"{paper.protocol} Here: {found.on}.", *quick])],
+            ),
+            Section("results", "Results", [Text(found.summary, listed=True)]),
+            Section("beside", "Printed beside ours", charts),
+            Section("tables", "Tables", tables),
+            Section("differences", "What differs from the paper", [Text(found.notes, listed=True)]),
+            Section("figures", "Figures", figures),
+            Section("method", "How to repeat", [code]),
+        ],
+    ).html()
+
+
+def chart(
+    name: str, drawn: Drawing, label: str, shape: str = "", columns: int = 1
+) -> builder.Figure:
+    """Return a drawing as a figure of a page, with its heading as caption."""
+    return builder.Figure(name, [interactive.plots(drawn)], label, label, shape, columns)
 
 
 def beside(table: Table) -> Drawing:

@@ -133,7 +133,7 @@ def residuals(
         against_input.append(Curve(*path, model, colour, _path_style(u, "fine"), model))
         against_time.append(Curve(*course, "", colour, "fine", model))
     x_label = axis_label(input_name, recording.units[input_name])
-    y_label = axis_label(f"{recording.origin} − model", recording.units[output_name])
+    y_label = axis_label("measured − model", recording.units[output_name])
     marks = _test_mark(recording.time, test_from)
     return Drawing(
         (

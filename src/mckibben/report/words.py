@@ -425,7 +425,7 @@ _ADVICE = {
 }
 
 
-def _residual(one: OutputCheck) -> str:
+def _residual(one: OutputCheck, *, sized: bool = True) -> str:
     size = f"{numeral(one.rmse, 2)} {one.unit}".rstrip()
     of_range = f"{percent(one.rmse / one.span)} of its range"
     if one.exact:
@@ -435,7 +435,7 @@ def _residual(one: OutputCheck) -> str:
             f"The model is of no use for {one.output}: {size} RMSE, where the mean is off by "
             f"{numeral(one.mean_error, 2)}."
         )
-    residual = f"The residual of {one.output}, {size} RMS ({of_range}),"
+    residual = f"The residual of {one.output}" + (f", {size} RMS ({of_range})," if sized else "")
     if not one.missing:
         return f"{residual} follows none of {one.n_tests} causes tested."
     first = _largest(one)
@@ -613,19 +613,19 @@ def reviewed(found: Review) -> list[str]:
     given = " of the compensator" if found.judged_by == "compensator" else ""
     said = []
     for one in found.outputs:
-        size = partial(_size, one.unit)
+        of = partial(size, one.unit)
         said.append(
-            f"{one.output}: achieved error {size(one.achieved)} RMS; the model misses "
-            f"{size(one.residual)} of the measured motion."
+            f"{one.output}: achieved error {of(one.achieved)} RMS; the model misses "
+            f"{of(one.residual)} of the measured motion."
         )
         if one.predicted is not None and one.pressure is not None:
             said.append(
-                f"{one.output}: the model predicts an error of {size(one.predicted)} for the "
-                f"commands{given}, and {size(one.pressure)} for pressures that differ from them."
+                f"{one.output}: the model predicts an error of {of(one.predicted)} for the "
+                f"commands{given}, and {of(one.pressure)} for pressures that differ from them."
             )
         low, high = (numeral(60 * end, 2) for end in one.drift_interval)
         said.append(
-            f"{one.output}: the residual drifts by {size(60 * one.drift)} per minute (95 %: {low} to "
+            f"{one.output}: the residual drifts by {of(60 * one.drift)} per minute (95 %: {low} to "
             f"{high})."
         )
     for delay in found.delays:
@@ -644,7 +644,8 @@ def reviewed(found: Review) -> list[str]:
     return said
 
 
-def _size(unit: str, value: float) -> str:
+def size(unit: str, value: float) -> str:
+    """Return a number with its unit."""
     return f"{numeral(value, 2)} {unit}".rstrip()
 
 
@@ -667,7 +668,8 @@ def _right(study: Study) -> str:
         return "The chosen model is checked when all are fitted."
     if isinstance(study.check, str):
         return study.check
-    return _residual(max(study.check.outputs, key=lambda one: one.rmse / max(one.span, 1e-300)))
+    worst = max(study.check.outputs, key=lambda one: one.rmse / max(one.span, 1e-300))
+    return _residual(worst, sized=False)  # which stands beside
 
 
 def _how_far(study: Study) -> str:
@@ -688,7 +690,7 @@ def _record_next(study: Study) -> str:
     if not study.data_gaps:
         return "No data gaps were found."
     first, *others = study.data_gaps
-    more = f" ({len(others)} more in the report)" if others else ""
+    more = f" ({len(others)} more gaps)" if others else ""
     return f"{gap_run(first, ranges=False)[:-1]}: {gap_name(first)} cannot be identified{more}."
 
 

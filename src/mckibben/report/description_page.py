@@ -1,10 +1,12 @@
-"""Figures of frequency responses."""
+"""What a model is, on a page: equations, parameters and how sure they are, answers to sines."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
+from mckibben.numerals import number
 from mckibben.report import interactive
+from mckibben.report.builder import Equations, Figure, Item, Table, Text
 from mckibben.report.drawing import Curve, Drawing, Panel, axis_label
 
 if TYPE_CHECKING:
@@ -13,10 +15,33 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.responses import FrequencyResponse
 
 
-def figures(description: ModelDescription) -> dict[str, list[list[interactive.Json]]]:
-    """Return the figures of a description as pages hold them, by name."""
-    drawn = {one.output.name: frequency_response(one) for one in description.frequency_responses}
-    return {f"response {name}": [interactive.plots(drawing)] for name, drawing in drawn.items()}
+def model_items(found: ModelDescription) -> list[Item]:
+    """Return the parts of a page that describe a model."""
+    rows = [
+        [
+            one.name,
+            {"latex": one.symbol},
+            one.value,
+            one.status if one.standard_error is None else f"± {number(one.standard_error, 2)}",
+            one.unit or "–",
+        ]
+        for one in found.parameters
+    ]
+    items: list[Item] = [
+        Text([found.written.title], "muted"),
+        Equations(found.written),
+        Table(
+            ["Parameter", "Symbol", "Value", "Standard error", "Unit"],
+            rows,
+            titles=[one.meaning for one in found.parameters],
+        ),
+    ]
+    for one in found.frequency_responses:
+        name = one.output.name
+        label = f"Gain and angle of {name} over the frequency of {one.input.name}"
+        plots = [interactive.plots(frequency_response(one))]
+        items.append(Figure(f"response {name}", plots, label, f"{label}; dots: measured.", "tall"))
+    return items
 
 
 def frequency_response(found: FrequencyResponse) -> Drawing:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
+
 from mckibben import options
 from mckibben.errors import DataError
 from mckibben.options import Option
-from mckibben.recording import Recording, is_frame, listed
+from mckibben.recording import Recording, is_frame
+from mckibben.recording import listed as recordings_of
 
 if TYPE_CHECKING:
     from mckibben.diagnosis.data_gaps import Gap
@@ -128,37 +131,33 @@ class ReadOptions:
         return recordings
 
 
-def loaded(data: Data) -> list[Recording] | None:
-    """Return data that are recordings already, rather than files."""
-    if isinstance(data, Recording):
-        return [data]
-    if is_frame(data):
-        return listed(data)
-    if not isinstance(data, Sequence) or isinstance(data, str):
-        return None
-    return (
-        listed(data) if any(isinstance(one, Recording) or is_frame(one) for one in data) else None
-    )
-
-
-def files_of(data: Data) -> list[Path]:
-    """Return the files among data; none of recordings.
+def items(data: Any) -> list[Recording | Path]:
+    """Return data as a list of recordings and files; data frames are made recordings.
 
     Raises
     ------
     DataError
-        If data are neither.
+        If there is anything else.
     """
-    if isinstance(data, Recording | str | Path):
-        data = [data]
-    if not (
-        isinstance(data, Sequence) and all(isinstance(d, Recording | str | Path) for d in data)
-    ):
-        raise DataError(
-            f"these are no recordings: {type(data).__name__}",
-            remedy="give recordings, or files; Recording.from_frame makes one of a data frame",
-        )
-    return [Path(one) for one in data if not isinstance(one, Recording)]
+    single = is_frame(data) or isinstance(data, Recording | str | Path | np.ndarray)
+    listed = [data] if single or not isinstance(data, Iterable) else list(data)
+    found: list[Recording | Path] = []
+    for one in listed:
+        if isinstance(one, str | Path):
+            found.append(Path(one))
+        else:
+            found += recordings_of(one)
+    return found
+
+
+def files_of(data: Data) -> list[Path]:
+    """Return the files among data."""
+    return [one for one in items(data) if isinstance(one, Path)]
+
+
+def loaded(data: Data) -> list[Recording]:
+    """Return the recordings among data that are no files."""
+    return [one for one in items(data) if isinstance(one, Recording)]
 
 
 def read_files(
@@ -178,9 +177,8 @@ def read_files(
     from mckibben.files import read
 
     reading = reading or ReadOptions()
-    files_of(data)
     found: list[Recording] = []
-    for one in [data] if isinstance(data, Recording | str | Path) else data:
+    for one in items(data):
         if isinstance(one, Recording):
             found.append(one)
         else:

@@ -468,13 +468,13 @@ def listed(recordings: Any) -> list[Recording]:
         If something else is given, such as the name of a file.
     """
     given = recordings
-    several = isinstance(given, Iterable) and not isinstance(given, Recording | str)
+    several = isinstance(given, Iterable) and not isinstance(given, Recording | str | np.ndarray)
     found = list(given) if several and not is_frame(given) else [given]
     found = [Recording.from_frame(one) if is_frame(one) else one for one in found]
     for one in found:
         if not isinstance(one, Recording):
             raise DataError(
-                f"a recording is needed here, not {type(one).__name__} {str(one)[:60]!r}",
+                f"a recording is needed here, not {type(one).__name__} {str(one)[:40]!r}",
                 remedy="read the file with mckibben.read; make one of arrays by "
                 "mckibben.Recording({'pressure': u, 'displacement': y}, sample_time)",
             )

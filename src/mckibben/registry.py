@@ -227,7 +227,7 @@ def load(group: str, name: str) -> Any:
     except (ImportError, AttributeError, SyntaxError) as error:
         raise ModelError(
             f"{name!r} of the {group} cannot be imported: {error}",
-            remedy=f"mend {locations[name]}, or take it out of the registry",
+            remedy=f"correct {locations[name]}, or take it out of the registry",
         ) from error
     return Chosen(name, found) if isinstance(found, Preset) else found
 

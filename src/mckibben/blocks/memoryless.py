@@ -302,7 +302,7 @@ class Polynomial(Invertible):
     def check_invertible(self) -> None:
         if self.input_range is None:
             raise ModelError(
-                "'polynomial' has no inverse without an input range", remedy="give `input_range`"
+                "'polynomial' has no inverse without an input range", remedy="give input_range"
             )
         slopes = slopes_at(self.polynomial, *self._arguments())
         if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:

@@ -176,7 +176,7 @@ class NarxEstimator(SearchEstimator):
         tracker.best_cost, chosen = min(tried, key=lambda item: item[0])
         if not stable(chosen, data):
             warnings.warn(
-                "the NARX model leaves all bounds when its input is held or goes on: do not run it free",
+                "the NARX model diverges when its input is held or goes on: do not run it free",
                 ModelWarning,
                 stacklevel=4,
             )

@@ -347,12 +347,14 @@ def _twin(plant: object) -> Twin:
             return Twin(plant)
         case str() | Path():
             return Twin(load(plant), name=Path(plant).stem)
-    raise DataError(f"plant is {plant!r}", remedy="give a model, its file, or a Twin")
+    raise DataError(
+        f"it is {plant!r}", parameter="plant", remedy="give a model, its file, or a Twin"
+    )
 
 
 def _demand(holds: bool, name: str, value: object, wanted: str) -> None:
     if not holds:
-        raise DataError(f"{name} is {value!r}", remedy=f"give {wanted}")
+        raise DataError(f"it is {value!r}", parameter=name, remedy=f"give {wanted}")
 
 
 register()

@@ -9,6 +9,7 @@ in a remedy                 Python                   command line
 ```gaps```                  gaps                     --gaps
 ```gaps=split```            gaps='split'             --gaps split
 ```columns[force]=F```      columns={'force': 'F'}   --column force=F
+```settings[delay]=0```     settings={'delay': 0}    --set delay=0
 ```track()```               track()                  mckibben track
 =========================== ======================== =====================
 """
@@ -79,14 +80,16 @@ def python_parameter(name: str, key: str | None = None, value: str | None = None
 
     >>> python_parameter("gaps", None, "split"), python_parameter("columns", "force", "F1")
     ("gaps='split'", "columns={'force': 'F1'}")
+    >>> python_parameter("settings", "delay", "0"), python_parameter("settings", "ridge")
+    ("settings={'delay': 0}", "settings['ridge']")
     """
     if value is None:
-        return name
-    plain = value.isupper() or not re.fullmatch(r"[A-Za-z_][\w.-]*", value)
-    plain = plain or value in ("True", "False", "None")
-    if key is not None:
-        return f"{name}={{{key!r}: {value!r}}}"
-    return f"{name}={value if plain else repr(value)}"
+        return name if key is None else f"{name}[{key!r}]"
+    word = value.capitalize() if value in ("true", "false", "none") else value
+    plain = word.isupper() or not re.fullmatch(r"(?!True$|False$|None$)[A-Za-z_][\w.-]*", word)
+    if not plain or (key is not None and name != "settings"):  # of columns and units, all is text
+        word = repr(value)
+    return f"{name}={word}" if key is None else f"{name}={{{key!r}: {word}}}"
 
 
 def python_operation(name: str) -> str:

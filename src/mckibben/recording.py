@@ -11,7 +11,7 @@ from typing import Any, ClassVar, SupportsFloat, SupportsIndex
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, check_finite
 from mckibben.errors import DataError
 from mckibben.system.extras import demand
 from mckibben.system.showing import DrawsItself
@@ -392,6 +392,29 @@ class Recording(DrawsItself):
         return same_grid and abs(self.start_time - float(other.time[-1]) - step) <= 0.1 * step
 
 
+def sample_time_of(
+    recording: Recording,
+    purpose: str,
+    remedy: str = "read it with a column of times, or give `rate`",
+) -> float:
+    """Return the sample time of a recording, which it cannot be used without.
+
+    Parameters
+    ----------
+    purpose : str
+        What it is needed for, after "cannot".
+
+    Raises
+    ------
+    DataError
+        If the recording has no time.
+    """
+    if recording.sample_time is None:
+        problem = f"a recording without time cannot {purpose}"
+        raise DataError(problem, file=recording.source, remedy=remedy)
+    return recording.sample_time
+
+
 def _frozen(name: str, samples: ArrayLike) -> Array:
     if isinstance(samples, np.ma.MaskedArray) and (masked := int(np.sum(samples.mask))):
         raise DataError(
@@ -412,14 +435,8 @@ def _frozen(name: str, samples: ArrayLike) -> Array:
         raise DataError(
             f"samples have shape {values.shape}", channel=name, remedy="give one value a sample"
         )
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise DataError(
-            f"the value is {values[bad[0]]}, and {bad.size} of {values.size} are not finite",
-            channel=name,
-            row=int(bad[0]) + 1,
-            remedy="cut those samples out, or read the file with `gaps=split` or `gaps=interpolate`",
-        )
+    remedy = "cut those samples out, or read the file with `gaps=split` or `gaps=interpolate`"
+    check_finite(values, remedy, name)
     values.flags.writeable = False
     return values
 

@@ -65,7 +65,7 @@ BAD = [
     ("plot run.csv -o out.bmp", "bmp"),
     # Models, settings and channels
     ("fit spline run.csv -o out.json", "'spline'"),
-    (f"{FIT} --set n_operators=many", "n_operators is 'many'"),
+    (f"{FIT} --set n_operators=many", "n_operators: it is 'many'"),
     (f"{FIT} --output temperature", "temperature"),
     (f"{FIT} --output pressure", "pressure"),
     (f"{FIT} --unit pressure", "--unit"),

@@ -285,7 +285,8 @@ class Adaptive(Block):
         """Refuse a time and a noise that nothing is measured with."""
         if not TIMES[0] <= self.time <= TIMES[1]:
             raise ModelError(
-                f"{self.kind!r} cannot learn in a time of {self.time:g} s",
+                f"{self.kind!r} cannot learn in {self.time:g} s",
+                parameter="time",
                 remedy=f"give {TIMES[0]:g} to {TIMES[1]:g} s",
             )
         _, part, behind = learning_part(self.forward)
@@ -293,7 +294,8 @@ class Adaptive(Block):
         low, high = (bound * width for bound in NOISES) if 0 < width < np.inf else NOISES
         if not low <= self.noise <= high:
             raise ModelError(
-                f"a noise of {self.noise:g} is none that {self.kind!r} is measured with",
+                f"{self.noise:g} is out of range",
+                parameter="noise",
                 remedy=f"give the standard deviation of what is measured, {low:.3g} to "
                 f"{high:.3g} in its unit",
             )
@@ -617,14 +619,14 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
     """
     if isinstance(model, Adaptive):
         raise ModelError(
-            f"{model.title!r} learns already",
-            remedy="use it as it is, or adapt the model it undoes",
+            f"{model.title!r} adapts already",
+            remedy="use it as it is, or adapt the model that it inverts",
         )
     _, part, behind = learning_part(model)
     width = width_of((part, *behind))
     if noise is None and not 0 < width < np.inf:
         raise ModelError(
-            f"what {model.title!r} reaches does not tell how exactly it is measured",
-            remedy="give the noise",
+            f"the range of {model.title!r}, of which noise is a share by default, is unknown",
+            remedy="give `noise`",
         )
     return Adaptive(model, float(time), float(width / 1000 if noise is None else noise))

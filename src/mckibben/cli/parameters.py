@@ -58,7 +58,7 @@ class Command(click.Command):
 
 def as_flag(name: str, key: str | None = None, value: str | None = None) -> str:
     """Return a parameter in an error as a flag of the command that runs, or as Python has it."""
-    flag = _flags.get(name)
+    flag = _flags.get(name) or _flags.get(f"{name}s")
     if flag is None:
         return python_parameter(name, key, value)
     word = value if key is None else f"{key}={value or 'VALUE'}"

@@ -33,9 +33,8 @@ class EstimatedLoad(Controller):
 
     def __post_init__(self) -> None:
         if not self.filter_time > 0:
-            raise ModelError(
-                f"filter_time is {self.filter_time}", remedy="give a positive time in seconds"
-            )
+            problem = f"it is {self.filter_time}"
+            raise ModelError(problem, parameter="filter_time", remedy="give a positive time [s]")
         inner = self.controller
         self.preview, self.forward_model = inner.preview, inner.forward_model
         self.samples_ahead = inner.samples_ahead

@@ -36,9 +36,8 @@ class DisturbanceObserver(Controller):
 
     def __post_init__(self) -> None:
         if not self.filter_time > 0:
-            raise ModelError(
-                f"filter_time is {self.filter_time}", remedy="give a positive time in seconds"
-            )
+            problem = f"it is {self.filter_time}"
+            raise ModelError(problem, parameter="filter_time", remedy="give a positive time [s]")
         self._model = self.compensator.inverse()
         self.forward_model = self._model
         self.preview = self._model.dead_time

@@ -91,9 +91,13 @@ def rig_from_data_sheet(
         ("max_contraction", max_contraction),
     ):
         if not 0 < value <= LARGEST:
-            raise DataError(f"{label} is {value}", remedy=f"give a number from 0 to {LARGEST:g}")
+            raise DataError(
+                f"it is {value}", parameter=label, remedy=f"give a number from 0 to {LARGEST:g}"
+            )
     if not 0.05 <= loop_width <= 0.5:
-        raise DataError(f"loop_width is {loop_width}", remedy="give a share from 0.05 to 0.5")
+        raise DataError(
+            f"it is {loop_width}", parameter="loop_width", remedy="give a share from 0.05 to 0.5"
+        )
     try:
         return _rig(
             name, diameter, length, max_pressure, max_force, max_contraction, payload, loop_width

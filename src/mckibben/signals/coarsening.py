@@ -119,7 +119,11 @@ def made_manageable(
     stretched = most is None and total > HUGE
     limit = most if most is not None else MOST_OF_HUGE if stretched else MOST
     if limit < FEWEST:
-        raise DataError(f"{limit} samples are too few to fit to", remedy=f"allow {FEWEST} or more")
+        raise DataError(
+            f"{limit} samples are too few",
+            parameter="most_samples",
+            remedy=f"allow {FEWEST} or more",
+        )
     factor = -(-total // limit)
     if factor == 1:
         return list(train), list(test), ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, check_finite
 from mckibben.errors import DataError
 from mckibben.system.compiling import deferred
 
@@ -239,11 +239,5 @@ def _checked(x: ArrayLike) -> Array:
             f"a signal of shape {values.shape} has no branches",
             remedy="give a row of at least two samples",
         )
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise DataError(
-            f"the value is {values[bad[0]]}, and {bad.size} of {values.size} are not finite",
-            row=int(bad[0]) + 1,
-            remedy="cut those samples out",
-        )
+    check_finite(values)
     return values

@@ -183,7 +183,9 @@ class TransferFunction(Block):
 
         if not isinstance(horizon, int) or horizon < 1:
             raise ModelError(
-                f"the horizon is {horizon!r}", remedy="predict a whole number of samples, 1 or more"
+                f"it is {horizon!r}",
+                parameter="horizon",
+                remedy="predict a whole number of samples, 1 or more",
             )
         c, d = [1.0, *self.noise_numerator], [1.0, *self.noise_denominator]
         name = self.output.name
@@ -216,7 +218,7 @@ class TransferFunction(Block):
         if lead == 0:
             raise ModelError(
                 f"{self.kind!r} has no inverse: its output answers a sample late",
-                remedy="identify it with delay=0",
+                remedy="identify it with `settings[delay]=0`",
             )
         zeros = np.roots(self.numerator)
         if np.any(np.abs(zeros) >= 1 - 1e-9):

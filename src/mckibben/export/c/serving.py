@@ -62,7 +62,7 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     for given, allowed in ((serving.limits, names), (serving.safe, names[n_in:])):
         if strange := sorted(set(given) - set(allowed)):
             raise ModelError(
-                f"{strange[0]!r:.60} is no channel to say that of",
+                f"{strange[0]!r:.60} is not one of its channels",
                 remedy=f"name one of {', '.join(allowed)}",
             )
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
@@ -75,8 +75,8 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     unknown = [n for n, a, b in zip(names, low, high, strict=True) if not np.isfinite(b - a)]
     if unknown:
         raise ModelError(
-            f"the model does not know between what limits {', '.join(unknown)} may be",
-            remedy=f"give it for each of them, `limits[{unknown[0]}]=LOW:HIGH`",
+            f"the model has no limits of {', '.join(unknown)}",
+            remedy=f"give them for each, `limits[{unknown[0]}]=LOW:HIGH`",
         )
     for name, a, b in zip(names, low, high, strict=True):
         if not a < b:

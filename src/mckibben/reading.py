@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -207,15 +208,22 @@ def read_sides(
 
     reading = reading or ReadOptions()
     named = [*(inputs or ()), *(outputs or ()), *([load] if load else ())]
-    found = [read_files(some, named, reading) for some in data]
+    with warnings.catch_warnings(record=True) as caught:
+        found = [read_files(some, named, reading) for some in data]
     if reading.rest_length is not None and not named:
         found = [[one.with_derived(["displacement"]) for one in some] for some in found]
     sides = channels_of([one for some in found for one in some], inputs, outputs, load)
     needed = [*sides.inputs, *sides.outputs]
-    for place, (some, runs) in enumerate(zip(data, found, strict=True)):
-        if any(name not in one for one in runs for name in needed):
-            found[place] = read_files(some, needed, reading)  # says what is wrong with it
+    if any(name not in one for runs in found for one in runs for name in needed):
+        return [read_files(some, needed, reading) for some in data]  # says what is wrong with it
+    _warn_again(caught)
     return found
+
+
+def _warn_again(caught: Iterable[warnings.WarningMessage]) -> None:
+    """Issue warnings that were held back until it was known that files are not read again."""
+    for one in caught:
+        warnings.warn(one.message, one.category, stacklevel=2)
 
 
 def read_pair(
@@ -235,7 +243,8 @@ def read_pair(
     from mckibben.comparison.channels import channels_of
 
     named = [name for name in (input, output, *others) if name]
-    recordings = read_files(data, named, reading)
+    with warnings.catch_warnings(record=True) as caught:
+        recordings = read_files(data, named, reading)
     usual = input or "pressure", output or "displacement"
     if not all(name in one for one in recordings for name in usual):
         found = channels_of(recordings, input, output, None)
@@ -248,6 +257,8 @@ def read_pair(
         usual = found.inputs[0], found.outputs[0]
     if not all(name in one for one in recordings for name in usual):
         recordings = read_files(data, [*usual, *others], reading)  # says what is wrong with it
+    else:
+        _warn_again(caught)
     return recordings, *usual
 
 

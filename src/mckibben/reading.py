@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from mckibben import options
 from mckibben.errors import DataError
 from mckibben.options import Option
-from mckibben.recording import Recording
+from mckibben.recording import Recording, is_frame, listed
 
 if TYPE_CHECKING:
     from mckibben.diagnosis.data_gaps import Gap
@@ -132,10 +132,13 @@ def loaded(data: Data) -> list[Recording] | None:
     """Return data that are recordings already, rather than files."""
     if isinstance(data, Recording):
         return [data]
+    if is_frame(data):
+        return listed(data)
     if not isinstance(data, Sequence) or isinstance(data, str):
         return None
-    found = [one for one in data if isinstance(one, Recording)]
-    return found or None
+    return (
+        listed(data) if any(isinstance(one, Recording) or is_frame(one) for one in data) else None
+    )
 
 
 def files_of(data: Data) -> list[Path]:

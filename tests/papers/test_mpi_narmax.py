@@ -142,7 +142,7 @@ def test_what_is_needed_is_named(slim: Rig) -> None:
     with pytest.raises(DataError, match="another load"):
         sort([alone, pulled])
     turned = alone.with_channels(displacement=-alone["displacement"])
-    with pytest.raises(DataError, match="calibration=.'displacement'"):
+    with pytest.raises(DataError, match=r"calibration=.'displacement'"):
         sort([turned, pulled])
 
 

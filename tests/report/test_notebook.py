@@ -106,7 +106,7 @@ def test_a_recording_is_compared_with_by_default(
 ) -> None:
     (axis,) = np.ravel(things[name].plot(recording=train))
     assert [line.get_label() for line in axis.lines] == [
-        "measured",
+        train.origin,
         "model" if name == "model" else "gpi",
     ]
 

@@ -319,9 +319,7 @@ def _one_each(
     return replace(drawing, panels=tuple(panels), note=left_out(named))
 
 
-def on_recording(
-    one: Shown, kind: str, points: int = POINTS, models: int | None = None
-) -> Drawing:
+def on_recording(one: Shown, kind: str, points: int = POINTS, models: int | None = None) -> Drawing:
     """Draw a recording with the outputs of models, perhaps of the first few only.
 
     Parameters

@@ -18,11 +18,9 @@ from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.base import driving
 from mckibben.recording import Recording
 from mckibben.report import (
-    check_subjects,
     interactive,
     model_subjects,
     printed,
-    review_subjects,
     subjects,
 )
 from mckibben.report.coupling_subjects import coupling
@@ -406,7 +404,7 @@ def _tracked(found: Tracked, output: str | None = None) -> Drawing:
 
 def _parts(found: Review, output: str | None = None) -> Drawing:
     """Draw reference and motion, and below the error with its parts."""
-    return review_subjects.parts(_named({one.output: one for one in found.outputs}, output))
+    return model_subjects.parts(_named({one.output: one for one in found.outputs}, output))
 
 
 def _checked(found: Validation, output: str | None) -> OutputCheck:
@@ -414,13 +412,13 @@ def _checked(found: Validation, output: str | None) -> OutputCheck:
 
 
 def _autocorrelation(found: Validation, output: str | None = None) -> Drawing:
-    return check_subjects.autocorrelation(_checked(found, output))
+    return model_subjects.autocorrelation(_checked(found, output))
 
 
 def _pattern(found: Validation, output: str | None = None, against: str = "branch") -> Drawing:
     """Draw means of an output's residual over inputs, loads, outputs or branches."""
     one = _checked(found, output)
-    return check_subjects.pattern(
+    return model_subjects.pattern(
         one, _named({each.against: each for each in one.patterns}, against)
     )
 

@@ -84,7 +84,7 @@ def test_settings_are_listed_and_checked() -> None:
         ("decaying-sine", "n_cycles='two'", {"period": 1, "high": 2, "n_cycles": "two"}),
         ("decaying-sine", "0", {"period": 1, "high": 2, "n_cycles": 0}),
         ("chirp", "'quadratic'", SETTINGS["chirp"] | {"law": "quadratic"}),
-        ("random-wave", "min_frequency 3", SETTINGS["random-wave"] | {"min_frequency": 3}),
+        ("random-wave", "min_frequency: it is 3", SETTINGS["random-wave"] | {"min_frequency": 3}),
         ("multisine", "0 harmonics", SETTINGS["multisine"] | {"period": 1, "max_frequency": 0.5}),
         ("binary-steps", "ramp", SETTINGS["binary-steps"] | {"hold": 1, "ramp": 1}),
         ("random-steps", "longest", SETTINGS["random-steps"] | {"shortest": 3, "longest": 1}),

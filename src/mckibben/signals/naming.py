@@ -68,8 +68,7 @@ def build(name: str, time: ArrayLike, **settings: Any) -> Array:
     for setting in settings:
         if setting not in known:
             raise DataError(
-                f"the signal {name!r} has no setting {setting!r}",
-                remedy=f"use {', '.join(known)}",
+                f"the signal {name!r} has no setting {setting!r}", remedy=f"use {', '.join(known)}"
             )
     for setting, (words, default) in known.items():
         if default is None and setting not in settings:
@@ -104,6 +103,5 @@ def _parsed(name: str, setting: str, value: Any, kind: Any) -> Any:
         return [float(part) for part in value] if isinstance(value, Sequence) else float(value)
     except (TypeError, ValueError):
         raise DataError(
-            f"the signal {name!r} cannot take {setting}={value!r}",
-            remedy=f"give {_words(kind)}",
+            f"the signal {name!r} cannot take {setting}={value!r}", remedy=f"give {_words(kind)}"
         ) from None

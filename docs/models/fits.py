@@ -25,7 +25,7 @@ from mckibben.blocks.hysteresis.oscillators import BoucWenOscillator
 from mckibben.blocks.saving import load
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
-from mckibben.report.figures import plot_model
+from mckibben.report.figures import write_figure
 from mckibben.rigs import load_rig, record
 from mckibben.signals import decaying_triangle, multisine
 from mckibben.signals.protocol import protocol
@@ -168,7 +168,7 @@ def draw(name: str, task: Task) -> None:
     """Draw a saved model, running free on the recording that moves its first input most."""
     picture = PICTURES / f"{name}.png"
     moving = max(task.recordings, key=lambda recording: np.ptp(recording[task.inputs[0]]))
-    plot_model(load(MODELS / f"{name}.json"), [moving], task.picture, picture)
+    write_figure(load(MODELS / f"{name}.json"), picture, task.picture, recording=moving)
     smaller(picture)
 
 

@@ -131,7 +131,8 @@ def rendered(
     place = f"{', '.join(where)}: " if where else ""
     remedy = in_terms_of(_short(error.remedy), parameter, operation)
     problem = in_terms_of(_short(error.problem), parameter, operation)
-    return f"{place}{problem}" + (f". Remedy: {remedy}." if remedy else "")
+    stop = "" if problem.endswith("?") else "."
+    return f"{place}{problem}" + (f"{stop} Remedy: {remedy}." if remedy else "")
 
 
 def _short(given: object, most: int = 1000) -> str:

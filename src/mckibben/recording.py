@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array, check_finite
 from mckibben.errors import DataError
+from mckibben.system.extras import demand
 from mckibben.system.showing import DrawsItself
 
 STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
@@ -273,6 +274,76 @@ class Recording(DrawsItself):
         kept = {name: unit for name, unit in self.units.items() if name not in added}
         return replace(self, channels={**self.channels, **added}, units=kept | dict(units or {}))
 
+    @classmethod
+    def from_frame(
+        cls,
+        frame: Any,
+        sample_time: float | None = None,
+        units: Mapping[str, str] | None = None,
+        **meta: Any,
+    ) -> Recording:
+        """Return a data frame of pandas as a recording.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+            Its columns are channels, in the package's units (bar, mm, N, s, rad). A column or an index
+            named ``time`` [s], or an index of dates, is the time grid.
+        sample_time : float, optional
+            Time between rows [s], without such a column; none where neither is given.
+        units : mapping of str to str, optional
+            Units of channels that the package has no unit for.
+        **meta
+            What else is known, as ``name="run 1"``.
+
+        Raises
+        ------
+        DataError
+            On times that are not uniform, and samples that are none.
+        """
+        start, known, columns = 0.0, frame.attrs.get("mckibben", {}), frame
+        if "time" in frame:
+            time, columns = frame["time"].to_numpy(), frame.drop(columns="time")
+        elif frame.index.name == "time" or frame.index.dtype.kind == "M":
+            time = frame.index.to_numpy()
+        else:
+            time = None
+        if time is not None:
+            seconds = (time - time[0]) / np.timedelta64(1, "s") if time.dtype.kind == "M" else time
+            sample_time, start = known.get("grid") or _grid(np.asarray(seconds, dtype=float))
+        channels = {str(name): columns[name].to_numpy() for name in columns}
+        units = known.get("units", {}) | dict(units or {})
+        return cls(channels, sample_time, units, start, known.get("meta", {}) | meta)
+
+    def to_frame(self) -> Any:
+        """Return the channels as a data frame of pandas over time [s]; `from_frame` undoes it."""
+        import pandas as pd
+
+        index = None if self.sample_time is None else pd.Index(self.time, name="time")
+        frame = pd.DataFrame(dict(self.channels), index=index)
+        grid = None if self.sample_time is None else (self.sample_time, self.start_time)
+        about = {"grid": grid, "units": dict(self.units), "meta": dict(self.meta)}
+        frame.attrs["mckibben"] = about
+        return frame
+
+    def to_xarray(self) -> Any:
+        """Return the channels as a dataset of xarray over time [s], with their units.
+
+        Raises
+        ------
+        DataError
+            If xarray is not installed.
+        """
+        demand("xarray", "xarray", "datasets of xarray")
+        from importlib import import_module
+
+        over = "sample" if self.sample_time is None else "time"
+        arrays = {name: (over, samples) for name, samples in self.channels.items()}
+        found = import_module("xarray").Dataset(arrays, {over: self.time}, dict(self.meta))
+        for name, unit in self.units.items():
+            found[name].attrs["units"] = unit
+        return found
+
     def with_derived(self, channels: Iterable[str]) -> Recording:
         """Return a recording with channels added that others and the rest length give."""
         found: dict[str, Array] = {}
@@ -383,21 +454,43 @@ def reading_notes(recordings: Iterable[Recording]) -> tuple[str, ...]:
     return tuple(f"{file}: {note}" for file, notes in found.items() for note in notes)
 
 
-def listed(recordings: Recording | Sequence[Recording]) -> list[Recording]:
-    """Return recordings as a list, be it one.
+def _grid(time: Array) -> tuple[float, float]:
+    """Return the sample time and the start of uniform times."""
+    steps = np.diff(time)
+    step = float((time[-1] - time[0]) / max(steps.size, 1)) if steps.size else 0.0
+    wrong = np.flatnonzero(~(np.abs(steps - step) <= 1e-3 * abs(step)))
+    if wrong.size or not step > 0:
+        raise DataError(
+            "the times are not uniform and rising",
+            channel="time",
+            row=int(wrong[0]) + 2 if wrong.size else None,
+            remedy="resample the frame, or write it to a CSV and read that",
+        )
+    return step, float(time[0])
+
+
+def is_frame(given: object) -> bool:
+    """Return whether something is a data frame."""
+    return hasattr(given, "columns") and hasattr(given, "to_numpy")
+
+
+def listed(recordings: Any) -> list[Recording]:
+    """Return recordings as a list, be it one; data frames as recordings.
 
     Raises
     ------
     DataError
         If something else is given, such as the name of a file.
     """
-    given: Any = recordings  # whatever the annotation says
-    several = isinstance(given, Iterable) and not isinstance(given, Recording | str)
-    found = list(given) if several else [given]
+    given = recordings
+    several = isinstance(given, Iterable) and not isinstance(given, Recording | str | np.ndarray)
+    found = list(given) if several and not is_frame(given) else [given]
+    found = [Recording.from_frame(one) if is_frame(one) else one for one in found]
     for one in found:
         if not isinstance(one, Recording):
             raise DataError(
-                f"a recording is needed here, not {type(one).__name__} {str(one)[:60]!r}",
-                remedy="read the file first: mckibben.read gives the list of its recordings",
+                f"a recording is needed here, not {type(one).__name__} {str(one)[:40]!r}",
+                remedy="read the file with mckibben.read; make one of arrays by "
+                "mckibben.Recording({'pressure': u, 'displacement': y}, sample_time)",
             )
     return found

@@ -136,15 +136,9 @@ PLUGINS: dict[str, dict[str, str]] = {
         "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNN",
     },
     "faces": {
-        "block": "mckibben.report.notebook.models:BlockFace",
-        "characterization": "mckibben.report.notebook.findings:CharacterizationFace",
-        "leaderboard": "mckibben.report.notebook.boards:LeaderboardFace",
-        "recording": "mckibben.report.notebook.recordings:RecordingFace",
-        "review": "mckibben.report.notebook.findings:ReviewFace",
-        "rig": "mckibben.report.notebook.rigs:RigFace",
-        "study": "mckibben.report.notebook.boards:StudyFace",
-        "tracked": "mckibben.report.notebook.findings:TrackedFace",
-        "validation": "mckibben.report.notebook.findings:ValidationFace",
+        "card": "mckibben.report.notebook:card",
+        "interactive": "mckibben.report.figures:interact",
+        "plot": "mckibben.report.figures:plot",
     },
     "papers": {
         "activation-pressure": "mckibben.papers.activation_pressure.run:RERUN",

@@ -122,7 +122,11 @@ def test_a_set_that_cannot_be_read_is_said_and_the_rest_goes_on(folder: Path) ->
     assert done[0].board is None
     assert "run.csv" in done[0].reason
     assert all(one.board is not None for one in done[1:])
-    assert "run.csv" in page(done, "it")
+    whole = page(done, "it")
+    assert {one.heading for one in whole.sections} > {"plain", "By volts"}
+    for text in (whole.markdown(), whole.html()):
+        assert "run.csv" in text
+        assert "Somebody" in text
 
 
 @pytest.mark.parametrize(

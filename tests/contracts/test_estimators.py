@@ -94,7 +94,7 @@ def test_predict_and_score_are_of_the_measured_outputs(name: str, kind: str) -> 
     assert [part.shape for part in predicted] == [
         y.shape if several else y.shape[:1] for y in measured
     ]
-    np.testing.assert_array_equal(estimator.predict(runs[0])[0], predicted[0])
+    np.testing.assert_array_equal(estimator.predict(runs[0]), predicted[0])
     y, z = np.concatenate(measured), np.concatenate(predicted).reshape(-1, len(outputs))
     assert estimator.score(runs) == pytest.approx(
         np.mean(1 - ((y - z) ** 2).mean(axis=0) / y.var(axis=0))

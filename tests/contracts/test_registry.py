@@ -25,7 +25,6 @@ from mckibben.estimators.hysteresis.pi import PIEstimator
 from mckibben.papers.experiment import Rerun
 from mckibben.presets import Chosen, preset
 from mckibben.registry import PLUGINS, REPLACED, load, names
-from mckibben.report.notebook.face import Face
 from mckibben.rigs import Rig
 
 SOURCE = Path(mckibben.__file__).parent
@@ -57,7 +56,6 @@ ON_DISK: dict[str, Callable[[], set[Any]]] = {
     "blocks": lambda: concrete(Block, "blocks") | concrete(Block, "estimators"),
     "envelopes": lambda: concrete(Envelope, "blocks/hysteresis"),
     "estimators": lambda: concrete(Estimator, "estimators"),
-    "faces": lambda: concrete(Face, "report/notebook"),
     "setups": lambda: concrete(Rig, "rigs"),
 }
 

@@ -90,7 +90,7 @@ def balance_of(estimator: BalanceEstimator) -> Balance:
 
 
 def error(estimator: BalanceEstimator, on: Recording) -> float:
-    missed = estimator.predict(on)[0].ravel() - on["displacement"]
+    missed = estimator.predict(on).ravel() - on["displacement"]
     return float(np.sqrt(np.mean(missed**2)))
 
 

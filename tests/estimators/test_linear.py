@@ -137,7 +137,7 @@ def test_output_error_of_several_inputs_finds_every_filter() -> None:
             np.testing.assert_allclose(part.numerator, b, atol=0.02)
             np.testing.assert_allclose(part.denominator, f, atol=0.05)
     assert fit.diagnostics_.rmse == pytest.approx(0.02, rel=0.05)
-    (modelled,) = fit.predict(recording)
+    modelled = fit.predict(recording)
     u = recording.matrix(PRESSURES)
     for place, name in enumerate(MOVED):
         own = fit.model_.parts[2 * place : 2 * place + 2]

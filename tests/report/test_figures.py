@@ -20,10 +20,8 @@ from mckibben.report import coupling_subjects, printed, subjects
 from mckibben.report.drawing import Curve, Drawing, Panel, along, over_time
 from mckibben.report.figures import (
     FIGURES,
-    MODEL_KINDS,
-    RECORDING_KINDS,
-    plot_model,
-    plot_recording,
+    draw,
+    write_figure,
 )
 from mckibben.report.interactive import packed, plots, text
 from mckibben.report.shown import shown
@@ -131,16 +129,20 @@ def test_every_format_is_written_alike_twice(tmp_path: Path, ending: str) -> Non
     assert first.read_bytes().startswith(SIGNATURES[ending])
 
 
-@pytest.mark.parametrize("kind", [*RECORDING_KINDS, *MODEL_KINDS, *FIGURES])
-def test_every_kind_is_drawn_for_print(tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("thing", "kind"), [(t, k) for t in ("recording", "block", "study") for k in FIGURES[t]]
+)
+def test_every_kind_is_drawn_for_print(tmp_path: Path, thing: str, kind: str) -> None:
     path = tmp_path / "figure.svg"
     runs = [measured(200, sample_time=None), measured(100, sample_time=None, name="second")]
-    if kind in RECORDING_KINDS:
-        plot_recording(runs, *CHANNELS, kind, path)
-    elif kind in MODEL_KINDS:
-        plot_model(GPI.example(), [measured(200), measured(100, seed=1)], kind, path)
+    if thing == "recording":
+        write_figure(runs, path, kind)
+    elif kind == "loop" and thing == "block":
+        write_figure(GPI.example(), path, kind, high=5.0)
+    elif thing == "block":
+        write_figure(GPI.example(), path, kind, recording=[measured(200), measured(100, seed=1)])
     else:
-        printed.save(FIGURES[kind](study()), path)
+        write_figure(study(), path, kind)
     assert path.stat().st_size > 1000
 
 
@@ -156,12 +158,12 @@ def test_what_cannot_be_drawn_is_named_and_leaves_no_file(tmp_path: Path) -> Non
     path = tmp_path / "figure.png"
     for kind in ("pie", "fit"):
         with pytest.raises(ModelError):
-            plot_recording([measured(50)], *CHANNELS, kind, path)
+            write_figure([measured(50)], path, kind)
     with pytest.raises(DataError, match="force"):
-        plot_recording([measured(50)], "pressure", "force", "time", path)
+        write_figure([measured(50)], path, "time", input="pressure", output="force")
     for name in ("leaderboard", "fit", "loops", "residuals", "weights"):
         with pytest.raises(ModelError):
-            printed.save(FIGURES[name](study(blocks={})), path)
+            write_figure(study(blocks={}), path, name)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -192,11 +194,11 @@ def test_packing_keeps_seven_digits_of_the_range_and_gaps(values: np.ndarray, fa
     np.testing.assert_array_equal(unpacked(packed(torn)), torn)
 
 
-@pytest.mark.parametrize("name", list(FIGURES))
+@pytest.mark.parametrize("name", list(FIGURES["study"]))
 def test_every_figure_is_one_that_plotly_knows(name: str) -> None:
     import plotly.graph_objects as go
 
-    for plot in plots(FIGURES[name](study())):
+    for plot in plots(draw(study(), name)):
         found = unpacked(json.loads(json.dumps(plot, allow_nan=False)))
         go.Figure(found)  # refuses unknown properties and values
 

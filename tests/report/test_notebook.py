@@ -14,6 +14,7 @@ import mckibben
 from mckibben import Recording, example
 from mckibben.comparison.leaderboard import Leaderboard
 from mckibben.control import track
+from mckibben.errors import MckibbenError
 from mckibben.system.showing import DrawsItself
 
 EVIL = '<img src=x onerror="alert(1)">\x1b[2J'
@@ -60,10 +61,10 @@ def things(train: Recording, board: Leaderboard) -> dict[str, Any]:
     }
 
 
-def test_they_print_within_a_terminal_and_cards_bring_nothing_along(things: dict[str, Any]) -> None:
+def test_they_print_three_lines_and_cards_bring_nothing_along(things: dict[str, Any]) -> None:
     for name, thing in things.items():
         lines = str(thing).splitlines()
-        assert len(lines) > 2, name
+        assert 1 < len(lines) <= 3, name
         assert max(map(len, lines)) <= 80, name
         card = thing._repr_html_()
         assert len(card) < 12_000, name
@@ -83,8 +84,31 @@ def test_a_leaderboard_is_a_table(board: Leaderboard) -> None:
     table = board.to_frame()
     assert {"model", "validation_rmse", "test.rmse"} <= set(table.columns)
     assert str(board) == repr(board)
-    ranked = [line.split() for line in str(board).splitlines()]
-    assert [words[1] for words in ranked if words and words[0].isdigit()] == ["gpi", "pi"]
+    assert re.findall(r"<tr><td[^>]*>([^<]+)<", board._repr_html_()) == ["gpi", "pi", "constant"]
+
+
+def test_figures_refuse_what_they_do_not_take(things: dict[str, Any], train: Recording) -> None:
+    for thing, kind, choices in (
+        (things["recording"], "loops", {}),
+        (things["model"], "loop", {"recording": train}),
+        (things["leaderboard"], "fit", {"recording": train, "models": "force-chou"}),
+        (things["leaderboard"], "fit", {}),
+        (things["validation"], "residual", {"against": "nothing"}),
+    ):
+        with pytest.raises(MckibbenError) as refused:
+            thing.plot(kind, **choices)
+        assert refused.value.remedy
+
+
+@pytest.mark.parametrize("name", ["model", "leaderboard"])
+def test_a_recording_is_compared_with_by_default(
+    things: dict[str, Any], train: Recording, name: str
+) -> None:
+    (axis,) = np.ravel(things[name].plot(recording=train))
+    assert [line.get_label() for line in axis.lines] == [
+        train.origin,
+        "model" if name == "model" else "gpi",
+    ]
 
 
 def test_names_are_shown_verbatim_and_never_obeyed() -> None:

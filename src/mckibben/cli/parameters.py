@@ -153,9 +153,9 @@ def made(name: str, hint: Any, default: Any) -> click.Parameter:
         required=required,
         multiple=several or mapping,
         nargs=width if about.parse is None else 1,
-        default=default if _is_plain(default, about) else None,
         show_default=_is_plain(default, about),
         callback=_parsed(name, about, mapping, several, default),
+        **({"default": default} if _is_plain(default, about) else {}),
     )
 
 

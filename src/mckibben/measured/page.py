@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,10 +16,14 @@ from mckibben.measured.running import Outcome, outcomes
 from mckibben.measured.sets import sets_in
 from mckibben.numerals import numeral
 from mckibben.report import words
+from mckibben.report.builder import Code, Item, Page, Section, Table, Text
 from mckibben.report.columns import columns_of_board
 
 SHOWN = 8
 """Models of a section, and the chosen one; the rest are in the file beside."""
+
+FILES = ["measured.html", "measured.md", "measured.csv"]
+"""What is written."""
 
 KEYS = ("test", "interval", "chosen", "rank", "gap", "parameters", "seconds", "step")
 """Columns of a section."""
@@ -27,46 +31,40 @@ KEYS = ("test", "interval", "chosen", "rank", "gap", "parameters", "seconds", "s
 BEST = 1.1
 """Times the least error that is set in bold."""
 
-HEAD = """# Every model on recordings
-
-Made by `{command}`; do not edit. Models are fitted and chosen on one side of each split and
-tested free-running on the other; the test decides nothing. All rows are in `measured.csv` beside this.
-"""
-
-OVERVIEW = """
-## All models on all sets
-
-Test RMSE in per cent of the range of what is tested on. Bold: the least of a column, and those within a
-tenth of it; underlined: chosen by cross-validation. A dash: not offered for such channels.
-"""
+ABOUT = (
+    "Models are fitted and chosen on one side of each split and tested free-running on the other; the "
+    "test decides nothing. All rows are in measured.csv."
+)
+OVERVIEW = (
+    "Test RMSE in per cent of the range of what is tested on. Bold: within a tenth of the least of a "
+    "column; underlined: chosen by cross-validation; a dash: not offered for such channels."
+)
 
 CHOICE = ("set", "chosen", "its test RMSE", "rank", "least test RMSE", "above it", "time")
 
 
-def page(outcomes: Sequence[Outcome], command: str) -> str:
-    """Return the page, in Markdown."""
-    return "\n".join(_lines(outcomes, command)).rstrip("\n") + "\n"
-
-
-def _lines(outcomes: Sequence[Outcome], command: str) -> Iterator[str]:
-    yield HEAD.format(command=command)
+def page(outcomes: Sequence[Outcome], command: str) -> Page:
+    """Return the page of all tasks."""
+    sections = []
     compared = [one for one in outcomes if one.board and one.board.rows]
     if compared:
-        yield "## How good the choice is\n"
-        yield from _table(CHOICE, map(_choice, compared))
+        choices = Table(CHOICE, [_choice(one) for one in compared])
+        sections.append(Section("choice", "How good the choice is", [choices]))
     if done := [one for one in compared if not one.left_out]:
-        yield OVERVIEW
-        yield from _matrix(done, lambda one: one.heading)
-    for name in dict.fromkeys(one.set.name for one in outcomes):
+        items: list[Item | None] = [Text([OVERVIEW]), _matrix(done, [one.heading for one in done])]
+        sections.append(Section("all", "All models on all sets", items))
+    for place, name in enumerate(dict.fromkeys(one.set.name for one in outcomes)):
         own = [one for one in outcomes if one.set.name == name]
-        yield f"\n## {_inline(own[0].set.title)}\n"
-        if about := own[0].set.split.about.strip():
-            yield f"{about}\n"
+        about = own[0].set.split.about
+        own_items: list[Item | None] = [Text([about])] if about.strip() else []
         for one in own:
             if not one.left_out:
-                yield from _section(one)
+                own_items += _section(one)
         for task in dict.fromkeys(one.task.name for one in own if one.left_out):
-            yield from _in_turn([one for one in own if one.left_out and one.task.name == task])
+            own_items += _in_turn([one for one in own if one.left_out and one.task.name == task])
+        sections.append(Section(f"set-{place}", own[0].set.title, own_items))
+    sections.append(Section("method", "How to repeat", [Code("", command)]))
+    return Page("Every model on recordings", ABOUT, sections)
 
 
 def table(outcomes: Iterable[Outcome]) -> pd.DataFrame:
@@ -82,30 +80,16 @@ def table(outcomes: Iterable[Outcome]) -> pd.DataFrame:
     return pd.concat(frames, names=keys).reset_index(keys) if frames else pd.DataFrame()
 
 
-def _inline(text: str) -> str:
-    """Return words of a description as such: on one line, and nothing that Markdown would take up."""
-    return re.sub(r"([\\`*\[\]<>|#])", r"\\\1", " ".join(text.split()))
-
-
-def _table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
-    first, *others = headings
-    yield f"| {' | '.join([first, *others])} |"
-    yield "|---|" + "---:|" * len(others)
-    for row in rows:
-        yield f"| {' | '.join(row)} |"
-
-
-def _choice(one: Outcome) -> list[str]:
+def _choice(one: Outcome) -> list[Any]:
     board, seconds = one.board, f"{one.seconds:.0f} s"
     assert board is not None
     best, lowest = board.best, board.lowest
     if best is None or lowest is None:
-        why = _inline(words.chosen(board) or one.failed)
-        return [_inline(one.label), f"none: {why}", "", "", "", "", seconds]
+        return [one.label, f"none: {words.chosen(board) or one.failed}", "", "", "", "", seconds]
     above = f"{100 * (best.test_error / lowest.test_error - 1):.0f} %"
     return [
-        *(_inline(one.label), f"`{best.model}`", _error(best, board), str(best.test_rank)),
-        *(f"`{lowest.model}` {_error(lowest, board)}", "–" if lowest is best else above, seconds),
+        *(one.label, best.model, _error(best, board), best.test_rank),
+        *(f"{lowest.model} {_error(lowest, board)}", "–" if lowest is best else above, seconds),
     ]
 
 
@@ -118,68 +102,62 @@ def _tested(one: Outcome) -> list[Row]:
     return sorted((row for row in rows if row.test is not None), key=lambda row: row.test_error)
 
 
-def _matrix(done: Sequence[Outcome], heading: Callable[[Outcome], str]) -> Iterator[str]:
-    """Give a table of models by tasks, those of most tasks and least errors first."""
+def _matrix(done: Sequence[Outcome], headings: Sequence[str]) -> Table:
+    """Return a table of models by tasks, those of most tasks and least errors first."""
     errors = pd.DataFrame(
         [{row.model: 100 * row.test_error / one.span for row in _tested(one)} for one in done]
     ).T
     ratios = errors / errors.min().clip(1e-12)
     places = pd.DataFrame({"tasks": -ratios.count(axis=1), "error": ratios.median(axis=1)})
-    models = places.sort_values(["tasks", "error"]).index
+    models = [*places.sort_values(["tasks", "error"]).index]
     values = errors.loc[models].to_numpy()
     chosen = [one.board.best.model if one.board and one.board.best else "" for one in done]
+    rows: list[list[str]] = []
+    marked: dict[tuple[int, int], str] = {}
+    for place, model in enumerate(models):
+        row = [model]
+        for column, error in enumerate(values[place]):
+            row.append("–" if np.isnan(error) else numeral(error, 3) if error < 100 else "> 100")
+            marks = ["least"] * bool(error <= BEST * np.nanmin(values[:, column]))
+            marked[place, column + 1] = " ".join([*marks, *["chosen"] * (model == chosen[column])])
+        rows.append(row)
+    return Table(["model", *headings], rows, marked=marked)
 
-    def cells(row: int, model: str) -> Iterator[str]:
-        for error, column, best in zip(values[row], values.T, chosen, strict=True):
-            text = numeral(error, 3) if error < 100 else ">100"
-            text = f"**{text}**" if error <= BEST * np.nanmin(column) else text
-            text = f"<u>{text}</u>" if model == best else text
-            yield "–" if np.isnan(error) else text
 
-    rows = ([f"`{model}`", *cells(row, model)] for row, model in enumerate(models))
-    yield from _table(["model", *(_inline(heading(one)) for one in done)], rows)
-
-
-def _in_turn(parts: Sequence[Outcome]) -> Iterator[str]:
-    """Give the section of a task that leaves out in turn."""
-    yield f"### {_inline(parts[0].task.name) or 'Each left out in turn'}\n"
+def _in_turn(parts: Sequence[Outcome]) -> list[Any]:
+    """Return the items of a task that leaves out in turn."""
+    items: list[Any] = [Text([parts[0].task.name or "Each left out in turn"], "lead")]
     done = [one for one in parts if _tested(one)]
     if done:
-        yield "Test RMSE on what is left out, in per cent of the range of all recordings.\n"
-        yield from _matrix(done, lambda one: f"without {one.left_out}")
-        yield ""
-    for one in parts:
-        if one not in done:
-            yield f"- without {one.left_out}: not compared: {one.failed}\n"
+        about = "Test RMSE on what is left out, in per cent of the range of all recordings."
+        items += [Text([about]), _matrix(done, [f"without {one.left_out}" for one in done])]
+    failed = [f"without {o.left_out}: not compared: {o.failed}" for o in parts if o not in done]
+    return [*items, Text(failed, listed=True)] if failed else items
 
 
-def _section(one: Outcome) -> Iterator[str]:
-    if one.task.name:
-        yield f"### {_inline(one.task.name)}\n"
+def _section(one: Outcome) -> list[Any]:
+    items: list[Any] = [Text([one.task.name], "lead")] if one.task.name else []
     board, tested = one.board, _tested(one)
     if board is None or not board.rows:
-        yield f"Not compared: {one.failed}\n"
-        return
+        return [*items, Text([f"Not compared: {one.failed}"])]
     columns = [column for column in columns_of_board(board) if column.key in KEYS]
-    yield f"Split: {board.split}. {words.chosen(board)}\n"
     chosen = board.best.model if board.best else ""
     shown = [row for k, row in enumerate(tested) if k < SHOWN or row.model == chosen]
     given = [row.to_dict() for row in shown]
-    rows = [[f"`{row['model']}`", *(column.text(row) for column in columns)] for row in given]
+    rows = [[row["model"], *(column.text(row) for column in columns)] for row in given]
+    best = next((k for k, row in enumerate(shown) if row.model == chosen), None)
     for figure in one.task.published:
         cells = [f"{figure.rmse:g}" if column.key == "test" else "–" for column in columns]
-        rows.append([f"{_inline(figure.what)} (printed)", *cells])
-    yield from _table(["model", *(column.label for column in columns)], rows)
-    yield ""
+        rows.append([f"{figure.what} (printed)", *cells])
     notes = []
     if one.notes:  # that of the first file in full
         more = f" (and {len(one.notes) - 1} more of the kind)" if len(one.notes) > 1 else ""
         notes = [f"as read: {one.notes[0]}{more}"]
     notes += words.comparison(board)
-    notes += [f"failed: `{row.model}`: {row.reason}" for row in board.rows if row.reason]
-    yield from (f"- {note}" for note in notes)
-    if notes:
-        yield ""
+    notes += [f"failed: {row.model}: {row.reason}" for row in board.rows if row.reason]
+    headings = ["model", *(column.label for column in columns)]
+    items += [Text([f"Split: {board.split}. {words.chosen(board)}"]), Table(headings, rows, best)]
+    return [*items, Text(notes, "note", listed=True)] if notes else items
 
 
 def measure(
@@ -195,7 +173,7 @@ def measure(
     progress: Callable[[float, str], None] | None = None,
     found: Callable[[Outcome], None] | None = None,
 ) -> list[Outcome]:
-    """Compare all models on all sets of a folder, and write one page, ``measured.md``, and a table.
+    """Compare all models on all sets of a folder, and write one page, as HTML and Markdown, and a table.
 
     Parameters
     ----------
@@ -232,14 +210,16 @@ def measure(
     if jobs != 1:
         workers.prepare()
     inputs = [one.folder for one in chosen]
-    with results_in(out, ["measured.md", "measured.csv"], inputs=inputs, force=force) as results:
+    with results_in(out, FILES, inputs=inputs, force=force) as results:
         every: list[Outcome] = []
         for one in outcomes(chosen, models=models, seed=seed, jobs=jobs, folder=out, tell=progress):
             every.append(one)
             if found is not None:
                 found(one)
         if results is not None:
-            results.write_text("measured.md", page(every, command))
+            whole = page(every, command)
+            results.write_text("measured.html", whole.html())
+            results.write_text("measured.md", whole.markdown())
             results.write_text("measured.csv", table(every).to_csv(index=False))
             results.commit()
         Checkpoints(out).clear()

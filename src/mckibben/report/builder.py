@@ -10,7 +10,7 @@ import hashlib
 import lzma
 import platform
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
@@ -35,7 +35,7 @@ Variants = list[list[interactive.Json]]
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph, or a list of sentences, in a style of the style sheet."""
+    """A paragraph, or a list of sentences, in a style of the style sheet; ``lead`` is a heading."""
 
     sentences: Sequence[str]
     style: str = ""
@@ -56,6 +56,8 @@ class Table:
     best: int | None = None
     titles: Sequence[str] = ()
     keys: Sequence[Sequence[Any]] = ()
+    marked: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    """Single cells that are ``"least"``, ``"chosen"`` or both."""
     summary: str = ""
     """Of a table that is folded: what it is called."""
     kind: str = "table"
@@ -171,6 +173,41 @@ class Page:
             scripts=scripts,
             policy=policy(*scripts),
         )
+
+    def markdown(self) -> str:
+        """Return the page as Markdown: its words and tables."""
+        lines = [f"# {plain(self.title)}", plain(self.subtitle)]
+        for section in self.sections:
+            lines += [f"## {plain(section.heading)}"] if section.heading else []
+            for item in filter(None, section.items):
+                if isinstance(item, Table):
+                    lines.append("\n".join(_table(item)))
+                elif isinstance(item, Code):
+                    lines.append(f"```\n{item.text}\n```")
+                elif isinstance(item, Text):
+                    start = "### " if item.style == "lead" else "- " if item.listed else ""
+                    mark = "\n" if item.listed else " "
+                    lines.append(mark.join(f"{start}{plain(one)}" for one in item.sentences))
+        return "\n\n".join(filter(None, lines)) + "\n"
+
+
+def plain(text: str) -> str:
+    """Return words on one line, with nothing in them that Markdown would take for its own."""
+    return re.sub(r"([\\`*\[\]<>|#])", r"\\\1", " ".join(text.split()))
+
+
+def _table(one: Table) -> Iterator[str]:
+    sides = ("---:" if k in one.figures else "---" for k in range(len(one.headings)))
+    yield f"| {' | '.join(map(plain, one.headings))} |"
+    yield f"|{'|'.join(sides)}|"
+    for place, row in enumerate(one.rows):
+        cells = []
+        for column, value in enumerate(row):
+            cell = number(value) if isinstance(value, float) else plain(str(value))
+            mark = one.marked.get((place, column), "")
+            cell = f"**{cell}**" if "least" in mark else cell
+            cells.append(f"<u>{cell}</u>" if "chosen" in mark else cell)
+        yield f"| {' | '.join(cells)} |"
 
 
 @cache

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from mckibben.recording import notes_by_file
-from mckibben.report import check_subjects, interactive, subjects, words
+from mckibben.report import interactive, model_subjects, words
 from mckibben.report.builder import Figure, Page, Section, Table, Text, Tile
 from mckibben.report.description_page import model_items
+from mckibben.report.figures import on_recording
+from mckibben.report.shown import Shown
 from mckibben.system.atomic import to_json
 
 if TYPE_CHECKING:
@@ -79,19 +81,20 @@ def _output(one: OutputCheck, place: int, runs: list[Run]) -> list[Any]:
     if place < MOST_OUTPUTS:
         first, fits, residuals = one.patterns[0].channel, [], []
         for run in runs:
-            about = (run.recording, one.output, {"model": run.modelled[:, place]})
-            fits.append(interactive.plots(subjects.fit_over_time(*about)))
-            drawing = subjects.residuals(run.recording, first, *about[1:])
-            residuals.append(interactive.plots(drawing))
-        panels = [interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns]
-        white = [interactive.plots(check_subjects.autocorrelation(one))]
+            about = Shown(
+                run.recording, first, one.output, {"model": run.modelled[:, place]}, "test"
+            )
+            fits.append(interactive.plots(on_recording(about, "fit")))
+            residuals.append(interactive.plots(on_recording(about, "residuals")))
+        panels = [interactive.plots(model_subjects.pattern(one, each))[0] for each in one.patterns]
+        white = [interactive.plots(model_subjects.autocorrelation(one))]
         items += [
             Figure(f"fit-{place}", fits, "Measured and modelled output over time"),
             Figure(
                 f"residuals-{place}",
                 residuals,
                 "Residuals over input and over time",
-                "Measured − modelled.",
+                "",
                 columns=2,
             ),
             Figure(

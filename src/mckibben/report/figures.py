@@ -1,221 +1,457 @@
-"""Figures for print, by name: of a study, of recordings, of a saved model against recordings."""
+"""The registry of figures: what draws each kind, for `plot`, `interactive`, print and pages."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from inspect import signature
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from mckibben.arrays import Array
+import numpy as np
+
 from mckibben.blocks.base import Block
-from mckibben.errors import ModelError
+from mckibben.blocks.free_run import run_free
+from mckibben.control.identified import known_ranges
+from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.base import driving
 from mckibben.recording import Recording
-from mckibben.report import model_subjects, printed, subjects
+from mckibben.report import (
+    interactive,
+    model_subjects,
+    printed,
+    subjects,
+)
 from mckibben.report.coupling_subjects import coupling
-from mckibben.report.drawing import N_COLOURS, Drawing, Panel, left_out
+from mckibben.report.drawing import N_COLOURS, POINTS, Curve, Drawing, Panel, axis_label, left_out
 from mckibben.report.shown import Shown, shown, unique
+from mckibben.signals import decaying_triangle
+from mckibben.system.extras import demand
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from mckibben.comparison.leaderboard import Leaderboard
+    from mckibben.control import Tracked
+    from mckibben.diagnosis.characterization import Characterization
+    from mckibben.diagnosis.check import OutputCheck, Validation
+    from mckibben.diagnosis.review import Review
+    from mckibben.rigs.rig import Rig
     from mckibben.studying.study import Study
 
+T = TypeVar("T")
 
-def time(study: Study) -> Drawing:
-    """Input and output of all recordings over time."""
-    return subjects.time_course(_recordings(study), _pair(study))
+Recordings = Recording | Sequence[Recording]
 
+SCREEN = 6.4 / printed.COLUMN
+"""Size of a figure of pyplot over that for print."""
 
-def loop(study: Study) -> Drawing:
-    """Output over input of all recordings."""
-    return subjects.loop(_recordings(study), *_pair(study))
+PERIOD, CYCLES, SAMPLE_TIME = 10.0, 3, 0.02
+"""Of the falling triangle that loops of models and rigs are drawn with [s]."""
 
-
-def leaderboard(study: Study) -> Drawing:
-    """Errors of all models, with the interval of the test error."""
-    return model_subjects.leaderboard(study.leaderboard)
-
-
-def fit(study: Study) -> Drawing:
-    """Measured and modelled output over time, of the model chosen."""
-    return _one_each(
-        shown(study),
-        lambda one: subjects.fit_over_time(one.recording, one.output, _chosen(one), one.test_from),
-    )
+DRIVING = ("pressure", "voltage")
+MOVED = ("displacement", "length", "contraction", "angle", "force")
+"""What drives, and what is moved, by the first word of a channel's name."""
 
 
-def loops(study: Study) -> Drawing:
-    """Measured and modelled loop, of the model chosen."""
-    return _one_each(
-        shown(study),
-        lambda one: subjects.fit_loops(one.recording, one.input, one.output, _chosen(one)),
-    )
+def draw(thing: Any, kind: str | None = None, **choices: Any) -> Drawing:
+    """Return a figure of a thing.
 
+    Parameters
+    ----------
+    thing : object
+        What has a name in `FIGURES` as its ``face``, or a sequence of recordings.
+    kind : str, optional
+        One of its figures; default the first, or that which compares it with a ``recording``.
+    **choices
+        What the figure takes.
 
-def residuals(study: Study) -> Drawing:
-    """Residuals of the model chosen against input and time, on the recording tested on."""
-    first = shown(study)[0]
-    return subjects.residuals(
-        first.recording, first.input, first.output, _chosen(first), first.test_from
-    )
-
-
-def weights(study: Study) -> Drawing:
-    """Weights over thresholds of all models that have them."""
-    return model_subjects.weights(
-        {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
-    )
-
-
-def inverse(study: Study) -> Drawing:
-    """Wished-for and modelled output, error, and the input that the inverse gives."""
-    if study.inverse is None or study.inverse.reachable is None:
+    Raises
+    ------
+    ModelError
+        On an unknown kind, or a choice that the figure does not take.
+    """
+    known = FIGURES[getattr(thing, "face", "recording")]
+    if kind is None and "recording" in choices and "loops" in known:
+        kind = "loops"
+    elif kind is None and isinstance(thing, Recording) and pair_of(thing) is None:
+        kind = "loop" if {"input", "output"} <= choices.keys() else "time"
+    kind = kind or next(iter(known))
+    if kind not in known:
+        raise ModelError(f"there is no figure {kind!r}", remedy=f"use one of {', '.join(known)}")
+    taken = [*signature(known[kind]).parameters][1:]
+    if unknown := choices.keys() - set(taken):
         raise ModelError(
-            "no model of this study has an inverse", remedy="compare pi, mpi and gpi, which can"
+            f"the figure {kind!r} takes no {', '.join(sorted(unknown))}",
+            remedy=f"it takes {', '.join(taken) or 'no choices'}; other figures: {', '.join(known)}",
         )
-    return model_subjects.inverse_check(study.inverse, study.train[0].sample_time is not None)
+    return known[kind](thing, **choices)
 
 
-FIGURES: Mapping[str, Callable[[Study], Drawing]] = MappingProxyType(
-    {
-        "time": time,
-        "loop": loop,
-        "leaderboard": leaderboard,
-        "fit": fit,
-        "loops": loops,
-        "residuals": residuals,
-        "weights": weights,
-        "inverse": inverse,
+def write_figure(thing: Any, path: str | Path, kind: str | None = None, **choices: Any) -> None:
+    """Write a figure for print, as `draw` makes it.
+
+    Parameters
+    ----------
+    thing : object
+        A recording, recordings, a model, a leaderboard, a study or another thing that is drawn.
+    path : path
+        File to write, ``.png``, ``.svg`` or ``.pdf``.
+    kind : str, optional
+        Which figure: see `FIGURES`.
+    **choices
+        What the figure takes.
+
+    Raises
+    ------
+    DataError
+        On absent channels, another suffix, or a folder that does not exist.
+    ModelError
+        On an unknown kind, or where there is nothing to draw.
+    """
+    printed.save(draw(thing, kind, **choices), path)
+
+
+def plot(thing: Any, kind: str | None, ax: Any, choices: Mapping[str, Any]) -> Axes | list[Axes]:
+    """Draw a figure with matplotlib; see `DrawsItself.plot`."""
+    demand("matplotlib", "figures", "plots")
+    from matplotlib import pyplot, rc_context
+
+    drawing = draw(thing, kind, **choices)
+    with rc_context({"text.parse_math": False}):
+        axes = [] if ax is None else list(np.ravel(np.asarray(ax, dtype=object)))
+        axes = axes or printed.axes_in(pyplot.figure(layout="constrained"), drawing, SCREEN)
+        if len(axes) != len(drawing.panels):
+            raise DataError(
+                f"the figure has {len(drawing.panels)} panels, and there are {len(axes)} axes",
+                remedy="pass as many as `ax=[...]`, or none for a new figure",
+            )
+        printed.draw_into(axes, drawing)
+    return axes[0] if len(axes) == 1 else axes
+
+
+def interact(thing: Any, kind: str | None, choices: Mapping[str, Any]) -> Any:
+    """Draw a figure with plotly; see `DrawsItself.interactive`."""
+    demand("plotly", "notebook", "interactive figures")
+    from plotly.graph_objects import Figure
+
+    drawing = replace(draw(thing, kind, **choices), stacked=True)
+    (found,) = interactive.plots(drawing)
+    # with a background of its own, it is readable in dark notebooks too
+    look = {
+        "template": "plotly_white",
+        "height": 420 if len(drawing.panels) == 1 else 240 * len(drawing.panels),
+        "legend": {"orientation": "h", "y": 1, "yanchor": "bottom", "x": 0},
     }
-)
-"""Name -> what draws it from a study."""
-
-RECORDING_KINDS = ("time", "loop")
-MODEL_KINDS = ("fit", "loops", "residuals", "weights")
+    plain = interactive.resolved(found, printed.COLOURS)
+    return Figure(data=plain["data"], layout=look | plain["layout"])
 
 
-def plot_recording(
-    recordings: Sequence[Recording],
-    input: str,  # noqa: A002
-    output: str,
-    kind: str,
-    path: str | Path,
-) -> None:
-    """Write a figure of recordings.
+def pair_of(recording: Recording) -> tuple[str, str] | None:
+    """Return the first channel that drives and the first that is moved, or None without either."""
 
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        At least one; of more than six, the first six are drawn and the others named.
-    input, output : str
-        Channels.
-    kind : {"time", "loop"}
-        Both over time, or the output over the input.
-    path : path
-        File to write, ``.png``, ``.svg`` or ``.pdf``.
+    def first(quantities: Sequence[str]) -> str | None:
+        found = (
+            name
+            for quantity in quantities
+            for name in recording.channels
+            if name.partition("_")[0] == quantity and np.ptp(recording[name]) > 0
+        )
+        return next(found, None)
 
-    Raises
-    ------
-    DataError
-        On absent channels, another suffix, or a folder that does not exist.
-    ModelError
-        On an unknown kind.
-    """
-    if _known(kind, RECORDING_KINDS) == "time":
-        drawing = subjects.time_course(recordings, (input, output))
-    else:
-        drawing = subjects.loop(recordings, input, output)
-    printed.save(drawing, path)
+    given, moved = first(DRIVING), first(MOVED)
+    return None if given is None or moved is None else (given, moved)
 
 
-def plot_model(block: Block, recordings: Sequence[Recording], kind: str, path: str | Path) -> None:
-    """Write a figure of a model, running free, against recordings.
+# --- Recordings and rigs ----------------------------------------------------------------------------
 
-    The first output of the model is drawn, over the first input, or of several muscles over that which
-    moves it most.
 
-    Parameters
-    ----------
-    block : Block
-        The model.
-    recordings : sequence of Recording
-        At least one, with the model's inputs and its measured output; of more than six, the first
-        six are drawn. Each starts from the memory that best explains its first sample.
-    kind : {"fit", "loops", "residuals", "weights"}
-        Output over time; output over input; measured less modelled; weights over thresholds.
-    path : path
-        File to write, ``.png``, ``.svg`` or ``.pdf``.
+def _time(
+    recordings: Recordings,
+    channels: Sequence[str] = (),
+    input: str | None = None,  # noqa: A002
+    output: str | None = None,
+) -> Drawing:
+    """Draw channels over time, one panel each; default all."""
+    several = _several(recordings)
+    named = [name for name in (input, output) if name is not None]
+    return subjects.time_course(several, channels or named or [*several[0].channels])
 
-    Raises
-    ------
-    DataError
-        On absent channels, another suffix, or a folder that does not exist.
-    ModelError
-        On an unknown kind, a model without weights, or one that does not suit the recordings.
-    """
-    from mckibben.blocks.free_run import run_free
 
-    name = "model"
-    if _known(kind, MODEL_KINDS) == "weights":
-        printed.save(model_subjects.weights({name: block}), path)
-        return
-    wanted = block.outputs[0].name
-    coupled = coupling(recordings, _driving(block, recordings[0]), (wanted,))
-    runs = [
-        Shown(r, *coupled.pairs([r])[0], {name: run_free(block, r, wanted)}, "")
-        for r in recordings[:N_COLOURS]
-    ]
+def _loop(
+    recordings: Recordings,
+    input: str | None = None,  # noqa: A002
+    output: str | None = None,
+) -> Drawing:
+    """Draw the output over the input, from early to late."""
+    several = _several(recordings)
+    pair = pair_of(several[0])
+    if pair is None and not (input and output):
+        raise DataError("no channels of a loop are known by name", remedy="name `input`, `output`")
+    given, moved = pair or ("", "")
+    return subjects.loop(several, input or given, output or moved)
 
-    def drawing(one: Shown) -> Drawing:
-        if kind == "fit":
-            return subjects.fit_over_time(one.recording, wanted, one.outputs)
-        if kind == "loops":
-            return subjects.fit_loops(one.recording, one.input, wanted, one.outputs)
-        return subjects.residuals(one.recording, one.input, wanted, one.outputs)
 
-    printed.save(_one_each(runs, drawing, [r.name for r in recordings[N_COLOURS:]]), path)
+def _several(recordings: Recordings) -> Sequence[Recording]:
+    return [recordings] if isinstance(recordings, Recording) else recordings
+
+
+def _rig_run(rig: Rig, given: str | None, wanted: str | None) -> tuple[Recording, str, str]:
+    """Return what a falling triangle of one input does to a rig, the other inputs at rest."""
+    driven = given or rig.inputs[0]
+    moved = [name for name in rig.outputs if not name.startswith("pressure")]
+    own = driven.replace("pressure", "displacement")
+    ends = rig.limits(driven)
+    t = SAMPLE_TIME * np.arange(round(CYCLES * PERIOD / SAMPLE_TIME) + 1)
+    resting = zip(rig.inputs, rig.resting[0], strict=True)
+    channels = {name: np.full(t.size, value) for name, value in resting}
+    channels[driven] = decaying_triangle(t, period=PERIOD, high=ends.high, low=ends.low)
+    run = rig.run(Recording(channels, SAMPLE_TIME, meta={"name": rig.name}))
+    return run, driven, wanted or (own if own in moved else (moved or [*rig.outputs])[0])
+
+
+def _rig_loop(rig: Rig, input: str | None = None, output: str | None = None) -> Drawing:  # noqa: A002
+    run, given, moved = _rig_run(rig, input, output)
+    return subjects.loop([run], given, moved)
+
+
+def _rig_time(rig: Rig, input: str | None = None, output: str | None = None) -> Drawing:  # noqa: A002
+    run, *pair = _rig_run(rig, input, output)
+    return subjects.time_course([run], pair)
+
+
+# --- Models and leaderboards ------------------------------------------------------------------------
+
+
+def _block_loop(
+    block: Block,
+    input: str | None = None,  # noqa: A002
+    output: str | None = None,
+    high: float | None = None,
+) -> Drawing:
+    """Draw the answer to a falling triangle of one input, from rest, the others in the middle."""
+    names = [channel.name for channel in block.inputs]
+    driven, given = input or names[0], output or block.outputs[0].name
+    ranges = known_ranges(block)
+    if driven not in ranges and high is None:
+        raise ModelError(
+            f"the range of {driven} that the model was identified on is not known",
+            remedy="set `high=`, or a measured `recording=`",
+        )
+    low, top = ranges.get(driven, (0.0, 0.0))
+    step = block.sample_time or SAMPLE_TIME
+    t = step * np.arange(round(CYCLES * PERIOD / step) + 1)
+    channels = {name: np.full(t.size, np.mean(ranges.get(name, (0.0, 0.0)))) for name in names}
+    channels[driven] = decaying_triangle(
+        t, period=PERIOD, high=top if high is None else high, low=low
+    )
+    units = {channel.name: channel.unit for channel in block.inputs}
+    run = block.simulate(Recording(channels, step, units, meta={"name": block.title}))
+    return subjects.loop([run], driven, given)
+
+
+def _against(kind: str) -> Callable[..., Drawing]:
+    """Return what draws a model, or some of a leaderboard, running free against recordings."""
+
+    def draw_against(
+        thing: Block | Leaderboard,
+        recording: Recordings | None = None,
+        input: str | None = None,  # noqa: A002
+        output: str | None = None,
+        models: str | Sequence[str] = (),
+    ) -> Drawing:
+        if recording is None:
+            raise ModelError(f"{kind!r} compares with a measurement", remedy="set `recording=`")
+        blocks = {"model": thing} if isinstance(thing, Block) else _blocks(thing, models)
+        first, several = next(iter(blocks.values())), _several(recording)
+        wanted = output or first.outputs[0].name
+        coupled = coupling(several, _driving(first, several[0]), (wanted,))
+        runs = [
+            Shown(
+                one,
+                input or coupled.pairs([one])[0][0],
+                wanted,
+                {name: run_free(block, one, wanted) for name, block in blocks.items()},
+                "",
+            )
+            for one in several[:N_COLOURS]
+        ]
+        return _one_each(runs, kind, [one.name for one in several[N_COLOURS:]])
+
+    return draw_against
+
+
+def _blocks(board: Leaderboard, models: str | Sequence[str]) -> dict[str, Block]:
+    """Return the models of a leaderboard by name; default the chosen one."""
+    asked = [models] if isinstance(models, str) else list(models)
+    if not asked and board.best is not None:
+        asked = [board.best.model]
+    known = {row.model: row.block for row in board.rows if row.block is not None}
+    if not asked or not known.keys() >= set(asked):
+        raise ModelError(
+            f"there is no model {', '.join(asked) or 'chosen'} to draw",
+            remedy=f"name some of {', '.join(known) or 'a leaderboard where a model worked'}",
+            parameter="models",
+        )
+    return {name: known[name] for name in asked}
+
+
+def _driving(block: Block, recording: Recording) -> tuple[str, ...]:
+    """Return a model's driving inputs, without scheduling ones: no loop is drawn over those."""
+    names = tuple(channel.name for channel in block.inputs)
+    muscles = tuple(name for name in driving(recording) if name in names)
+    return muscles if names[0] in muscles else names[:1]
 
 
 def _one_each(
-    runs: Sequence[Shown], draw: Callable[[Shown], Drawing], others: Sequence[str] = ()
+    runs: Sequence[Shown], kind: str, others: Sequence[str] = (), models: int | None = None
 ) -> Drawing:
     """Draw each recording in panels of its own."""
     panels: list[Panel] = []
     for one in runs[:N_COLOURS]:
-        drawing = draw(one)
+        drawing = on_recording(one, kind, models=models)
         title = one.name if len(runs) > 1 else ""
         panels += [replace(panel, title=title) for panel in drawing.panels]
     named = [*(one.name for one in runs[N_COLOURS:]), *others]
     return replace(drawing, panels=tuple(panels), note=left_out(named))
 
 
-def _recordings(study: Study) -> list[Recording]:
-    return [one.recording for one in unique(shown(study))]
+def on_recording(one: Shown, kind: str, points: int = POINTS, models: int | None = None) -> Drawing:
+    """Draw a recording with the outputs of models, perhaps of the first few only.
 
-
-def _pair(study: Study) -> tuple[str, str]:
-    """Return the first output, and the input that is its own."""
-    first = shown(study)[0]
-    return first.input, first.output
-
-
-def _chosen(one: Shown) -> dict[str, Array]:
-    if not one.outputs:
+    Parameters
+    ----------
+    kind : {"fit", "loops", "residuals"}
+        Over time; over the input; measured less modelled.
+    """
+    outputs = dict(list(one.outputs.items())[:models])
+    if not outputs:
         raise ModelError(
-            "no model of this study worked", remedy="read the reasons in its leaderboard"
+            "no model of this study worked", remedy="see the reasons in its leaderboard"
         )
-    return dict(list(one.outputs.items())[:1])
+    run, given, moved = one.recording, one.input, one.output
+    if kind == "fit":
+        return subjects.fit_over_time(run, moved, outputs, one.test_from, points)
+    if kind == "loops":
+        return subjects.fit_loops(run, given, moved, outputs, points)
+    return subjects.residuals(run, given, moved, outputs, one.test_from, points)
 
 
-def _driving(block: Block, recording: Recording) -> tuple[str, ...]:
-    """Return a model's inputs, without what else it is told, as a load: no loop is drawn over that."""
-    told = tuple(channel.name for channel in block.inputs)
-    muscles = tuple(name for name in driving(recording) if name in told)
-    return muscles if told[0] in muscles else told[:1]
+def _weights(block: Block, recording: Recordings | None = None) -> Drawing:
+    """Draw weights over thresholds, the same whatever the recording."""
+    del recording
+    return model_subjects.weights({"model": block})
 
 
-def _known(name: str, names: tuple[str, ...]) -> str:
-    if name not in names:
-        raise ModelError(f"there is no figure {name!r}", remedy=f"use one of {', '.join(names)}")
-    return name
+# --- Studies ----------------------------------------------------------------------------------------
+
+
+def _of_study(kind: str) -> Callable[[Study], Drawing]:
+    """Return what draws the chosen model on recordings; residuals on the one tested on."""
+
+    def draw_study(study: Study) -> Drawing:
+        runs = shown(study)
+        return _one_each(runs[:1] if kind == "residuals" else runs, kind, models=1)
+
+    return draw_study
+
+
+def _study_recordings(drawn: Callable[..., Drawing]) -> Callable[[Study], Drawing]:
+    """Return what draws input and first output of all recordings."""
+
+    def draw_study(study: Study) -> Drawing:
+        every = shown(study)
+        return drawn(
+            [one.recording for one in unique(every)], input=every[0].input, output=every[0].output
+        )
+
+    return draw_study
+
+
+def _study_weights(study: Study) -> Drawing:
+    rows = study.leaderboard.rows
+    return model_subjects.weights({row.model: row.block for row in rows if row.block is not None})
+
+
+def _inverse(study: Study) -> Drawing:
+    """Draw desired and modelled output, error, and the input that the inverse computes."""
+    if study.inverse is None or study.inverse.reachable is None:
+        raise ModelError("no model of this study has an inverse", remedy="compare pi, mpi and gpi")
+    return model_subjects.inverse_check(study.inverse, study.train[0].sample_time is not None)
+
+
+# --- What was found ---------------------------------------------------------------------------------
+
+
+def _cycles(found: Characterization) -> Drawing:
+    """Draw the loop width of every cycle over its amplitude."""
+    if not found.cycles:
+        raise ModelError(
+            "there is no whole cycle to draw", remedy="record one, from the lowest input and back"
+        )
+    x = np.array([cycle.amplitude for cycle in found.cycles])
+    y = np.array([cycle.width for cycle in found.cycles])
+    label = axis_label(f"amplitude of {found.input}", found.input_unit)
+    return Drawing((Panel(label, "loop width [%]", (Curve(x, y, "", "series-1", "dots"),)),))
+
+
+def _tracked(found: Tracked, output: str | None = None) -> Drawing:
+    """Draw reference and motion over time."""
+    name = _named({name: name for name in found.rmse}, output)
+    return model_subjects.tracking({"achieved": found}, name)
+
+
+def _parts(found: Review, output: str | None = None) -> Drawing:
+    """Draw reference and motion, and below the error with its parts."""
+    return model_subjects.parts(_named({one.output: one for one in found.outputs}, output))
+
+
+def _checked(found: Validation, output: str | None) -> OutputCheck:
+    return _named({one.output: one for one in found.outputs}, output)
+
+
+def _autocorrelation(found: Validation, output: str | None = None) -> Drawing:
+    return model_subjects.autocorrelation(_checked(found, output))
+
+
+def _pattern(found: Validation, output: str | None = None, against: str = "branch") -> Drawing:
+    """Draw means of an output's residual over inputs, loads, outputs or branches."""
+    one = _checked(found, output)
+    return model_subjects.pattern(
+        one, _named({each.against: each for each in one.patterns}, against)
+    )
+
+
+def _named(known: Mapping[str, T], name: str | None) -> T:
+    """Return what has a name; default the first."""
+    if name is not None and name not in known:
+        raise DataError(f"{name!r} is not among the results", remedy=f"use {', '.join(known)}")
+    return known[name or next(iter(known))]
+
+
+_AGAINST = {kind: _against(kind) for kind in ("loops", "fit", "residuals")}
+
+FIGURES: Mapping[str, Mapping[str, Callable[..., Drawing]]] = MappingProxyType(
+    {
+        "recording": {"loop": _loop, "time": _time},
+        "rig": {"loop": _rig_loop, "time": _rig_time},
+        "block": {"loop": _block_loop, "weights": _weights, **_AGAINST},
+        "leaderboard": {"errors": model_subjects.leaderboard, **_AGAINST},
+        "study": {
+            "loops": _of_study("loops"),
+            "time": _study_recordings(_time),
+            "loop": _study_recordings(_loop),
+            "leaderboard": lambda study: model_subjects.leaderboard(study.leaderboard),
+            "fit": _of_study("fit"),
+            "residuals": _of_study("residuals"),
+            "weights": _study_weights,
+            "inverse": _inverse,
+        },
+        "characterization": {"cycles": _cycles},
+        "tracked": {"time": _tracked},
+        "review": {"parts": _parts},
+        "validation": {"autocorrelation": _autocorrelation, "residual": _pattern},
+    }
+)
+"""Name of a thing -> name of a figure, the usual one first -> what draws it."""

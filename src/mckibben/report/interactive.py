@@ -7,6 +7,7 @@ which depend on whether the page is dark or light.
 from __future__ import annotations
 
 from base64 import b64decode, b64encode
+from collections.abc import Mapping
 from html import escape
 from typing import Any
 
@@ -63,6 +64,19 @@ def unpacked(numbers: Json) -> Array:
 def text(words: str) -> str:
     """Return words as plotly.js shows them verbatim: it takes <b>, <a> and the like for markup."""
     return escape(words, quote=False)
+
+
+def resolved(value: Any, colours: Mapping[str, str]) -> Any:
+    """Return plain numbers for packed ones, and colours for their names, as the page's script does."""
+    if isinstance(value, dict):
+        if set(value) == {"base", "f4"}:
+            return unpacked(value)
+        return {key: resolved(item, colours) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [resolved(item, colours) for item in value]
+    if isinstance(value, str) and value.startswith("--"):
+        return colours.get(value[2:], "#222222")
+    return value
 
 
 def _plot(panels: tuple[Panel, ...]) -> Json:

@@ -1,4 +1,4 @@
-"""Figures of models themselves: their ranking, their weights, and the check of an inverse."""
+"""Figures of models themselves: ranking, weights, inverse, residuals over what they follow, reviews."""
 
 from __future__ import annotations
 
@@ -28,10 +28,15 @@ from mckibben.report.drawing import (
 if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.control import Tracked
+    from mckibben.diagnosis.check import OutputCheck
+    from mckibben.diagnosis.patterns import Bin, Pattern
+    from mckibben.diagnosis.review import Followed
     from mckibben.studying.inverting import InverseCheck
 
 OFF_THE_CHART = 3.0
 """Cross-validated errors beyond so many times the largest test error would squeeze all others."""
+
+BRANCHES = (("rising", "series-1"), ("falling", "series-6"))
 
 OperatorSum = PI | GPI | EUPI | RateDependentPI
 
@@ -158,6 +163,62 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
                 axis_label(given.name, given.unit),
                 (Curve(*over_time(t, check.pressure[:, 0]), "", "input"),),
             ),
+        ),
+        stacked=True,
+    )
+
+
+def autocorrelation(one: OutputCheck) -> Drawing:
+    """Draw the residual's autocorrelation, and the band of white noise."""
+    found = one.whiteness
+    lags = np.array(found.lags, dtype=float)
+    band = np.array(found.band)
+    curves = (
+        Curve(lags, band, "99 % of white noise", "input", "fine"),
+        Curve(lags, -band, "", "input", "fine"),
+        Curve(lags, np.array(found.autocorrelation), "", "series-1", "stems"),
+    )
+    return Drawing((Panel("lag [samples]", "autocorrelation", curves, zero=True),), columns=1)
+
+
+def pattern(one: OutputCheck, against: Pattern) -> Drawing:
+    """Draw the residual's means over something, with their 95 % intervals."""
+    groups = BRANCHES if against.against == "branch" else (("", "series-1"),)
+    curves: list[Curve] = []
+    for label, colour in groups:
+        bins = [each for each in against.bins if each.label == label]
+        curves += _means(bins, label, colour)
+    what = "modelled " if against.against == "output" else ""
+    x_label = axis_label(f"{what}{against.channel}", against.unit)
+    y_label = axis_label("measured − model", one.unit)
+    return Drawing((Panel(x_label, y_label, tuple(curves), zero=True),))
+
+
+def _means(bins: list[Bin], label: str, colour: str) -> list[Curve]:
+    x = np.array([(each.low + each.high) / 2 for each in bins])
+    ends = np.array([each.interval for each in bins]).reshape(-1, 2)
+    return [
+        Curve(x, ends[:, 0], "", colour, "fine"),
+        Curve(x, ends[:, 1], "", colour, "fine"),
+        Curve(x, np.array([each.mean for each in bins]), label, colour, "beads"),
+    ]
+
+
+def parts(one: Followed, points: int = POINTS) -> Drawing:
+    """Draw reference and measured motion, and below the error with its parts."""
+    wanted = over_time(one.time, one.reference, points)
+    got = over_time(one.time, one.measured, points)
+    error = over_time(one.time, one.measured - one.reference, points)
+    curves = [
+        Curve(*over_time(one.time, part, points), kind, series_colour(place))
+        for place, (kind, part) in enumerate(one.parts.items())
+    ]
+    above = (Curve(*wanted, "reference", style="broad"), Curve(*got, "recorded", "series-1"))
+    below = (Curve(*error, "error", style="broad"), *curves)
+    return Drawing(
+        (
+            Panel("time [s]", axis_label(one.output, one.unit), above),
+            Panel("time [s]", axis_label("error", one.unit), below, zero=True),
         ),
         stacked=True,
     )

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.comparison.channels import any_moves, held_at_levels
 from mckibben.diagnosis.check import Validation
+from mckibben.errors import in_terms_of
 from mckibben.numerals import number, numeral, percent
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
-    check_subjects,
     coupling_subjects,
     interactive,
     model_subjects,
-    review_subjects,
     subjects,
     words,
 )
@@ -33,6 +32,7 @@ from mckibben.report.columns import columns_of_board
 from mckibben.report.commands import commands
 from mckibben.report.description_page import model_items
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
+from mckibben.report.figures import on_recording
 from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ class _View:
 def tiles(study: Study) -> tuple[Tile, ...]:
     """Return the numbers of the first screen: loop, model, inverse, data gaps."""
     board, found, best = study.leaderboard, study.characterization, study.leaderboard.best
-    loop = Tile("Loop width", "–", "of several muscles, see Recordings", "recordings")
+    loop = Tile("Loop width", "–", "several muscles: see Recordings", "recordings")
     if found is not None and found.loop_width is not None:
         width = f"{numeral(found.mid_width, 2)} {found.output_unit} at mid {found.input}"
         loop = Tile("Loop width", f"{numeral(found.loop_width, 2)} %", width, "recordings")
@@ -151,14 +151,13 @@ def _share(study: Study) -> str:
 def _lead(one: Shown, board: Leaderboard) -> Figure:
     """Return the measured loop with the chosen model's; over time where several inputs move."""
     moving = [name for name in board.inputs if any_moves([one.recording], (name,))]
-    best = dict(list(one.outputs.items())[:1])
-    caption = one.name + (f", and {next(iter(best))} running free" if best else "")
-    if len(moving) > 1 and one.recording.sample_time is not None:
-        drawing = subjects.fit_over_time(one.recording, one.output, best, one.test_from, POINTS)
-    elif best:
-        drawing = subjects.fit_loops(one.recording, one.input, one.output, best, POINTS)
+    best = next(iter(one.outputs), None)
+    caption = one.name + (f", and {best} running free" if best else "")
+    if best is None:
+        drawing = subjects.loop([one.recording], one.input, one.output)
     else:
-        drawing = subjects.loop([one.recording], one.input, one.output, POINTS)
+        timed = len(moving) > 1 and one.recording.sample_time is not None
+        drawing = on_recording(one, "fit" if timed else "loops", models=1)
     return Figure("lead", [interactive.plots(drawing)], "Loop, measured and modelled", caption)
 
 
@@ -168,14 +167,16 @@ def _review(study: Study, points: int) -> Section | None:
     figures = [
         Figure(
             f"review {one.output}",
-            [interactive.plots(review_subjects.parts(one, points))],
+            [interactive.plots(model_subjects.parts(one, points))],
             f"Reference, measured motion, and parts of the error of {one.output}",
             "The parts add up to the error: model, pressure (measured less commanded), command.",
             "stacked",
         )
         for one in study.review.outputs
     ]
-    return Section("review", "Closed loop", [Text(words.reviewed(study.review)), *figures])
+    return Section(
+        "review", "Closed loop", [Text(words.reviewed(study.review), listed=True), *figures]
+    )
 
 
 def _leaderboard(board: Leaderboard) -> Section:
@@ -227,7 +228,13 @@ def _leaderboard(board: Leaderboard) -> Section:
             table
             if ranked
             else Text(["No model is fitted yet."] if board.pending else ["No model worked."]),
-            Text([*notes, *words.comparison(board), *words.not_validated(board)], "note"),
+            Text(
+                [
+                    in_terms_of(n)
+                    for n in (*notes, *words.comparison(board), *words.not_validated(board))
+                ],
+                "note",
+            ),
             Text(failed, "failed", listed=True) if failed else None,
             chart,
         ],
@@ -247,11 +254,7 @@ def _model(study: Study, view: _View) -> Section | None:
     if not study.predictions:
         return None
     ranked = [row.model for row in board.rows if row.reason is None][:N_COLOURS]
-    fit = view.each(
-        lambda one: subjects.fit_over_time(
-            one.recording, one.output, one.outputs, one.test_from, view.points
-        )
-    )
+    fit = view.each(lambda one: on_recording(one, "fit", view.points))
     items: list[Any] = [Figure("fit", fit, "Measured and modelled output over time", toggled=True)]
     if study.description is not None:
         items += model_items(study.description)
@@ -263,20 +266,14 @@ def _model(study: Study, view: _View) -> Section | None:
 def _checks(study: Study, view: _View) -> Section | None:
     board, items = study.leaderboard, list[Any]()
     if study.predictions:
-        residuals = view.each(
-            lambda one: subjects.residuals(
-                one.recording, one.input, one.output, one.outputs, one.test_from, view.points
-            )
-        )
+        residuals = view.each(lambda one: on_recording(one, "residuals", view.points))
         label = "Residuals over input and over time"
-        items.append(
-            Figure("residuals", residuals, label, "Measured − modelled.", "", 2, toggled=True)
-        )
+        items.append(Figure("residuals", residuals, label, "", "", 2, toggled=True))
     if isinstance(study.check, Validation):
         items.append(Text(words.check_sentences(study.check), listed=True))
         for one in study.check.outputs[:MOST_CHECKED]:
             panels = [
-                interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns
+                interactive.plots(model_subjects.pattern(one, each))[0] for each in one.patterns
             ]
             caption = f"Mean residual of {one.output} on the test, with 95 % intervals."
             items.append(Figure(f"patterns {one.output}", [panels], caption, caption, "", 2))
@@ -348,7 +345,7 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
         items.append(Figure("levels", levels, label, f"{label}.", "square"))
     notes = [f"{file}: {'; '.join(said)}." for file, said in notes_by_file(measured).items()]
     notes += [note for note in study.notes if note not in reading_notes(measured)]
-    items.append(Text(notes, "note", listed=True) if notes else None)
+    items.append(Text([*map(in_terms_of, notes)], "note", listed=True) if notes else None)
     return Section("recordings", "Recordings", items, view.names)
 
 

@@ -136,6 +136,13 @@ def drawn(drawing: Drawing) -> Figure:
     demand("matplotlib", "figures", "figures for print")
     from matplotlib.figure import Figure
 
+    figure = Figure(layout="constrained")
+    draw_into(axes_in(figure, drawing), drawing)
+    return figure
+
+
+def axes_in(figure: Figure, drawing: Drawing, scale: float = 1.0) -> list[Axes]:
+    """Return the axes of a drawing's panels in a new figure, which is given its size."""
     n = len(drawing.panels)
     columns = 1 if drawing.stacked else min(n, drawing.columns)
     rows = -(-n // columns)
@@ -149,15 +156,19 @@ def drawn(drawing: Drawing) -> Figure:
     names = [[curve.name for curve in panel.curves if curve.name] for panel in drawing.panels]
     lines = max(-(-len(own) // _legend_columns(own)) for own in names)
     height = rows * panel_height + 0.2 + note + _LEGEND_LINE * max(lines - 2, 0)
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure.set_size_inches(scale * width, scale * height)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=drawing.stacked).ravel()
-    for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=False)):
-        draw_panel(axis, panel, bottom=not drawing.stacked or place == n - 1)
     for axis in axes[n:]:
         axis.set_axis_off()
     if drawing.note:
-        figure.supxlabel(verbatim(drawing.note), fontsize=6, wrap=True)
-    return figure
+        figure.supxlabel(verbatim(drawing.note), fontsize="small", wrap=True)
+    return list(axes[:n])
+
+
+def draw_into(axes: Sequence[Axes], drawing: Drawing) -> None:
+    """Draw every panel into its axes."""
+    for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=True)):
+        draw_panel(axis, panel, bottom=not drawing.stacked or place == len(axes) - 1)
 
 
 def verbatim(words: str) -> str:

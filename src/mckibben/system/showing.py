@@ -12,17 +12,17 @@ from mckibben.registry import load
 
 
 class ShowsItself:
-    """Prints as a short text within 80 columns, and shows in a notebook as a small card."""
+    """Prints as at most three lines of 80 columns, and shows in a notebook as a small card."""
 
     face: ClassVar[str]
-    """Name of what shows it, in the registry's ``faces``."""
+    """Name of its kind, by which its card and its figures are found."""
 
     def __str__(self) -> str:
-        found: str = load("faces", self.face)(self).text()
+        found: str = load("faces", "card")(self).text()
         return found
 
     def _repr_html_(self) -> str:
-        found: str = load("faces", self.face)(self).html()
+        found: str = load("faces", "card")(self).html()
         return found
 
 
@@ -56,7 +56,7 @@ class DrawsItself(ShowsItself):
         DataError
             On absent channels, or another number of axes.
         """
-        return load("faces", self.face)(self).plot(kind, ax, choices)
+        return load("faces", "plot")(self, kind, ax, choices)
 
     def interactive(self, kind: str | None = None, **choices: Any) -> Any:
         """Draw it with plotly: the same figures, to zoom and read.
@@ -72,4 +72,4 @@ class DrawsItself(ShowsItself):
         -------
         plotly.graph_objects.Figure
         """
-        return load("faces", self.face)(self).interactive(kind, choices)
+        return load("faces", "interactive")(self, kind, choices)

@@ -91,7 +91,7 @@ def _figures(desk: Desk, model: Any) -> None:
         output.set_visibility(len(desk.outputs) > 1)
 
         async def draw() -> None:
-            from mckibben.report.figures import plot_model, plot_recording
+            from mckibben.report.figures import write_figure
 
             role: Role = "test" if desk.workspace.with_role("test") else "train"
             recordings = desk.workspace.with_role(role)
@@ -106,9 +106,9 @@ def _figures(desk: Desk, model: Any) -> None:
 
             def save() -> None:
                 if sides:
-                    plot_recording(recordings, *sides, what, path)
+                    write_figure(recordings, path, what, input=sides[0], output=sides[1])
                 else:
-                    plot_model(desk.workspace.model(name), recordings, what, path)
+                    write_figure(desk.workspace.model(name), path, what, recording=recordings)
 
             await asyncio.to_thread(save)
             hand_over(desk, path, call)

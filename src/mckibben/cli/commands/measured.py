@@ -24,7 +24,7 @@ def measured(
         Path,
         Argument("FOLDER", "A folder for every set of recordings, each with its channels.toml."),
     ],
-    out: Annotated[Path, Option("Folder for measured.md and measured.csv.", "DIR", "-o")] = Path(
+    out: Annotated[Path, Option("Folder for the page and measured.csv.", "DIR", "-o")] = Path(
         "measured"
     ),
     only: Annotated[tuple[str, ...], Option("A set's folder; repeatable.", "SET")] = (),
@@ -38,7 +38,7 @@ def measured(
     as_json: Json = False,
 ) -> None:
     from mckibben.errors import DataError
-    from mckibben.measured.page import measure
+    from mckibben.measured.page import FILES, measure
     from mckibben.report import words
 
     def done(one: Outcome) -> None:
@@ -58,7 +58,7 @@ def measured(
             progress=tell,
             found=done,
         )
-    written = [out / "measured.md", out / "measured.csv"]
+    written = [out / name for name in FILES]
     show({one.label: one.to_dict() for one in found}, list, as_json, written=written)
     if all(one.failed for one in found):
         raise DataError(

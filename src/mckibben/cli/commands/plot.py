@@ -30,14 +30,14 @@ def plot(
     from mckibben.blocks.saving import load
     from mckibben.outputs import claim
     from mckibben.reading import read_pair
-    from mckibben.report.figures import plot_model, plot_recording
+    from mckibben.report.figures import write_figure
     from mckibben.report.printed import format_of
 
     format_of(out)  # another ending is refused now
     claim(out, inputs=[*files, *([] if model is None else [model])], force=force)
     recordings, given, moved = read_pair(files, input, output, reading)
     if model is None:
-        plot_recording(recordings, given, moved, kind or "loop", out)
+        write_figure(recordings, out, kind, input=given, output=moved)
     else:
-        plot_model(load(model), recordings, kind or "fit", out)
+        write_figure(load(model), out, kind or "fit", recording=recordings)
     say(f"Written: {out}")

@@ -13,11 +13,12 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from annotated_types import Interval
+from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
-from mckibben.errors import ModelWarning
+from mckibben.errors import DataError, ModelWarning
 from mckibben.estimators.core.data import Mask, TrainingData, training_data
 from mckibben.estimators.core.settings import check_settings
 from mckibben.estimators.core.uncertainty import (
@@ -28,7 +29,7 @@ from mckibben.estimators.core.uncertainty import (
     vanishing,
 )
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
-from mckibben.recording import REST_LENGTH, Recording, conversion, listed
+from mckibben.recording import REST_LENGTH, Recording, conversion, is_frame, listed
 from mckibben.signals.checking import LARGEST_SEED
 from mckibben.system.progress import telling
 from mckibben.system.threads import one_blas_thread
@@ -324,9 +325,10 @@ class Estimator(ABC):
 
     def fit(
         self,
-        recordings: Recording | Sequence[Recording],
-        y: None = None,
+        recordings: Recording | Sequence[Recording] | ArrayLike,
+        y: ArrayLike | None = None,
         *,
+        sample_time: float | None = None,
         rows: Sequence[Mask] | None = None,
         validation: Sequence[Recording] = (),
         progress: bool | Progress | None = None,
@@ -335,10 +337,13 @@ class Estimator(ABC):
 
         Parameters
         ----------
-        recordings : Recording or sequence of Recording
-            What to learn from; every one starts with a memory of its own.
-        y : None
-            Ignored; scikit-learn passes it.
+        recordings : Recording, data frame, or sequence of these; or array, shape (n,) or (n, inputs)
+            What to learn from; every one starts with a memory of its own. With ``y``, an array of the
+            inputs, in the package's units.
+        y : array, shape (n,) or (n, outputs), optional
+            The outputs.
+        sample_time : float, optional
+            Between samples of arrays [s].
         rows : sequence of bool arrays, optional
             For every recording, the samples whose outputs count.
         validation : sequence of Recording
@@ -360,13 +365,31 @@ class Estimator(ABC):
             On settings out of range.
         """
         before = dict(vars(self))
+        runs = listed(recordings) if y is None else [self._recording(recordings, y, sample_time)]
         try:
             with one_blas_thread(), telling(progress, "fitting") as tell:
-                return self._fit(recordings, rows, validation, tell)
+                return self._fit(runs, rows, validation, tell)
         except BaseException:  # a fit that fails, or is interrupted too early, leaves no traces
             vars(self).clear()
             vars(self).update(before)
             raise
+
+    def _recording(self, u: Any, y: Any, sample_time: float | None) -> Recording:
+        """Return arrays as a recording with the channels of this estimator; ``y`` may be None."""
+        channels: dict[str, Array] = {}
+        for given, names in ((u, self.input), (y, self.output)):
+            columns = np.asarray(() if given is None else given, dtype=float)
+            columns = columns[:, None] if columns.ndim == 1 else columns
+            if given is None:
+                continue
+            named = (names,) if isinstance(names, str) else names
+            if named is None or columns.ndim != 2 or columns.shape[1] != len(named):
+                raise DataError(
+                    f"arrays of shape {columns.shape} are not the channels {names}",
+                    remedy="name the columns: mckibben.Recording({'pressure_1': ...}, sample_time)",
+                )
+            channels |= dict(zip(named, columns.T, strict=True))
+        return Recording(channels, sample_time)
 
     def _fit(
         self,
@@ -407,12 +430,31 @@ class Estimator(ABC):
         """
         check_settings(self)
 
-    def predict(self, recordings: Recording | Sequence[Recording]) -> list[Array]:
-        """Return the model's free-running output on every recording, from its inputs alone.
+    def predict(
+        self,
+        recordings: Recording | Sequence[Recording] | ArrayLike,
+        *,
+        sample_time: float | None = None,
+    ) -> Any:
+        """Return the model's free-running output, from the inputs alone.
 
-        Every run starts as a stream would: no measured output is looked at. Shape (n,), or (n, m) of
-        a model of m outputs.
+        Every run starts as a stream would: no measured output is looked at.
+
+        Parameters
+        ----------
+        recordings : Recording, data frame, or array of inputs; or sequence of recordings
+        sample_time : float, optional
+            Between samples of an array [s].
+
+        Returns
+        -------
+        array, shape (n,), or (n, m) of a model of m outputs
+            Of one recording; a list of these of a sequence.
         """
+        if isinstance(recordings, np.ndarray):
+            recordings = self._recording(recordings, None, sample_time)
+        if isinstance(recordings, Recording) or is_frame(recordings):
+            return self.predict(listed(recordings))[0]
         block = self.fitted
         names = [channel.name for channel in block.inputs]
         given = [channel.name for channel in block.outputs]

@@ -1,1 +1,0 @@
-"""How things show themselves to those who work in Python: cards, texts and plots."""

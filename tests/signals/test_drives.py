@@ -89,7 +89,7 @@ def test_settings_are_listed_and_checked() -> None:
         ("binary-steps", "ramp", SETTINGS["binary-steps"] | {"hold": 1, "ramp": 1}),
         ("random-steps", "longest", SETTINGS["random-steps"] | {"shortest": 3, "longest": 1}),
         ("pulls", "3", SETTINGS["pulls"] | {"n_pulls": 3, "duration": 30}),
-        ("pulls", "0 pulls", SETTINGS["pulls"] | {"n_pulls": 0}),
+        ("pulls", "pulls:n_pulls", SETTINGS["pulls"] | {"n_pulls": 0}),
         ("sine", "period", {"period": 0.0, "peaks": 1.0}),
         ("sine", "peaks", {"period": 1.0, "peaks": ()}),
         ("irregular-triangle", "0", SETTINGS["irregular-triangle"] | {"n_turns": 0}),

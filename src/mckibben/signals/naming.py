@@ -77,7 +77,12 @@ def build(name: str, time: ArrayLike, **settings: Any) -> Array:
                 remedy=f"write for instance {name}:{setting}=..., {words}",
             )
     parsed = {key: _parsed(name, key, value, kinds[key]) for key, value in settings.items()}
-    return np.asarray(signal(time, **parsed), dtype=float)
+    try:
+        return np.asarray(signal(time, **parsed), dtype=float)
+    except DataError as error:
+        if error.parameter is not None:  # which is the signal's, not that of an operation
+            error.parameter = f"{name}:{error.parameter}"
+        raise
 
 
 def _words(kind: Any) -> str:

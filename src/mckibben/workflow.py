@@ -270,7 +270,7 @@ def _compared(
     names = list(registry.names("estimators") if whole else chosen.models)
     arguments["settings"] = settings_of_all(names, chosen.settings) if chosen.settings else {}
     files = expanded(files_of(train), files_of(test))
-    runs = loaded(train), [], loaded(test)
+    runs: tuple[list[Recording], ...] = (loaded(train), [], loaded(test))
     sides: list[Data] = [[*some, *more] for some, more in zip(files, runs, strict=True)]
     logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
     with (

@@ -188,6 +188,31 @@ class CacheWarning(UserWarning):
     """Compiled functions cannot be cached, or were damaged and are compiled again."""
 
 
+def require(
+    holds: bool,
+    parameter: str,
+    value: object,
+    wanted: str,
+    kind: Callable[..., MckibbenError] = ModelError,
+) -> None:
+    """Refuse the value of a parameter unless a condition holds.
+
+    Parameters
+    ----------
+    wanted : str
+        What may be given.
+
+    Examples
+    --------
+    >>> require(False, "delay", -1, "0 or more")
+    Traceback (most recent call last):
+    mckibben.errors.ModelError: delay: it is -1. Remedy: give 0 or more.
+    """
+    if not holds:
+        shown = f"{value:g}" if isinstance(value, float) else f"{value!r:.60}"
+        raise kind(f"it is {shown}", parameter=parameter, remedy=f"give {wanted}")
+
+
 def unforeseen(error: Exception) -> MckibbenError:
     """Return what nobody has foreseen, as an error: it is a fault of the program."""
     return MckibbenError(

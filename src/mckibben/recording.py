@@ -418,9 +418,7 @@ def sample_time_of(
 def _frozen(name: str, samples: ArrayLike) -> Array:
     if isinstance(samples, np.ma.MaskedArray) and (masked := int(np.sum(samples.mask))):
         raise DataError(
-            f"{masked} sample(s) are masked",
-            channel=name,
-            remedy="cut them out, or fill them in",
+            f"{masked} sample(s) are masked", channel=name, remedy="cut them out, or fill them in"
         )
     try:
         given = np.asarray(samples)

@@ -17,7 +17,7 @@ from mckibben.comparison.fitting import Constant, Data, Item, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.comparison.splits import Split, split_of, validation_folds
-from mckibben.errors import DataError, ModelError
+from mckibben.errors import DataError, ModelError, require
 from mckibben.estimators.catalogue import declared, default_model
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import counted
@@ -83,10 +83,8 @@ def plan_of(
 ) -> Plan:
     """Return what a comparison is to do; see `compare`."""
     recordings, tests, checks = listed(train), listed(test), listed(validation)
-    if not isinstance(n_folds, int) or n_folds < 0:
-        raise ModelError(
-            f"it is {n_folds!r:.60}", parameter="n_folds", remedy="give 0, 1, 2 or more"
-        )
+    whole = isinstance(n_folds, int) and n_folds >= 0
+    require(whole, "n_folds", n_folds, "0, 1, 2 or more")
     if not recordings:
         raise DataError("there are no recordings to fit", remedy="give at least one")
     every = [*recordings, *tests, *checks]

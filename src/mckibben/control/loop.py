@@ -19,7 +19,7 @@ from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
 from mckibben.control.roles import Plant, asked, offered, resting, roles
 from mckibben.control.twin import Twin
-from mckibben.errors import ModelError
+from mckibben.errors import ModelError, require
 from mckibben.recording import Recording, sample_time_of
 from mckibben.signals.checking import generator
 from mckibben.system.progress import telling
@@ -272,12 +272,8 @@ def _check(
         "delay": (delay, MOST_DELAY, "steps"),
     }
     for name, (value, most, unit) in ranges.items():
-        if not 0 <= value <= most:
-            raise ModelError(f"it is {value}", parameter=name, remedy=f"give 0 to {most:g} {unit}")
-    if slew is not None and not 0 < slew < np.inf:
-        raise ModelError(
-            f"it is {slew}", parameter="slew", remedy="give a positive number, in bar/s"
-        )
+        require(0 <= value <= most, name, value, f"0 to {most:g} {unit}")
+    require(slew is None or 0 < slew < np.inf, "slew", slew, "a positive number, in bar/s")
 
 
 def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:

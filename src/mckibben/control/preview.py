@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.blocks.base import Block
-from mckibben.errors import ModelError
+from mckibben.errors import require
 from mckibben.recording import Recording, sample_time_of
 
 MOST_PREVIEW = 1e4
@@ -35,10 +35,7 @@ def dead_time_undone(compensator: Block) -> float:
 
 def samples_ahead(preview: float, sample_time: float) -> int:
     """Return a preview in whole samples, rounded, or refuse one that is out of range."""
-    if not 0 <= preview <= MOST_PREVIEW:
-        raise ModelError(
-            f"it is {preview}", parameter="preview", remedy=f"give 0 to {MOST_PREVIEW:g} s"
-        )
+    require(0 <= preview <= MOST_PREVIEW, "preview", preview, f"0 to {MOST_PREVIEW:g} s")
     return round(preview / sample_time)
 
 

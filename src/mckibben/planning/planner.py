@@ -22,7 +22,7 @@ from mckibben.blocks.equations import quantities
 from mckibben.blocks.running import run_many
 from mckibben.diagnosis.data_gaps import Gap, excitation, gaps_of
 from mckibben.diagnosis.excitation import Excitation
-from mckibben.errors import DataError, MckibbenError, ModelError
+from mckibben.errors import DataError, MckibbenError, ModelError, require
 from mckibben.estimators.catalogue import default_model
 from mckibben.estimators.core.uncertainty import (
     LARGEST,
@@ -166,8 +166,8 @@ def plan(
         )
     if muscle is not None and model is not None:
         raise DataError("a muscle is a model itself", remedy="leave `model` out")
-    if not 0 < minutes <= MOST_MINUTES:
-        raise DataError(f"it is {minutes:g}", parameter="minutes", remedy="give 3, up to 60")
+    possible = 0 < minutes <= MOST_MINUTES
+    require(possible, "minutes", minutes, f"3, or up to {MOST_MINUTES:g}", DataError)
     generator(seed)  # refuses what is no seed
     plant = rig if isinstance(rig, Rig) or rig is None else load_rig(rig)
     block = inside(model) if isinstance(model, Block) else None

@@ -9,6 +9,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import Recording, sample_time_of
+from mckibben.signals.checking import require_positive
 
 STOP_BAND = 60.0
 """Attenuation of what could alias [dB]."""
@@ -71,10 +72,7 @@ def resample(recording: Recording, sample_time: float) -> Recording:
         would be left.
     """
     step = sample_time_of(recording, "be resampled")
-    if not 0 < sample_time < np.inf:
-        raise DataError(
-            f"a sample time of {sample_time} s is impossible", remedy="give a positive time"
-        )
+    require_positive("sample_time", sample_time)
     ratio = sample_time / step
     if ratio == 1:
         return recording

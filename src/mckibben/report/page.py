@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.comparison.channels import any_moves, held_at_levels
 from mckibben.diagnosis.check import Validation
-from mckibben.errors import in_terms_of
 from mckibben.numerals import number, numeral, percent
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
@@ -228,13 +227,7 @@ def _leaderboard(board: Leaderboard) -> Section:
             table
             if ranked
             else Text(["No model is fitted yet."] if board.pending else ["No model worked."]),
-            Text(
-                [
-                    in_terms_of(n)
-                    for n in (*notes, *words.comparison(board), *words.not_validated(board))
-                ],
-                "note",
-            ),
+            Text([*notes, *words.comparison(board), *words.not_validated(board)], "note"),
             Text(failed, "failed", listed=True) if failed else None,
             chart,
         ],
@@ -345,7 +338,7 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
         items.append(Figure("levels", levels, label, f"{label}.", "square"))
     notes = [f"{file}: {'; '.join(said)}." for file, said in notes_by_file(measured).items()]
     notes += [note for note in study.notes if note not in reading_notes(measured)]
-    items.append(Text([*map(in_terms_of, notes)], "note", listed=True) if notes else None)
+    items.append(Text(notes, "note", listed=True) if notes else None)
     return Section("recordings", "Recordings", items, view.names)
 
 

@@ -43,7 +43,7 @@ CHOICES = {
 
 STARTED = (
     "Memory starts as training left it where the test continues from there; else, with one driving "
-    "input, from the excursion that best explains the first measured output (--initial measured)."
+    "input, from the excursion that best explains the first measured output (`initial=measured`)."
 )
 """How models are run free in a comparison."""
 
@@ -107,7 +107,7 @@ def comparison(board: Leaderboard) -> list[str]:
     if board.loads:
         said.append(f"Given to models beside the inputs: {', '.join(board.loads)}.")
     said += [
-        f"{name} varies, and no model is given it: see --input and --load."
+        f"{name} varies, and no model is given it: see `inputs` and `load`."
         for name in board.ignored
     ]
     said += [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from mckibben.numerals import percent
 from mckibben.recording import notes_by_file
 from mckibben.report import interactive, model_subjects, words
 from mckibben.report.builder import Figure, Page, Section, Table, Text, Tile
@@ -58,13 +59,19 @@ def check_page(found: Validation, model_file: str) -> str:
     more = len(found.recordings) - 6
     listed = ", ".join(found.recordings[:6]) + (f" and {more} more" if more > 0 else "")
     return Page(
-        words.check_verdict(found),
-        f"{model_file} ({found.model}), running free on {listed}",
+        f"Check of {found.model}",
+        f"{model_file}, running free on {listed}",
         [verdict, *sections],
         [
-            Tile(one.output, f"{words.size(one.unit, one.rmse)}", "RMS residual", f"output-{k}")
+            Tile(
+                f"Residual of {one.output}",
+                words.size(one.unit, one.rmse),
+                f"RMS, {percent(one.rmse / one.span)} of its range" if one.span else "RMS",
+                f"output-{k}",
+            )
             for k, one in enumerate(found.outputs[:4])
         ],
+        answers=[("Is it right?", words.check_verdict(found, sized=False))],
     ).html()
 
 

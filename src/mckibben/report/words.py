@@ -362,9 +362,9 @@ def _spanning(limits: tuple[float, float], unit: str) -> str:
 # --- Residual check ---------------------------------------------------------------------------------
 
 
-def check_verdict(found: Validation) -> str:
+def check_verdict(found: Validation, *, sized: bool = True) -> str:
     """Return what the residual of every output follows first, in a sentence each."""
-    return " ".join(_residual(one) for one in found.outputs)
+    return " ".join(_residual(one, sized=sized) for one in found.outputs)
 
 
 def check_sentences(found: Validation) -> list[str]:

@@ -39,7 +39,7 @@ def measured(what: str, *words: str | Path) -> None:
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         process = subprocess.Popen(
-            [sys.executable, "-m", "mckibben.cli.entry", *map(str, words), "-o", folder],
+            [sys.executable, "-m", "mckibben", *map(str, words), "-o", folder],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             start_new_session=True,

@@ -30,7 +30,7 @@ def study(*words: str, cache: str | None = None) -> tuple[float, float]:
     environment = os.environ | ({} if cache is None else {"NUMBA_CACHE_DIR": cache})
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "report.html"
-        command = [sys.executable, "-m", "mckibben.cli.entry", "study", *EXAMPLES, *words]
+        command = [sys.executable, "-m", "mckibben", "study", *EXAMPLES, *words]
         started = time.perf_counter()
         process = subprocess.Popen(
             [*command, "-o", folder],

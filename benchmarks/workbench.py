@@ -122,7 +122,7 @@ def walk(page: Any, folder: Path) -> None:
 @contextmanager
 def starting(folder: Path) -> Iterator[subprocess.Popen[str]]:
     """Start the workbench over a folder; Python keeps what it has compiled, as it does by itself."""
-    command = [sys.executable, "-m", "mckibben.cli.main", "app", str(folder)]
+    command = [sys.executable, "-m", "mckibben", "app", str(folder)]
     own = {name: text for name, text in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     process = subprocess.Popen(
         [*command, "--port", "0", "--no-show"], stdout=subprocess.PIPE, text=True, env=own

@@ -184,7 +184,7 @@ def main() -> None:
             [
                 sys.executable,
                 "-m",
-                "mckibben.cli.main",
+                "mckibben",
                 "app",
                 f"{folder}/my_muscle",
                 "--port",

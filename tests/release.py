@@ -142,7 +142,7 @@ def try_alone(wheel: Path) -> str:
             raise ReleaseError(f"its environment takes {size:.0f} MB, of {ROOM}")
         started = time.perf_counter()
         for line in main_job():
-            run(str(python), "-m", "mckibben.cli.entry", *line, within=folder)
+            run(str(python), "-m", "mckibben", *line, within=folder)
         if not (folder / "study" / "report.html").is_file():
             raise ReleaseError("the README's main job wrote no report")
         took = time.perf_counter() - started

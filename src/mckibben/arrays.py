@@ -5,11 +5,33 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.errors import DataError
+
 Array = NDArray[np.float64]
 """Double-precision numbers, of any shape."""
 
 NARROWEST = 1e-30
 """Least range of a channel that can be computed with, in its unit: products of less would vanish."""
+
+
+def check_finite(
+    values: Array, remedy: str = "leave those samples out", channel: str | None = None
+) -> None:
+    """Refuse samples of which one is not finite, naming the first.
+
+    Raises
+    ------
+    DataError
+        If one is infinite or no number.
+    """
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise DataError(
+            f"the value is {values[bad[0]]}, and {bad.size} of {values.size} are not finite",
+            channel=channel,
+            row=int(bad[0]) + 1,
+            remedy=remedy,
+        )
 
 
 def true_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:

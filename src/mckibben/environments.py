@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -23,10 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.system.extras import demand
 
 demand("gymnasium", "gym", "environments")
+_require = partial(require, kind=DataError)
 
 import gymnasium  # noqa: E402
 
@@ -131,22 +133,24 @@ class Tracking(gymnasium.Env[Vector, Vector]):
                 control_time = max(0.02, chosen.sample_time)
             self._spreading = chosen if spread else None
         else:
-            _demand(not spread, "spread", spread, "0 with a plant, whose band scatters")
-            _demand(not load, "load", load, "0 with a plant, and held={'force': ...} to the plant")
+            _require(not spread, "spread", spread, "0 with a plant, whose band scatters")
+            _require(not load, "load", load, "0 with a plant, and held={'force': ...} to the plant")
             chosen = plant = _twin(plant)
             control_time = chosen.sample_time if control_time is None else control_time
-        _demand(0 < control_time <= 1, "control_time", control_time, "0 to 1 s")
-        _demand(2 * control_time <= duration <= 1e4, "duration", duration, "2 steps to 10000 s")
-        _demand(preview in range(1001), "preview", preview, "a whole number from 0 to 1000")
-        _demand(0 <= effort < np.inf, "effort", effort, "0 or more")
-        _demand(0 <= spread <= 0.5, "spread", spread, "0 to 0.5")
-        _demand(
+        _require(0 < control_time <= 1, "control_time", control_time, "0 to 1 s")
+        _require(2 * control_time <= duration <= 1e4, "duration", duration, "2 steps to 10000 s")
+        _require(preview in range(1001), "preview", preview, "a whole number from 0 to 1000")
+        _require(0 <= effort < np.inf, "effort", effort, "0 or more")
+        _require(0 <= spread <= 0.5, "spread", spread, "0 to 0.5")
+        _require(
             reference in ("random-wave", "irregular-triangle", "sine"),
             "reference",
             reference,
             "random-wave, irregular-triangle or sine",
         )
-        _demand(render_mode in (None, "rgb_array"), "render_mode", render_mode, "rgb_array or none")
+        _require(
+            render_mode in (None, "rgb_array"), "render_mode", render_mode, "rgb_array or none"
+        )
         changes = {**(settings or {}), "sample_time": control_time}
         self._plant: Rig | Twin = chosen.changed(changes)
         if self._spreading is not None:
@@ -169,7 +173,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         self._high = np.array([limit.high for limit in limits])
         if load:
             force = self._plant.limits("force") if "force" in self._plant.inputs else None
-            _demand(
+            _require(
                 force is not None and force.low <= load <= force.high,
                 "load",
                 load,
@@ -347,12 +351,9 @@ def _twin(plant: object) -> Twin:
             return Twin(plant)
         case str() | Path():
             return Twin(load(plant), name=Path(plant).stem)
-    raise DataError(f"plant is {plant!r}", remedy="give a model, its file, or a Twin")
-
-
-def _demand(holds: bool, name: str, value: object, wanted: str) -> None:
-    if not holds:
-        raise DataError(f"{name} is {value!r}", remedy=f"give {wanted}")
+    raise DataError(
+        f"it is {plant!r}", parameter="plant", remedy="give a model, its file, or a Twin"
+    )
 
 
 register()

@@ -9,6 +9,7 @@ in a remedy                 Python                   command line
 ```gaps```                  gaps                     --gaps
 ```gaps=split```            gaps='split'             --gaps split
 ```columns[force]=F```      columns={'force': 'F'}   --column force=F
+```settings[delay]=0```     settings={'delay': 0}    --set delay=0
 ```track()```               track()                  mckibben track
 =========================== ======================== =====================
 """
@@ -79,14 +80,16 @@ def python_parameter(name: str, key: str | None = None, value: str | None = None
 
     >>> python_parameter("gaps", None, "split"), python_parameter("columns", "force", "F1")
     ("gaps='split'", "columns={'force': 'F1'}")
+    >>> python_parameter("settings", "delay", "0"), python_parameter("settings", "ridge")
+    ("settings={'delay': 0}", "settings['ridge']")
     """
     if value is None:
-        return name
-    plain = value.isupper() or not re.fullmatch(r"[A-Za-z_][\w.-]*", value)
-    plain = plain or value in ("True", "False", "None")
-    if key is not None:
-        return f"{name}={{{key!r}: {value!r}}}"
-    return f"{name}={value if plain else repr(value)}"
+        return name if key is None else f"{name}[{key!r}]"
+    word = value.capitalize() if value in ("true", "false", "none") else value
+    plain = word.isupper() or not re.fullmatch(r"(?!True$|False$|None$)[A-Za-z_][\w.-]*", word)
+    if not plain or (key is not None and name != "settings"):  # of columns and units, all is text
+        word = repr(value)
+    return f"{name}={word}" if key is None else f"{name}={{{key!r}: {word}}}"
 
 
 def python_operation(name: str) -> str:
@@ -128,7 +131,8 @@ def rendered(
     place = f"{', '.join(where)}: " if where else ""
     remedy = in_terms_of(_short(error.remedy), parameter, operation)
     problem = in_terms_of(_short(error.problem), parameter, operation)
-    return f"{place}{problem}" + (f". Remedy: {remedy}." if remedy else "")
+    stop = "" if problem.endswith("?") else "."
+    return f"{place}{problem}" + (f"{stop} Remedy: {remedy}." if remedy else "")
 
 
 def _short(given: object, most: int = 1000) -> str:
@@ -182,6 +186,31 @@ class ModelWarning(UserWarning):
 
 class CacheWarning(UserWarning):
     """Compiled functions cannot be cached, or were damaged and are compiled again."""
+
+
+def require(
+    holds: bool,
+    parameter: str,
+    value: object,
+    wanted: str,
+    kind: Callable[..., MckibbenError] = ModelError,
+) -> None:
+    """Refuse the value of a parameter unless a condition holds.
+
+    Parameters
+    ----------
+    wanted : str
+        What may be given.
+
+    Examples
+    --------
+    >>> require(False, "delay", -1, "0 or more")
+    Traceback (most recent call last):
+    mckibben.errors.ModelError: delay: it is -1. Remedy: give 0 or more.
+    """
+    if not holds:
+        shown = f"{value:g}" if isinstance(value, float) else f"{value!r:.60}"
+        raise kind(f"it is {shown}", parameter=parameter, remedy=f"give {wanted}")
 
 
 def unforeseen(error: Exception) -> MckibbenError:

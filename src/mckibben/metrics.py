@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, check_finite
 from mckibben.errors import DataError
 
 
@@ -233,11 +233,5 @@ def _pair(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array]:
             remedy="give two rows of the same length, one value a sample",
         )
     for values in (a, b):
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
-            raise DataError(
-                f"the value is {values[bad[0]]}, and {bad.size} of {values.size} are not finite",
-                row=int(bad[0]) + 1,
-                remedy="leave those samples out",
-            )
+        check_finite(values)
     return a, b

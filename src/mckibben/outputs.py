@@ -277,7 +277,7 @@ def _finish(folder: Path) -> None:
         journal = json.loads(ordinary.read_text(place, most=ordinary.DESCRIPTION))
         files, removed = list(journal["files"]), dict(journal["removed"])
     except (ValueError, TypeError, KeyError):
-        remedy = "move it away, and look at the files in the folder `new` beside it"
+        remedy = "move it away, and look at the files in the folder 'new' beside it"
         raise DataError("the journal is damaged", file=place, remedy=remedy) from None
     for name, old in removed.items():
         path = _inside(folder, name)

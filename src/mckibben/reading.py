@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
+
 from mckibben import options
 from mckibben.errors import DataError
 from mckibben.options import Option
-from mckibben.recording import Recording, is_frame, listed
+from mckibben.recording import Recording, is_frame
+from mckibben.recording import listed as recordings_of
 
 if TYPE_CHECKING:
     from mckibben.diagnosis.data_gaps import Gap
@@ -128,37 +132,33 @@ class ReadOptions:
         return recordings
 
 
-def loaded(data: Data) -> list[Recording] | None:
-    """Return data that are recordings already, rather than files."""
-    if isinstance(data, Recording):
-        return [data]
-    if is_frame(data):
-        return listed(data)
-    if not isinstance(data, Sequence) or isinstance(data, str):
-        return None
-    return (
-        listed(data) if any(isinstance(one, Recording) or is_frame(one) for one in data) else None
-    )
-
-
-def files_of(data: Data) -> list[Path]:
-    """Return the files among data; none of recordings.
+def items(data: Any) -> list[Recording | Path]:
+    """Return data as a list of recordings and files; data frames are made recordings.
 
     Raises
     ------
     DataError
-        If data are neither.
+        If there is anything else.
     """
-    if isinstance(data, Recording | str | Path):
-        data = [data]
-    if not (
-        isinstance(data, Sequence) and all(isinstance(d, Recording | str | Path) for d in data)
-    ):
-        raise DataError(
-            f"these are no recordings: {type(data).__name__}",
-            remedy="give recordings, or files; Recording.from_frame makes one of a data frame",
-        )
-    return [Path(one) for one in data if not isinstance(one, Recording)]
+    single = is_frame(data) or isinstance(data, Recording | str | Path | np.ndarray)
+    listed = [data] if single or not isinstance(data, Iterable) else list(data)
+    found: list[Recording | Path] = []
+    for one in listed:
+        if isinstance(one, str | Path):
+            found.append(Path(one))
+        else:
+            found += recordings_of(one)
+    return found
+
+
+def files_of(data: Data) -> list[Path]:
+    """Return the files among data."""
+    return [one for one in items(data) if isinstance(one, Path)]
+
+
+def loaded(data: Data) -> list[Recording]:
+    """Return the recordings among data that are no files."""
+    return [one for one in items(data) if isinstance(one, Recording)]
 
 
 def read_files(
@@ -178,9 +178,8 @@ def read_files(
     from mckibben.files import read
 
     reading = reading or ReadOptions()
-    files_of(data)
     found: list[Recording] = []
-    for one in [data] if isinstance(data, Recording | str | Path) else data:
+    for one in items(data):
         if isinstance(one, Recording):
             found.append(one)
         else:
@@ -209,15 +208,22 @@ def read_sides(
 
     reading = reading or ReadOptions()
     named = [*(inputs or ()), *(outputs or ()), *([load] if load else ())]
-    found = [read_files(some, named, reading) for some in data]
+    with warnings.catch_warnings(record=True) as caught:
+        found = [read_files(some, named, reading) for some in data]
     if reading.rest_length is not None and not named:
         found = [[one.with_derived(["displacement"]) for one in some] for some in found]
     sides = channels_of([one for some in found for one in some], inputs, outputs, load)
     needed = [*sides.inputs, *sides.outputs]
-    for place, (some, runs) in enumerate(zip(data, found, strict=True)):
-        if any(name not in one for one in runs for name in needed):
-            found[place] = read_files(some, needed, reading)  # says what is wrong with it
+    if any(name not in one for runs in found for one in runs for name in needed):
+        return [read_files(some, needed, reading) for some in data]  # says what is wrong with it
+    _warn_again(caught)
     return found
+
+
+def _warn_again(caught: Iterable[warnings.WarningMessage]) -> None:
+    """Issue warnings that were held back until it was known that files are not read again."""
+    for one in caught:
+        warnings.warn(one.message, one.category, stacklevel=2)
 
 
 def read_pair(
@@ -237,7 +243,8 @@ def read_pair(
     from mckibben.comparison.channels import channels_of
 
     named = [name for name in (input, output, *others) if name]
-    recordings = read_files(data, named, reading)
+    with warnings.catch_warnings(record=True) as caught:
+        recordings = read_files(data, named, reading)
     usual = input or "pressure", output or "displacement"
     if not all(name in one for one in recordings for name in usual):
         found = channels_of(recordings, input, output, None)
@@ -250,6 +257,8 @@ def read_pair(
         usual = found.inputs[0], found.outputs[0]
     if not all(name in one for one in recordings for name in usual):
         recordings = read_files(data, [*usual, *others], reading)  # says what is wrong with it
+    else:
+        _warn_again(caught)
     return recordings, *usual
 
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, SupportsFloat, SupportsIndex
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mckibben.arrays import Array
+from mckibben.arrays import Array, check_finite
 from mckibben.errors import DataError
 from mckibben.system.extras import demand
 from mckibben.system.showing import DrawsItself
@@ -392,12 +392,33 @@ class Recording(DrawsItself):
         return same_grid and abs(self.start_time - float(other.time[-1]) - step) <= 0.1 * step
 
 
+def sample_time_of(
+    recording: Recording,
+    purpose: str,
+    remedy: str = "read it with a column of times, or give `rate`",
+) -> float:
+    """Return the sample time of a recording, which it cannot be used without.
+
+    Parameters
+    ----------
+    purpose : str
+        What it is needed for, after "cannot".
+
+    Raises
+    ------
+    DataError
+        If the recording has no time.
+    """
+    if recording.sample_time is None:
+        problem = f"a recording without time cannot {purpose}"
+        raise DataError(problem, file=recording.source, remedy=remedy)
+    return recording.sample_time
+
+
 def _frozen(name: str, samples: ArrayLike) -> Array:
     if isinstance(samples, np.ma.MaskedArray) and (masked := int(np.sum(samples.mask))):
         raise DataError(
-            f"{masked} sample(s) are masked",
-            channel=name,
-            remedy="cut them out, or fill them in",
+            f"{masked} sample(s) are masked", channel=name, remedy="cut them out, or fill them in"
         )
     try:
         given = np.asarray(samples)
@@ -412,14 +433,8 @@ def _frozen(name: str, samples: ArrayLike) -> Array:
         raise DataError(
             f"samples have shape {values.shape}", channel=name, remedy="give one value a sample"
         )
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise DataError(
-            f"the value is {values[bad[0]]}, and {bad.size} of {values.size} are not finite",
-            channel=name,
-            row=int(bad[0]) + 1,
-            remedy="cut those samples out, or read the file with `gaps=split` or `gaps=interpolate`",
-        )
+    remedy = "cut those samples out, or read the file with `gaps=split` or `gaps=interpolate`"
+    check_finite(values, remedy, name)
     values.flags.writeable = False
     return values
 
@@ -468,13 +483,13 @@ def listed(recordings: Any) -> list[Recording]:
         If something else is given, such as the name of a file.
     """
     given = recordings
-    several = isinstance(given, Iterable) and not isinstance(given, Recording | str)
+    several = isinstance(given, Iterable) and not isinstance(given, Recording | str | np.ndarray)
     found = list(given) if several and not is_frame(given) else [given]
     found = [Recording.from_frame(one) if is_frame(one) else one for one in found]
     for one in found:
         if not isinstance(one, Recording):
             raise DataError(
-                f"a recording is needed here, not {type(one).__name__} {str(one)[:60]!r}",
+                f"a recording is needed here, not {type(one).__name__} {str(one)[:40]!r}",
                 remedy="read the file with mckibben.read; make one of arrays by "
                 "mckibben.Recording({'pressure': u, 'displacement': y}, sample_time)",
             )

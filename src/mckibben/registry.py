@@ -184,7 +184,7 @@ REPLACED: dict[str, dict[str, str]] = {
     "blocks": {"force-balance": "balance", "force-balance-inverse": "balance"},
     "estimators": {"force-balance": "balance", "grey-box": "balance"},
 }
-"""Group -> name that is gone -> name of what does its work."""
+"""Group -> name that was removed -> name of what replaces it."""
 
 
 def names(group: str) -> tuple[str, ...]:
@@ -210,7 +210,9 @@ def load(group: str, name: str) -> Any:
         kind = group.removesuffix("s")
         successor = REPLACED.get(group, {}).get(name)
         if successor is not None:
-            raise ModelError(f"the {kind} {name!r} is gone", remedy=f"use {successor!r} instead")
+            raise ModelError(
+                f"the {kind} {name!r} was removed", remedy=f"use {successor!r} instead"
+            )
         raise ModelError(
             f"there is no {kind} named {name!r}",
             remedy=f"use one of {', '.join(sorted(locations))}",
@@ -221,7 +223,7 @@ def load(group: str, name: str) -> Any:
     except (ImportError, AttributeError, SyntaxError) as error:
         raise ModelError(
             f"{name!r} of the {group} cannot be imported: {error}",
-            remedy=f"mend {locations[name]}, or take it out of the registry",
+            remedy=f"correct {locations[name]}, or take it out of the registry",
         ) from error
     return Chosen(name, found) if isinstance(found, Preset) else found
 

@@ -269,9 +269,8 @@ def _compared(
     whole = chosen.models in ("all", "quick")
     names = list(registry.names("estimators") if whole else chosen.models)
     arguments["settings"] = settings_of_all(names, chosen.settings) if chosen.settings else {}
-    runs = loaded(train)
-    files = expanded(files_of(train), files_of(test))
-    sides: Sequence[Data] = files if runs is None else (runs, [], loaded(test) or [])
+    files, runs = expanded(files_of(train), files_of(test)), loaded(train)
+    sides: Sequence[Data] = (runs, [], loaded(test)) if runs else files
     logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
     with (
         results_in(out, written(names), inputs=_paths(train, *sides, logs), force=force) as results,

@@ -33,7 +33,7 @@ OPTIONS = [
 @contextmanager
 def workbench(folder: Path) -> Iterator[str]:
     """Start the workbench over a folder on a free port, and give its address."""
-    command = [sys.executable, "-m", "mckibben.cli.main", "app", str(folder)]
+    command = [sys.executable, "-m", "mckibben", "app", str(folder)]
     plain = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
     process = subprocess.Popen(
         [*command, "--port", "0", "--no-show"], stdout=subprocess.PIPE, text=True, env=plain

@@ -65,7 +65,7 @@ BAD = [
     ("plot run.csv -o out.bmp", "bmp"),
     # Models, settings and channels
     ("fit spline run.csv -o out.json", "'spline'"),
-    (f"{FIT} --set n_operators=many", "n_operators is 'many'"),
+    (f"{FIT} --set n_operators=many", "n_operators: it is 'many'"),
     (f"{FIT} --output temperature", "temperature"),
     (f"{FIT} --output pressure", "pressure"),
     (f"{FIT} --unit pressure", "--unit"),
@@ -108,7 +108,7 @@ BAD = [
     (f"{RIG} --signal sine:period=2 --inputs run.csv", "--inputs"),
     (f"{RIG} --signal wobble", "'wobble'"),
     (f"{RIG} --signal sine", "'period'"),
-    (f"{RIG} --signal sine:period=nan", "period is nan"),
+    (f"{RIG} --signal sine:period=nan", "sine:period: it is nan"),
     (f"{RIG} --signal sine:tempo=1", "'tempo'"),
     (f"{RIG} --signal pressure=sine:period=1", "'pressure'"),
     (f"{RIG} --signal sine:period=1 --set payload=-3", "payload is -3"),

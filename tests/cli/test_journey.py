@@ -145,8 +145,9 @@ def test_what_was_assumed_while_reading_reaches_every_result(
         (note,) = printed["notes"][str(file)]
         assert "pressure in bar, displacement in mm" in note
         assert f"{file}: {note}" in printed["leaderboard"]["notes"]
-        assert done.err.count(f"{file}: {note}") == 1
-        assert (tmp_path / "out" / "report.html").read_text().count(f"{file} was read: {note}") == 1
+        start = f"{file}: {note.partition('`')[0]}"
+        assert done.err.count(start) == 1
+        assert (tmp_path / "out" / "report.html").read_text().count(start) == 1
 
 
 def test_several_zeros_are_taken_out(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> None:

@@ -121,7 +121,7 @@ def test_runs_with_derivatives_are_those_of_the_block_and_exact(follow: Any, mod
 
 def test_what_cannot_be_learned_from_is_refused() -> None:
     noisy, _ = shaken("quick", periodic=True)
-    with pytest.raises(ModelError, match="initial is 'fitted'"):
+    with pytest.raises(ModelError, match="initial: it is 'fitted'"):
         OscillatorEstimator(initial="fitted").fit(noisy)  # type: ignore[arg-type]
     turned = [run.with_channels(displacement=-run["displacement"]) for run in noisy]
     with pytest.raises(DataError, match="displacement"):

@@ -117,7 +117,7 @@ REFUSED = {
     "pressure, displacement": Serving(),
     "displacement is 90": Serving(SERVING.limits, {"displacement": 90.0}),
     "'speed'": Serving({"speed": (0.0, 1.0)}),
-    "0.001 s": Serving(SERVING.limits, watchdog=0.001),
+    "watchdog: it is 0.001": Serving(SERVING.limits, watchdog=0.001),
     "pressure are 3 and 1": Serving({**SERVING.limits, "pressure": (3.0, 1.0)}),
 }
 

@@ -63,7 +63,7 @@ from mckibben.blocks.learning import (
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
-from mckibben.errors import ModelError
+from mckibben.errors import ModelError, require
 
 TRUSTED = 1 / 3
 """Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
@@ -283,20 +283,14 @@ class Adaptive(Block):
 
     def _check_settings(self) -> None:
         """Refuse a time and a noise that nothing is measured with."""
-        if not TIMES[0] <= self.time <= TIMES[1]:
-            raise ModelError(
-                f"{self.kind!r} cannot learn in a time of {self.time:g} s",
-                remedy=f"give {TIMES[0]:g} to {TIMES[1]:g} s",
-            )
+        shortest, longest = TIMES
+        wanted = f"{shortest:g} to {longest:g} s"
+        require(shortest <= self.time <= longest, "time", self.time, wanted)
         _, part, behind = learning_part(self.forward)
         width = width_of((part, *behind))
         low, high = (bound * width for bound in NOISES) if 0 < width < np.inf else NOISES
-        if not low <= self.noise <= high:
-            raise ModelError(
-                f"a noise of {self.noise:g} is none that {self.kind!r} is measured with",
-                remedy=f"give the standard deviation of what is measured, {low:.3g} to "
-                f"{high:.3g} in its unit",
-            )
+        wanted = f"the standard deviation of what is measured, {low:.3g} to {high:.3g} in its unit"
+        require(low <= self.noise <= high, "noise", self.noise, wanted)
 
     def _check_memory(self, state: Array) -> None:
         """Refuse a state, or what is learnt of one, that learning never comes to."""
@@ -617,14 +611,14 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
     """
     if isinstance(model, Adaptive):
         raise ModelError(
-            f"{model.title!r} learns already",
-            remedy="use it as it is, or adapt the model it undoes",
+            f"{model.title!r} adapts already",
+            remedy="use it as it is, or adapt the model that it inverts",
         )
     _, part, behind = learning_part(model)
     width = width_of((part, *behind))
     if noise is None and not 0 < width < np.inf:
         raise ModelError(
-            f"what {model.title!r} reaches does not tell how exactly it is measured",
-            remedy="give the noise",
+            f"the range of {model.title!r}, of which noise is a share by default, is unknown",
+            remedy="give `noise`",
         )
     return Adaptive(model, float(time), float(width / 1000 if noise is None else noise))

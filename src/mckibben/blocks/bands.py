@@ -24,7 +24,7 @@ from mckibben.blocks.kernels import Step, kernel, step
 from mckibben.blocks.notation import Notation
 from mckibben.blocks.parameters import same_as
 from mckibben.blocks.saving import nested
-from mckibben.errors import ModelError
+from mckibben.errors import ModelError, require
 from mckibben.numerals import numeral
 from mckibben.registry import load
 
@@ -159,8 +159,7 @@ def check_level(level: float, units: int, unit: str) -> None:
 
     A new one is as likely as each of them to be missed most, and nothing bounds by how much.
     """
-    if not 0.0 < level < 1.0:
-        raise ModelError(f"the level is {level:g}", remedy="give one above 0 and below 1, as 0.9")
+    require(0.0 < level < 1.0, "level", level, "one above 0 and below 1, as 0.9")
     if level > units / (units + 1) + 1e-12:
         most, needed = 100 * units / (units + 1), int(np.ceil(level / (1.0 - level) - 1e-9))
         raise ModelError(

@@ -341,7 +341,7 @@ class Block(DrawsItself, Parametrised):
         """
         raise ModelError(
             f"{self.kind!r} is not linear, so it has no transfer function",
-            remedy="hand over a linear model (oe, arx, armax, bj, p1 to p3)",
+            remedy="use a linear model (oe, arx, armax, bj, p1 to p3)",
         )
 
     def continuous(self) -> Polynomials | None:
@@ -483,15 +483,7 @@ class Block(DrawsItself, Parametrised):
         return sum(part.n_clipped(own) for part, own in self.shares(state))
 
     def _inputs_from(self, recording: Recording) -> Array:
-        for channel in self.inputs:
-            if channel.name in recording and recording.units[channel.name] != channel.unit:
-                raise DataError(
-                    f"the model wants this input in {channel.unit or 'no unit'}, "
-                    f"the recording has {recording.units[channel.name] or 'no unit'}",
-                    file=recording.source,
-                    channel=channel.name,
-                    remedy="convert the recording, or name its unit when reading it",
-                )
+        check_units(recording, self.inputs)
         return np.ascontiguousarray(recording.matrix(channel.name for channel in self.inputs))
 
     def _inputs_from_array(self, array: Array) -> Array:
@@ -535,11 +527,25 @@ def one_per(field: str, more: int = 0) -> Any:
     return property(size)
 
 
+def check_units(recording: Recording, channels: Sequence[Channel]) -> None:
+    """Refuse a recording in which a channel of a model is absent, or in another unit."""
+    for channel in channels:
+        recording[channel.name]  # refuses what is absent
+        if (unit := recording.units[channel.name]) != channel.unit:
+            raise DataError(
+                f"the model has it in {channel.unit or 'no unit'}, the recording in "
+                f"{unit or 'no unit'}",
+                file=recording.source,
+                channel=channel.name,
+                remedy=f"convert the recording, or read it with `units[{channel.name}]=UNIT`",
+            )
+
+
 def explicit_state(block: Block, initial: Initial) -> Array:
     """Return an explicit initial state after checking its length."""
     if isinstance(initial, str):
         raise ModelError(
-            f"{block.kind!r} knows no start {initial!r}",
+            f"{block.kind!r} has no start {initial!r}",
             remedy=f"give 'first_sample', 'virgin', or {block.n_states} numbers",
         )
     state = np.array(initial, dtype=np.float64)
@@ -562,7 +568,7 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
     if sample_time is None or not sample_time > 0:
         raise ModelError(
             f"{kind!r} depends on rate and needs a sample time, but the data have no time",
-            remedy="read the recording with a time column or `rate`, or give sample_time",
+            remedy="read the recording with a column of times or `rate`, or give `sample_time`",
         )
     return sample_time
 

@@ -85,7 +85,7 @@ class Invertible(Block):
             raise ModelError(
                 f"{self.kind!r} has no inverse: its output may fall while its input rises "
                 f"(least slope {steepness:.3g})",
-                remedy="identify it with nonnegative=true where it has that setting, or "
+                remedy="identify it with `settings[nonnegative]=true` where it has that setting, or "
                 "invert another model",
             )
 
@@ -112,7 +112,7 @@ class Invertible(Block):
         found = np.array([*state, *self.remembered(state), *([0.0] if self.counts_clipped else [])])
         if found.size != self.n_inverse_states:
             raise ModelError(
-                f"{len(state)} states of {self.kind!r} do not tell those of its inverse",
+                f"{len(state)} states of {self.kind!r} do not determine those of its inverse",
                 remedy=f"give {self.n_inverse_states}, or 'first_sample'",
             )
         return found

@@ -118,7 +118,7 @@ class Trial:
         if not holds:
             raise ContractError(
                 f"{self.block.kind!r} breaks the contract of blocks: {law}",
-                remedy="mend the block; docs/templates/README.md has a table of where to look",
+                remedy="correct the block; docs/templates/README.md has a table of where to look",
             )
 
     def same(self, outputs: Array, references: Array, law: str) -> None:

@@ -85,7 +85,7 @@ def model_state(compensator: Block, state: Array) -> Array:
         return state.copy()
     raise ModelError(
         f"{compensator.title!r} is no exact inverse whose memory could be foreseen",
-        remedy="invert a model such as pi, gpi, mpi or balance (mckibben invert), and give that",
+        remedy="invert a model such as pi, gpi, mpi or balance with `invert()`, and give that",
     )
 
 

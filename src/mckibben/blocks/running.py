@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.fields import Initial
-from mckibben.errors import DataError, ModelError
+from mckibben.errors import DataError, require
 from mckibben.system.threads import cores
 
 if TYPE_CHECKING:
@@ -116,10 +116,8 @@ class Stream:
 
 def refuse_time(sample_time: float | None) -> None:
     """Refuse what cannot be the time between two samples: no finite number of seconds above 0."""
-    if sample_time is not None and not (isfinite(sample_time) and sample_time > 0):
-        raise ModelError(
-            f"the time between samples cannot be {sample_time:g} s", remedy="give seconds, above 0"
-        )
+    possible = sample_time is None or (isfinite(sample_time) and sample_time > 0)
+    require(possible, "sample_time", sample_time, "a positive time [s]")
 
 
 def _scalars(array: Array) -> memoryview[float]:

@@ -38,7 +38,7 @@ def from_dict(content: Mapping[str, Any]) -> Block:
     if not isinstance(content, Mapping) or content.get("format") != FORMAT:
         raise ModelError(
             f'this is not a saved model (no "format": "{FORMAT}")',
-            remedy="give a file written by 'mckibben fit' or Block.save",
+            remedy="give a file that `fit()` or Block.save wrote",
         )
     version = content.get("version")
     if type(version) is not int or version != VERSION:
@@ -78,7 +78,7 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
     if unknown:
         again = getattr(cls, "made_again", "save the model again")
-        raise ModelError(f"{kind!r} has no field {unknown[0]!r}", remedy=f"{again}")
+        raise ModelError(f"{kind!r} has no field {unknown[0]!r}", remedy=again)
     return cls(**values)
 
 

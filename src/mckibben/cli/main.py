@@ -109,7 +109,7 @@ def _run() -> int:
         finish()
         return code or 0
     except click.UsageError as error:
-        click.UsageError(visible(error.message), error.ctx).show()
+        click.UsageError(visible(error.format_message()), error.ctx).show()
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
         return _say("Interrupted.", INTERRUPTED)

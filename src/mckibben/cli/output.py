@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from mckibben.cli.parameters import plainly
-from mckibben.errors import MckibbenError
+from mckibben.cli.parameters import as_command, as_flag, plainly
+from mckibben.errors import MckibbenError, in_terms_of
 from mckibben.system.atomic import to_json
 
 _UNSEEN = re.compile(
@@ -82,7 +82,7 @@ def show(
         say(to_json(result.to_dict() if hasattr(result, "to_dict") else result))
         return
     for line in lines():
-        say(line)
+        say(in_terms_of(line, as_flag, as_command))
     for note in notes:
         say(f"Note: {plainly(note)}")
     if paths := [str(path) for path in written if path is not None]:

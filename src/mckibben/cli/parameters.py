@@ -58,7 +58,7 @@ class Command(click.Command):
 
 def as_flag(name: str, key: str | None = None, value: str | None = None) -> str:
     """Return a parameter in an error as a flag of the command that runs, or as Python has it."""
-    flag = _flags.get(name)
+    flag = _flags.get(name) or _flags.get(f"{name}s")
     if flag is None:
         return python_parameter(name, key, value)
     word = value if key is None else f"{key}={value or 'VALUE'}"
@@ -153,9 +153,9 @@ def made(name: str, hint: Any, default: Any) -> click.Parameter:
         required=required,
         multiple=several or mapping,
         nargs=width if about.parse is None else 1,
-        default=default if _is_plain(default, about) else None,
         show_default=_is_plain(default, about),
         callback=_parsed(name, about, mapping, several, default),
+        **({"default": default} if _is_plain(default, about) else {}),
     )
 
 

@@ -117,7 +117,10 @@ def identify(
         tried.append((one, float(np.mean(errors)), reason))
     best, lowest, reason = min(tried, key=lambda item: item[1])
     if not np.isfinite(lowest):
-        raise ModelError(f"every order of {family!r} failed: {reason}")
+        raise ModelError(
+            f"every order of {family!r} failed: {reason}",
+            remedy="give other orders, or other recordings",
+        )
     fitted: Estimator = estimator_class(**settings, **best).fit(runs)
     return Identified(fitted, best, tuple(tried))
 

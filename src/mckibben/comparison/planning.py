@@ -17,7 +17,7 @@ from mckibben.comparison.fitting import Constant, Data, Item, constant_of
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.comparison.splits import Split, split_of, validation_folds
-from mckibben.errors import DataError, ModelError
+from mckibben.errors import DataError, ModelError, require
 from mckibben.estimators.catalogue import declared, default_model
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.numerals import counted
@@ -73,18 +73,18 @@ def plan_of(
     outputs: Names = None,
     load: str | None = None,
     validation: Sequence[Recording] = (),
-    models: str | Sequence[str],
-    settings: Settings | None,
+    models: str | Sequence[str] = "all",
+    settings: Settings | None = None,
     n_folds: int = N_FOLDS,
-    seed: int,
+    seed: int = 0,
     most_samples: int | None = None,
     allow_shared: bool = False,
     allow_early: bool = False,
 ) -> Plan:
     """Return what a comparison is to do; see `compare`."""
     recordings, tests, checks = listed(train), listed(test), listed(validation)
-    if not isinstance(n_folds, int) or n_folds < 0:
-        raise ModelError(f"there cannot be {n_folds!r:.60} folds", remedy="give 0, 1, 2 or more")
+    whole = isinstance(n_folds, int) and n_folds >= 0
+    require(whole, "n_folds", n_folds, "0, 1, 2 or more")
     if not recordings:
         raise DataError("there are no recordings to fit", remedy="give at least one")
     every = [*recordings, *tests, *checks]
@@ -123,8 +123,9 @@ def plan_of(
     named = {*given, *(registry.names("estimators") if models in ("all", "quick") else ())}
     if lost := sorted({*(settings or {})} - named):
         raise ModelError(
-            f"settings are given for {', '.join(lost)}, and no such model is compared",
-            remedy="add it to the models, or leave its settings out",
+            f"no model is compared that is named {', '.join(lost)}",
+            parameter="settings",
+            remedy="add it to `models`, or leave its settings out",
         )
     # that a model is not given the load is no reason against it
     refused = objections(objections(names, split.train, channels), split.train, unloaded)
@@ -181,7 +182,7 @@ def _checked(some: Sequence[Sequence[Recording]], channels: Channels) -> str:
     if len(set(units.values())) > 1:
         raise DataError(
             f"the outputs have different units: {units}, so that their errors have no mean",
-            remedy="compare models of each apart, with `output`",
+            remedy="compare models of each separately, with `output`",
         )
     return next(iter(units.values()))
 

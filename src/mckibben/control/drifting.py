@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.control.roles import Plant, rest_length_of
-from mckibben.errors import ModelError
+from mckibben.errors import require
 
 GROUPS = ("stiffness", "friction", "gain")
 """What drifts: rubber, friction, and the calibration of pressure, commanded and measured alike."""
@@ -52,14 +52,10 @@ class Drift:
     over: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.group not in GROUPS:
-            raise ModelError(f"there is no group {self.group!r}", remedy=f"{', '.join(GROUPS)}")
-        if not 0.1 <= self.factor <= 10.0:
-            raise ModelError(f"a factor of {self.factor:g} is no drift", remedy="give 0.1 to 10")
-        if not (0.0 <= self.start < np.inf and 0.0 <= self.over < np.inf):
-            raise ModelError(
-                f"a drift from {self.start:g} s over {self.over:g} s", remedy="give times from 0 up"
-            )
+        require(self.group in GROUPS, "group", self.group, f"one of {', '.join(GROUPS)}")
+        require(0.1 <= self.factor <= 10.0, "factor", self.factor, "0.1 to 10")
+        for name, time in (("start", self.start), ("over", self.over)):
+            require(0.0 <= time < np.inf, name, time, "0 s or more")
 
     def at(self, time: float) -> float:
         """Return the factor at a time [s], in parts of `PART`."""

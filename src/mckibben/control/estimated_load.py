@@ -10,7 +10,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.control.connecting import Offer
 from mckibben.control.controller import Ahead, Controller
-from mckibben.errors import ModelError
+from mckibben.errors import require
 
 
 @dataclass
@@ -32,10 +32,7 @@ class EstimatedLoad(Controller):
     filter_time: float = 0.3
 
     def __post_init__(self) -> None:
-        if not self.filter_time > 0:
-            raise ModelError(
-                f"filter_time is {self.filter_time}", remedy="give a positive time in seconds"
-            )
+        require(self.filter_time > 0, "filter_time", self.filter_time, "a positive time [s]")
         inner = self.controller
         self.preview, self.forward_model = inner.preview, inner.forward_model
         self.samples_ahead = inner.samples_ahead

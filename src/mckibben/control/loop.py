@@ -19,8 +19,8 @@ from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
 from mckibben.control.roles import Plant, asked, offered, resting, roles
 from mckibben.control.twin import Twin
-from mckibben.errors import DataError, ModelError
-from mckibben.recording import Recording
+from mckibben.errors import ModelError, require
+from mckibben.recording import Recording, sample_time_of
 from mckibben.signals.checking import generator
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
@@ -154,11 +154,7 @@ def track(
     ModelError
         On settings out of range.
     """
-    step = reference.sample_time
-    if step is None:
-        raise DataError(
-            "the reference has no time", file=reference.source, remedy="add a time column or `rate`"
-        )
+    step = sample_time_of(reference, "be a reference")
     _check(approach, settle, noise, delay, slew, step)
     reference = asked(plant, reference, controller if isinstance(controller, Block) else None)
     if isinstance(controller, Block):
@@ -276,10 +272,8 @@ def _check(
         "delay": (delay, MOST_DELAY, "steps"),
     }
     for name, (value, most, unit) in ranges.items():
-        if not 0 <= value <= most:
-            raise ModelError(f"{name} is {value}", remedy=f"give 0 to {most:g} {unit}")
-    if slew is not None and not 0 < slew < np.inf:
-        raise ModelError(f"slew is {slew}", remedy="give a positive number, in bar/s")
+        require(0 <= value <= most, name, value, f"0 to {most:g} {unit}")
+    require(slew is None or 0 < slew < np.inf, "slew", slew, "a positive number, in bar/s")
 
 
 def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:

@@ -16,7 +16,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.control.connecting import Offer
 from mckibben.control.controller import Ahead, Controller
-from mckibben.errors import ModelError
+from mckibben.errors import require
 
 
 @dataclass
@@ -35,10 +35,7 @@ class DisturbanceObserver(Controller):
     filter_time: float = 0.3
 
     def __post_init__(self) -> None:
-        if not self.filter_time > 0:
-            raise ModelError(
-                f"filter_time is {self.filter_time}", remedy="give a positive time in seconds"
-            )
+        require(self.filter_time > 0, "filter_time", self.filter_time, "a positive time [s]")
         self._model = self.compensator.inverse()
         self.forward_model = self._model
         self.preview = self._model.dead_time

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.blocks.base import Block
-from mckibben.errors import DataError, ModelError
-from mckibben.recording import Recording
+from mckibben.errors import require
+from mckibben.recording import Recording, sample_time_of
 
 MOST_PREVIEW = 1e4
 """Seconds."""
@@ -35,8 +35,7 @@ def dead_time_undone(compensator: Block) -> float:
 
 def samples_ahead(preview: float, sample_time: float) -> int:
     """Return a preview in whole samples, rounded, or refuse one that is out of range."""
-    if not 0 <= preview <= MOST_PREVIEW:
-        raise ModelError(f"preview is {preview}", remedy=f"give 0 to {MOST_PREVIEW:g} s")
+    require(0 <= preview <= MOST_PREVIEW, "preview", preview, f"0 to {MOST_PREVIEW:g} s")
     return round(preview / sample_time)
 
 
@@ -57,11 +56,7 @@ def previewed(reference: Recording, preview: float) -> Recording:
     ModelError
         Where the preview is out of range.
     """
-    if reference.sample_time is None:
-        raise DataError(
-            "the reference has no time", file=reference.source, remedy="add a time column or `rate`"
-        )
-    ahead = samples_ahead(preview, reference.sample_time)
+    ahead = samples_ahead(preview, sample_time_of(reference, "be a reference"))
     n = len(reference)
     places = np.minimum(np.arange(n) + ahead, n - 1)
     return reference.with_channels(**{name: reference[name][places] for name in reference.channels})

@@ -170,7 +170,7 @@ class Twin:
         """
         if name not in self._limits:
             raise ModelError(
-                f"{self.forward.title!r} does not say how far its {name} may go",
+                f"{self.forward.title!r} has no limits of {name}",
                 remedy=f"give `limits[{name}]=LOW:HIGH`, or calibrate it",
             )
         return self._limits[name]
@@ -293,7 +293,7 @@ class Twin:
             return self.held[name]
         if name not in self.driving:
             raise DataError(
-                "the plant's model needs it, and nothing says what it is",
+                "the plant's model needs it, and it is not given",
                 channel=name,
                 remedy="add the column to the reference, or say at what it is held",
             )

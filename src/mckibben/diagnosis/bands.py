@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands import Band, Banded, inside
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, check_units
 from mckibben.blocks.fields import rows, vector
 from mckibben.blocks.free_run import refuse_runaway, run_free
 from mckibben.blocks.inverse import commands
@@ -196,16 +196,7 @@ def calibration(
             remedy="resample all to one (`resample`)",
         )
     for recording in recordings:
-        for channel in model.outputs:
-            recording[channel.name]  # which says what is absent
-            if recording.units[channel.name] != channel.unit:
-                raise DataError(
-                    f"the model gives {channel.unit or 'no unit'}, the recording has "
-                    f"{recording.units[channel.name] or 'no unit'}",
-                    file=recording.source,
-                    channel=channel.name,
-                    remedy="convert the recording, or name its unit when reading it",
-                )
+        check_units(recording, model.outputs)
     inputs, outputs = ([c.name for c in channels] for channels in (model.inputs, model.outputs))
     check_shared({"fit": fitted, "calibrate": recordings}, inputs, outputs)
     held = [held_of(model, one) for one in one_by_one(recordings, tell)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, check_units
 from mckibben.blocks.free_run import PERIODIC, measured_start, refuse_runaway, run_free
 from mckibben.comparison.shared_rows import check_shared
 from mckibben.errors import DataError
@@ -85,7 +85,7 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
     total, source = sum(map(len, recordings)), recordings[0].source
     if total < FEWEST:
         raise DataError(
-            f"{total} samples are too few to tell a wrong model from noise",
+            f"{total} samples are too few to distinguish a wrong model from noise",
             file=source,
             remedy=f"record at least {FEWEST}, better ten cycles with 50 or more each",
         )
@@ -94,7 +94,7 @@ def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
     still += [c.name for c in block.outputs if _constant(recordings, c.name)]
     if still:
         raise DataError(
-            "the channel is constant, so that nothing tells what the model does when it moves",
+            "the channel is constant, which does not test the model",
             file=source,
             channel=still[0],
             remedy="record while it moves, or name another column with `columns[CHANNEL]=COLUMN`",
@@ -128,16 +128,7 @@ def _modelled(
 
 
 def _refuse(recording: Recording, block: Block, step: float | None) -> None:
-    channels = (*block.inputs, *block.outputs)
-    units = recording.select([channel.name for channel in channels]).units
-    for channel in channels:
-        if (unit := units[channel.name]) != channel.unit:
-            raise DataError(
-                f"the model wants {channel.unit or 'no unit'}, the recording has {unit or 'no unit'}",
-                file=recording.source,
-                channel=channel.name,
-                remedy="convert the recording, or name its unit when reading it",
-            )
+    check_units(recording, (*block.inputs, *block.outputs))
     if len(recording) < SHORTEST:
         raise DataError(
             f"{len(recording)} samples are too few: what a residual remembers is longer",

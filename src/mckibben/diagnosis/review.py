@@ -24,7 +24,7 @@ from mckibben.comparison.shared_rows import check_shared
 from mckibben.control.twin import COMMAND
 from mckibben.diagnosis.refit import Refit, refitted
 from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.recording import Recording, listed
+from mckibben.recording import Recording, listed, sample_time_of
 from mckibben.statistics import NORMAL_95, block_length, correlation_length
 from mckibben.system.showing import DrawsItself
 
@@ -200,7 +200,7 @@ def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block |
         model = compensator.forward_model
     if model is None:
         raise ModelError(
-            "it is not known which model was in the loop", remedy="give the model too, with `model`"
+            "it is not known which model was in the loop", remedy="give it with `model`"
         )
     model = inside(model)
     if compensator is None:
@@ -228,8 +228,7 @@ def _check(logs: Sequence[Recording], model: Block, inputs: Sequence[str], follo
             remedy=f"map its column, as in `columns[{name}]=COLUMN`",
         )
     for log in logs:
-        if log.sample_time is None:
-            raise DataError("the log has no time", file=log.source, remedy="add a time column")
+        sample_time_of(log, "be the log of a loop")
         for name in [channel.name for channel in (*model.inputs, *model.outputs)]:
             if name not in inputs or COMMAND + name not in log:
                 log[name]  # which says what is absent

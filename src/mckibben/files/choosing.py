@@ -107,7 +107,7 @@ def assign(source: Source) -> tuple[dict[str, Column], dict[str, str]]:
             first = named[channel].header
             raise source.error(
                 f"columns {first!r} and {column.header!r} both hold it",
-                f"name one, with `columns[{channel}]={first!r}`; the columns of a file need different "
+                f"name one, with `columns[{channel}]={first}`; the columns of a file need different "
                 "headers",
                 channel,
             )
@@ -264,7 +264,7 @@ def _require(named: Mapping[str, Column], source: Source) -> None:
         for channel in given:
             if channel not in named:
                 problem = f"it is not there; there are {', '.join(named)}"
-                raise source.error(problem, f"give {option} for one of them", channel)
+                raise source.error(problem, f"give `{option}` of one of them", channel)
 
 
 def _headers(table: Table) -> str:

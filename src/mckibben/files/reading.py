@@ -206,7 +206,7 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
     if times is not None:
         times = replace(times, values=timebase.checked(times.values, source))
     elif step is None and (columns := matrix_hint(table, time=True)):
-        source.warn(f"no column of times is named; use --column time=COLUMN{columns}")
+        source.warn(f"no column of times is named; use `columns[time]=COLUMN`{columns}")
     pieces = gaps_in.pieces(channels, times, step, start, source)
     if request.informative:
         _refuse_constant(pieces, source)
@@ -247,7 +247,7 @@ def _stated_step(times: Times | None, source: Source) -> float | None:
     else:
         return step if table.sample_time is None else table.sample_time
     problem = f"{problem}, which is not the {1 / step:g} a second asked for"
-    raise source.error(problem, "leave --rate out, or delete the column of times", "time")
+    raise source.error(problem, "leave `rate` out, or delete the column of times", "time")
 
 
 def _refuse_constant(pieces: Sequence[gaps_in.Piece], source: Source) -> None:
@@ -255,5 +255,7 @@ def _refuse_constant(pieces: Sequence[gaps_in.Piece], source: Source) -> None:
         samples = np.concatenate([piece.samples[name] for piece in pieces])
         held = name.partition("_")[0] in MAY_BE_HELD or name in source.request.constants
         if not held and np.ptp(samples) == 0:
-            remedy = f"give a recording in which it changes, or --column {name}=COLUMN"
+            remedy = (
+                f"give a recording in which it changes, or another column, `columns[{name}]=COLUMN`"
+            )
             raise source.error(f"it is constant, at {samples[0]:g}", remedy, name)

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Literal, get_args
 
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.files.channels import NAME, Channel, Described, Time
 from mckibben.files.formats import MOST_BYTES
 from mckibben.files.headers import parse, snake_case
@@ -95,15 +95,12 @@ class Request:
     def check(self, path: Path) -> None:
         """Refuse options that are impossible for any file."""
         error = partial(DataError, file=path)
-        if self.gaps not in get_args(Gaps):
-            problem = f"there is no way {self.gaps!r} to treat gaps"
-            raise error(problem, remedy=f"use one of {', '.join(get_args(Gaps))}")
-        if self.rate is not None and not 0 < self.rate < math.inf:
-            problem = f"a rate of {self.rate:g} samples per second is impossible"
-            raise error(problem, remedy="give a positive number with `rate`")
-        if self.rest_length is not None and not 0 < self.rest_length <= LONGEST:
-            problem = f"a rest length of {self.rest_length:g} mm is impossible"
-            raise error(problem, remedy="give a positive number of millimetres with `rest_length`")
+        ways = get_args(Gaps)
+        require(self.gaps in ways, "gaps", self.gaps, f"one of {', '.join(ways)}", error)
+        possible = self.rate is None or 0 < self.rate < math.inf
+        require(possible, "rate", self.rate, "a positive number of samples a second", error)
+        possible = self.rest_length is None or 0 < self.rest_length <= LONGEST
+        require(possible, "rest_length", self.rest_length, f"a length up to {LONGEST:g} mm", error)
         for channel, (value, _) in self.constants.items():
             if not math.isfinite(value) or channel in ("", "time", *self.columns):
                 remedy = "give a finite number, to a channel that is no column and not time"

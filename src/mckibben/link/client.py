@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.link.device import (
     Counts,
     Device,
@@ -175,8 +175,7 @@ class Link:
 
     def stream(self, every: int) -> None:
         """Have the device tell every so many of its steps by itself, or none with 0; see `samples`."""
-        if not 0 <= every <= 0xFFFF:
-            raise DataError(f"every {every} steps", remedy="give 0 to 65535")
+        require(0 <= every <= 0xFFFF, "every", every, "0 to 65535", DataError)
         self._lead(Kind.STREAM, struct.pack("<H", every))
         self._every = every
 
@@ -262,11 +261,8 @@ class Link:
         ticks = device.silence
         if self._watchdog is not None:
             ticks = round(self._watchdog / device.period)
-            if not 1 <= ticks <= device.silence:
-                raise DataError(
-                    f"a watchdog of {self._watchdog:g} s",
-                    remedy=f"give {device.period:g} to {device.period * device.silence:g} s",
-                )
+            wanted = f"{device.period:g} to {device.period * device.silence:g} s"
+            require(1 <= ticks <= device.silence, "watchdog", self._watchdog, wanted, DataError)
         body = bytes.fromhex(device.fingerprint) + struct.pack("<BI", self._lock_step, ticks)
         self._session = (
             self._exchange.session + 1

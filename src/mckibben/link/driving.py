@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.errors import DataError, DataWarning
+from mckibben.errors import DataError, DataWarning, require
 from mckibben.link.client import Link
 from mckibben.link.device import Device, State
 from mckibben.recording import Recording
@@ -116,11 +116,8 @@ def drive(line: Link, settings: Mapping[str, float], seconds: float, every: int)
     DataError
         On unknown inputs, or values or times that are out of range.
     """
-    if not 0 < seconds <= LONGEST:
-        remedy = f"give a time up to {LONGEST:g} s"
-        raise DataError(f"{seconds:g} s is impossible", parameter="seconds", remedy=remedy)
-    if not 0 <= every <= 0xFFFF:
-        raise DataError(f"{every} is impossible", parameter="every", remedy="give 1 to 65535")
+    require(0 < seconds <= LONGEST, "seconds", seconds, f"a time up to {LONGEST:g} s", DataError)
+    require(0 <= every <= 0xFFFF, "every", every, "0 to 65535", DataError)
     before = line.state()
     if not settings:
         return Driven(line.device, before)

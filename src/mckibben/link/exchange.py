@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.link.device import ANSWER, Kind, Status, unfit
 from mckibben.link.framing import Frame, Reader
 from mckibben.link.ports import ByteStream
@@ -72,11 +72,8 @@ class Exchange:
     def __init__(
         self, stream: ByteStream, *, timeout: float, patience: float, clock: Callable[[], float]
     ) -> None:
-        if not 0 < timeout <= patience:
-            raise DataError(
-                f"a timeout of {timeout:g} s and a patience of {patience:g} s",
-                remedy="give positive times, the patience no shorter",
-            )
+        wanted = f"a positive time up to the patience, {patience:g} s"
+        require(0 < timeout <= patience, "timeout", timeout, wanted, DataError)
         self.stream, self.clock = stream, clock
         self._timeout, self._patience = timeout, patience
         self._reader = Reader()

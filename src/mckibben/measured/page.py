@@ -16,7 +16,7 @@ from mckibben.measured.running import Outcome, outcomes
 from mckibben.measured.sets import sets_in
 from mckibben.numerals import numeral
 from mckibben.report import words
-from mckibben.report.builder import Code, Page, Section, Table, Text
+from mckibben.report.builder import Code, Item, Page, Section, Table, Text
 from mckibben.report.columns import columns_of_board
 
 SHOWN = 8
@@ -51,18 +51,18 @@ def page(outcomes: Sequence[Outcome], command: str) -> Page:
         choices = Table(CHOICE, [_choice(one) for one in compared])
         sections.append(Section("choice", "How good the choice is", [choices]))
     if done := [one for one in compared if not one.left_out]:
-        items = [Text([OVERVIEW]), _matrix(done, [one.heading for one in done])]
+        items: list[Item | None] = [Text([OVERVIEW]), _matrix(done, [one.heading for one in done])]
         sections.append(Section("all", "All models on all sets", items))
     for place, name in enumerate(dict.fromkeys(one.set.name for one in outcomes)):
         own = [one for one in outcomes if one.set.name == name]
         about = own[0].set.split.about
-        items = [Text([about])] if about.strip() else []
+        own_items: list[Item | None] = [Text([about])] if about.strip() else []
         for one in own:
             if not one.left_out:
-                items += _section(one)
+                own_items += _section(one)
         for task in dict.fromkeys(one.task.name for one in own if one.left_out):
-            items += _in_turn([one for one in own if one.left_out and one.task.name == task])
-        sections.append(Section(f"set-{place}", own[0].set.title, items))
+            own_items += _in_turn([one for one in own if one.left_out and one.task.name == task])
+        sections.append(Section(f"set-{place}", own[0].set.title, own_items))
     sections.append(Section("method", "How to repeat", [Code("", command)]))
     return Page("Every model on recordings", ABOUT, sections)
 

@@ -163,7 +163,7 @@ def _load(path: Path) -> Muscle:
         raise DataError(
             f'it is no identified muscle (format = "{FORMAT}", version = {VERSION})',
             file=path,
-            remedy="give a muscle's file, or a name that mckibben muscles list tells",
+            remedy=f"give a muscle's file, or one of {', '.join(names())}",
         )
     try:
         found = _File.model_validate(content)

@@ -132,7 +132,7 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
     muscle its own traits are likely, and far from all their mean, with the spread of all.
     """
     if not muscles:
-        raise DataError("there are no muscles to tell of others", remedy="leave fewer out")
+        raise DataError("there are no muscles to derive a prior from", remedy="leave fewer out")
     muscles = sorted(muscles, key=lambda muscle: muscle.name)
     table = np.array([muscle.traits for muscle in muscles])
     told = np.isfinite(table)

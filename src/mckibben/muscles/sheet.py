@@ -121,5 +121,5 @@ def refused(error: ValidationError, file: str | Path | None, what: str) -> DataE
     return DataError(
         f"{place}: {said}" if place else said,
         file=file,
-        remedy=f"give {what}: see mckibben muscles show",
+        remedy=f"give {what}, as the files of the library have it",
     )

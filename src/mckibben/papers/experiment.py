@@ -392,7 +392,7 @@ def reproduce(
     Parameters
     ----------
     name : str
-        As ``mckibben reproduce --list`` lists it.
+        Of `mckibben.registry.names` ("papers").
     rig : Rig or str, optional
         That is recorded, and on which loops are closed; default the protocol's, with ``data`` none.
     data : sequence of Recording, optional

@@ -22,7 +22,7 @@ from mckibben.blocks.equations import quantities
 from mckibben.blocks.running import run_many
 from mckibben.diagnosis.data_gaps import Gap, excitation, gaps_of
 from mckibben.diagnosis.excitation import Excitation
-from mckibben.errors import DataError, MckibbenError, ModelError
+from mckibben.errors import DataError, MckibbenError, ModelError, require
 from mckibben.estimators.catalogue import default_model
 from mckibben.estimators.core.uncertainty import (
     LARGEST,
@@ -46,7 +46,7 @@ from mckibben.planning.limits import (
     narrowed,
 )
 from mckibben.planning.motion import motion
-from mckibben.recording import Recording, listed
+from mckibben.recording import Recording, listed, sample_time_of
 from mckibben.rigs import Rig, load_rig
 from mckibben.signals.checking import generator
 from mckibben.statistics import Autoregression
@@ -166,8 +166,8 @@ def plan(
         )
     if muscle is not None and model is not None:
         raise DataError("a muscle is a model itself", remedy="leave `model` out")
-    if not 0 < minutes <= MOST_MINUTES:
-        raise DataError(f"{minutes:g} minutes are impossible", remedy="give `minutes=3`, up to 60")
+    possible = 0 < minutes <= MOST_MINUTES
+    require(possible, "minutes", minutes, f"3, or up to {MOST_MINUTES:g}", DataError)
     generator(seed)  # refuses what is no seed
     plant = rig if isinstance(rig, Rig) or rig is None else load_rig(rig)
     block = inside(model) if isinstance(model, Block) else None
@@ -225,12 +225,7 @@ def _known(recordings: list[Recording], rig: Rig | None, block: Block | None) ->
     needed = [*(rig.inputs if rig is not None else ())]
     needed += [one.name for one in (*block.inputs, *block.outputs)] if block is not None else []
     for recording in recordings:
-        if recording.sample_time is None:
-            raise DataError(
-                "the recording has no time, and a plan says how fast to go",
-                file=recording.source,
-                remedy="read it with a time column or `rate`",
-            )
+        sample_time_of(recording, "be planned from")
         if lacking := [name for name in needed if name not in recording]:
             raise DataError(
                 f"the recording lacks {', '.join(lacking)}, which the rig or the model has",

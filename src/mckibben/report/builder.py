@@ -17,6 +17,7 @@ from importlib import resources
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from mckibben.errors import in_terms_of
 from mckibben.numerals import number, percent, typeset, typeset_within
 from mckibben.report import interactive
 from mckibben.report.mathematics import mathml
@@ -253,7 +254,7 @@ def _environment() -> Environment:
         "number": number,
         "percent": percent,
         "typeset": typeset,
-        "typeset_within": typeset_within,
+        "typeset_within": lambda text: typeset_within(in_terms_of(str(text))),
         "mathml": mathml,
     }
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}

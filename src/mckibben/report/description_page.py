@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.description import ModelDescription
     from mckibben.diagnosis.responses import FrequencyResponse
 
+UNFOLDED = 30
+"""Parameters that are shown without being asked for."""
+
 
 def model_items(found: ModelDescription) -> list[Item]:
     """Return the parts of a page that describe a model."""
@@ -34,6 +37,7 @@ def model_items(found: ModelDescription) -> list[Item]:
             ["Parameter", "Symbol", "Value", "Standard error", "Unit"],
             rows,
             titles=[one.meaning for one in found.parameters],
+            summary=f"{len(rows)} parameters" if len(rows) > UNFOLDED else "",
         ),
     ]
     for one in found.frequency_responses:

@@ -113,7 +113,7 @@ class _View:
 def tiles(study: Study) -> tuple[Tile, ...]:
     """Return the numbers of the first screen: loop, model, inverse, data gaps."""
     board, found, best = study.leaderboard, study.characterization, study.leaderboard.best
-    loop = Tile("Loop width", "–", "of several muscles, see Recordings", "recordings")
+    loop = Tile("Loop width", "–", "several muscles: see Recordings", "recordings")
     if found is not None and found.loop_width is not None:
         width = f"{numeral(found.mid_width, 2)} {found.output_unit} at mid {found.input}"
         loop = Tile("Loop width", f"{numeral(found.loop_width, 2)} %", width, "recordings")
@@ -173,7 +173,9 @@ def _review(study: Study, points: int) -> Section | None:
         )
         for one in study.review.outputs
     ]
-    return Section("review", "Closed loop", [Text(words.reviewed(study.review)), *figures])
+    return Section(
+        "review", "Closed loop", [Text(words.reviewed(study.review), listed=True), *figures]
+    )
 
 
 def _leaderboard(board: Leaderboard) -> Section:

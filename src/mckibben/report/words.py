@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from mckibben.numerals import numeral, percent
+from mckibben.numerals import counted, numeral, percent
 from mckibben.recording import standard_unit
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ CHOICES = {
 
 STARTED = (
     "Memory starts as training left it where the test continues from there; else, with one driving "
-    "input, from the excursion that best explains the first measured output (--initial measured)."
+    "input, from the excursion that best explains the first measured output (`initial=measured`)."
 )
 """How models are run free in a comparison."""
 
@@ -107,7 +107,7 @@ def comparison(board: Leaderboard) -> list[str]:
     if board.loads:
         said.append(f"Given to models beside the inputs: {', '.join(board.loads)}.")
     said += [
-        f"{name} varies, and no model is given it: see --input and --load."
+        f"{name} varies, and no model is given it: see `inputs` and `load`."
         for name in board.ignored
     ]
     said += [
@@ -677,8 +677,7 @@ def _how_far(study: Study) -> str:
     if best is None or best.test is None:
         return "No model is chosen."
     if best.band is None:
-        rmse, largest = numeral(best.test.rmse, 2), numeral(best.test.max_error, 2)
-        return f"{rmse} {unit} RMSE on the test, {largest} {unit} at most."
+        return f"At most {numeral(best.test.max_error, 2)} {unit} on the test."
     worst = min(best.band.coverage, key=best.band.coverage.__getitem__)
     of = f" for {worst}" if len(best.band.coverage) > 1 else ""
     half = numeral(best.band.width[worst] / 2, 2)
@@ -690,7 +689,7 @@ def _record_next(study: Study) -> str:
     if not study.data_gaps:
         return "No data gaps were found."
     first, *others = study.data_gaps
-    more = f" ({len(others)} more gaps)" if others else ""
+    more = f" ({counted(len(others), 'more gap')})" if others else ""
     return f"{gap_run(first, ranges=False)[:-1]}: {gap_name(first)} cannot be identified{more}."
 
 

@@ -56,7 +56,7 @@ def _demand(rig: Rig, holds: bool, law: str) -> None:
     if not holds:
         raise ContractError(
             f"the rig {rig.name!r} breaks the contract: {law}",
-            remedy="mend its parameters or set-up",
+            remedy="correct its parameters or set-up",
         )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError, DataWarning
-from mckibben.recording import Recording, standard_unit
+from mckibben.recording import Recording, sample_time_of, standard_unit
 from mckibben.rigs.parameters import Range
 
 
@@ -47,12 +47,7 @@ class Commands:
         DataError
             On missing or unknown channels, or a recording without time.
         """
-        if inputs.sample_time is None:
-            raise DataError(
-                "a recording without time cannot drive a rig",
-                file=inputs.source,
-                remedy="give `rate`, or Recording(..., sample_time=...)",
-            )
+        sample_time_of(inputs, "drive a rig")
         first = next(iter(self.ranges))
         remedy = f"give {', '.join(self.ranges)} and no others"
         strangers = sorted(set(inputs.channels) - {*self.ranges, *self.outputs})

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from pydantic import ValidationError
 
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.metrics import loop_width
 from mckibben.recording import Recording
 from mckibben.rigs.parameters import Air, Creep, Friction, Muscle, Range, Sensor
@@ -90,10 +90,9 @@ def rig_from_data_sheet(
         ("max_force", max_force),
         ("max_contraction", max_contraction),
     ):
-        if not 0 < value <= LARGEST:
-            raise DataError(f"{label} is {value}", remedy=f"give a number from 0 to {LARGEST:g}")
-    if not 0.05 <= loop_width <= 0.5:
-        raise DataError(f"loop_width is {loop_width}", remedy="give a share from 0.05 to 0.5")
+        require(0 < value <= LARGEST, label, value, f"a number from 0 to {LARGEST:g}", DataError)
+    possible = 0.05 <= loop_width <= 0.5
+    require(possible, "loop_width", loop_width, "a share from 0.05 to 0.5", DataError)
     try:
         return _rig(
             name, diameter, length, max_pressure, max_force, max_contraction, payload, loop_width

@@ -169,13 +169,13 @@ def _read(path: Path) -> dict[str, Any]:
         fields = _plain(tomllib.loads(read_text(path, most=DESCRIPTION)))
     except (ValueError, RecursionError) as error:
         raise DataError(
-            f"this is not TOML: {str(error)[:200]}", file=path, remedy="mend the file"
+            f"this is not TOML: {str(error)[:200]}", file=path, remedy="correct the file"
         ) from None
     if fields.pop("format", None) != FORMAT:
         raise DataError(
             f"it does not begin with format = {FORMAT!r}",
             file=path,
-            remedy="start from mckibben rig show NAME > FILE",
+            remedy="start from a rig of the package, saved as a file",
         )
     version = fields.pop("format_version", None)
     if version != FORMAT_VERSION:

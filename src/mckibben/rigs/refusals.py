@@ -58,7 +58,7 @@ def unit(field: FieldInfo) -> str:
 
 def _wanted(field: FieldInfo | None) -> str:
     if field is None:
-        return "see mckibben rig show"
+        return "correct its name, or drop it"
     of_unit = f" [{unit(field)}]" if unit(field) else ""
     bounds = limits(field)
     return f"give {field.description or 'section'}{of_unit}" + (f", {bounds}" if bounds else "")

@@ -151,9 +151,10 @@ class Rig(DrawsItself, Section, ABC):
             for section in sections:
                 place = place.get(section) if isinstance(place, dict) else None  # type: ignore[assignment]
             if not isinstance(place, dict) or (last not in place and sections != ["start"]):
+                known = place if isinstance(place, dict) else fields
                 raise DataError(
                     f"the rig {self.name!r} has no parameter {path!r}",
-                    remedy=f"see mckibben rig show {self.name}",
+                    remedy=f"use one of {', '.join(known)}",
                 )
             place[last] = value
         try:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.signals.checking import as_time, generator, require_order, require_positive
 
 N_WAVES = 64
@@ -50,11 +50,8 @@ def random_wave(
     t = as_time(time)
     require_positive("max_frequency", max_frequency)
     require_order(low, high)
-    if not 0 <= min_frequency < max_frequency:
-        raise DataError(
-            f"min_frequency {min_frequency} is not within 0 and max_frequency {max_frequency}",
-            remedy="give 0 <= min_frequency < max_frequency",
-        )
+    lower = 0 <= min_frequency < max_frequency
+    require(lower, "min_frequency", min_frequency, f"0 to {max_frequency:g} Hz", DataError)
     rng = generator(seed)
     frequencies = rng.uniform(min_frequency, max_frequency, N_WAVES)
     phases = rng.uniform(0.0, 2 * np.pi, N_WAVES)
@@ -149,8 +146,7 @@ def chirp(
     require_positive("start_frequency", start_frequency)
     require_positive("end_frequency", end_frequency)
     require_order(low, high)
-    if law not in ("linear", "logarithmic"):
-        raise DataError(f"law is {law!r}", remedy="give linear or logarithmic")
+    require(law in ("linear", "logarithmic"), "law", law, "linear or logarithmic", DataError)
     whole = float(t[-1] - t[0])
     if not whole > 0:
         raise DataError("one instant makes no sweep", remedy="give more than one time")

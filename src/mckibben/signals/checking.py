@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 
 
 def as_time(given: ArrayLike) -> Array:
@@ -19,8 +19,7 @@ def as_time(given: ArrayLike) -> Array:
 
 def require_positive(name: str, value: float) -> None:
     """Refuse what is not a positive number."""
-    if not 0 < value < np.inf:
-        raise DataError(f"{name} is {value}", remedy="give a positive number")
+    require(0 < value < np.inf, name, value, "a positive number", DataError)
 
 
 LARGEST_SEED = 2**64 - 1
@@ -30,22 +29,16 @@ LARGEST_SEED = 2**64 - 1
 def require_finite(name: str, values: ArrayLike) -> Array:
     """Return numbers as an array, or refuse those that are not finite."""
     numbers = np.atleast_1d(np.asarray(values, dtype=float))
-    if not np.isfinite(numbers).all():
-        raise DataError(f"{name} is {values!r}", remedy="give finite numbers")
+    require(bool(np.isfinite(numbers).all()), name, values, "finite numbers", DataError)
     return numbers
 
 
 def require_order(low: float, high: float) -> None:
     """Refuse limits that are not finite, or not in order."""
-    if not -np.inf < low < high < np.inf:
-        raise DataError(f"high {high} is not above low {low}", remedy="give low < high")
+    require(-np.inf < low < high < np.inf, "high", high, f"more than low, {low:g}", DataError)
 
 
 def generator(seed: int) -> np.random.Generator:
     """Return what draws random numbers, or say that the seed is impossible."""
-    if not 0 <= seed <= LARGEST_SEED:
-        raise DataError(
-            f"seed {seed} is {'negative' if seed < 0 else 'too large'}",
-            remedy=f"give 0 to {LARGEST_SEED}",
-        )
+    require(0 <= seed <= LARGEST_SEED, "seed", seed, f"0 to {LARGEST_SEED}", DataError)
     return np.random.default_rng(seed)

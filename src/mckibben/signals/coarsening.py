@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.recording import Recording
 from mckibben.signals.reversals import reversals
 
@@ -118,8 +118,7 @@ def made_manageable(
     total = max(sum(map(len, train)), sum(map(len, test)))
     stretched = most is None and total > HUGE
     limit = most if most is not None else MOST_OF_HUGE if stretched else MOST
-    if limit < FEWEST:
-        raise DataError(f"{limit} samples are too few to fit to", remedy=f"allow {FEWEST} or more")
+    require(limit >= FEWEST, "most_samples", limit, f"{FEWEST} or more", DataError)
     factor = -(-total // limit)
     if factor == 1:
         return list(train), list(test), ()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.signals.checking import (
     as_time,
     generator,
@@ -154,8 +154,7 @@ def irregular_triangle(
         On fewer than one turning point, or high not above low.
     """
     t = as_time(time)
-    if n_turns < 1:
-        raise DataError(f"{n_turns} turning points are too few", remedy="ask for at least 1")
+    require(n_turns >= 1, "n_turns", n_turns, "1 or more", DataError)
     require_order(low, high)
     levels = [0.0, 1.0]
     for share in generator(seed).uniform(0.1, 1.0, n_turns):
@@ -168,8 +167,7 @@ def irregular_triangle(
 
 def _rising(low: float, high: float, n_cycles: int) -> list[float]:
     require_order(low, high)
-    if n_cycles < 1:
-        raise DataError(f"{n_cycles} cycles are too few", remedy="ask for at least 1")
+    require(n_cycles >= 1, "n_cycles", n_cycles, "1 or more", DataError)
     return [low + (high - low) * (k + 1) / n_cycles for k in range(n_cycles)]
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, sample_time_of
 
 ORDER = 4
 """Of the low-pass, which is run forth and back."""
@@ -37,13 +37,7 @@ def low_pass(
     """
     from scipy.signal import butter, sosfiltfilt
 
-    if recording.sample_time is None:
-        raise DataError(
-            "a recording without time cannot be filtered by frequency",
-            file=recording.source,
-            remedy="read it with a rate",
-        )
-    highest = 0.5 / recording.sample_time
+    highest = 0.5 / sample_time_of(recording, "be filtered by frequency")
     if not 0 < cutoff < highest:
         raise DataError(
             f"a cutoff of {cutoff:g} Hz is impossible",

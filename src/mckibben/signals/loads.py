@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.signals.checking import as_time, require_finite, require_positive
 
 
@@ -93,8 +93,7 @@ def pulls(
     """
     t = as_time(time)
     require_positive("duration", duration)
-    if n_pulls < 1:
-        raise DataError(f"{n_pulls} pulls are too few", remedy="ask for at least 1")
+    require(n_pulls >= 1, "n_pulls", n_pulls, "1 or more", DataError)
     require_finite("high", high)
     require_finite("low", low)
     share = float(t[-1] - t[0]) / n_pulls

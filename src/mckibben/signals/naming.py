@@ -68,8 +68,7 @@ def build(name: str, time: ArrayLike, **settings: Any) -> Array:
     for setting in settings:
         if setting not in known:
             raise DataError(
-                f"the signal {name!r} has no setting {setting!r}",
-                remedy=f"use {', '.join(known)}",
+                f"the signal {name!r} has no setting {setting!r}", remedy=f"use {', '.join(known)}"
             )
     for setting, (words, default) in known.items():
         if default is None and setting not in settings:
@@ -78,7 +77,12 @@ def build(name: str, time: ArrayLike, **settings: Any) -> Array:
                 remedy=f"write for instance {name}:{setting}=..., {words}",
             )
     parsed = {key: _parsed(name, key, value, kinds[key]) for key, value in settings.items()}
-    return np.asarray(signal(time, **parsed), dtype=float)
+    try:
+        return np.asarray(signal(time, **parsed), dtype=float)
+    except DataError as error:
+        if error.parameter is not None:  # which is the signal's, not that of an operation
+            error.parameter = f"{name}:{error.parameter}"
+        raise
 
 
 def _words(kind: Any) -> str:
@@ -104,6 +108,5 @@ def _parsed(name: str, setting: str, value: Any, kind: Any) -> Any:
         return [float(part) for part in value] if isinstance(value, Sequence) else float(value)
     except (TypeError, ValueError):
         raise DataError(
-            f"the signal {name!r} cannot take {setting}={value!r}",
-            remedy=f"give {_words(kind)}",
+            f"the signal {name!r} cannot take {setting}={value!r}", remedy=f"give {_words(kind)}"
         ) from None

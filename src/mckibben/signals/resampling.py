@@ -8,7 +8,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, sample_time_of
+from mckibben.signals.checking import require_positive
 
 STOP_BAND = 60.0
 """Attenuation of what could alias [dB]."""
@@ -33,7 +34,7 @@ def cut(recording: Recording, start: float, stop: float = np.inf) -> Recording:
     DataError
         If the recording has no time, or fewer than two samples are left.
     """
-    step = _step(recording, "cut by time", "use Recording.slice, which counts samples")
+    step = sample_time_of(recording, "be cut by time", "use Recording.slice, which counts samples")
     first, last = (
         int(np.clip(np.ceil((limit - recording.start_time) / step - 1e-6), 0, len(recording)))
         for limit in (start, stop)
@@ -70,11 +71,8 @@ def resample(recording: Recording, sample_time: float) -> Recording:
         If the recording has no time, the sample time is not positive, or fewer than two samples
         would be left.
     """
-    step = _step(recording, "be resampled", "read it with `rate`")
-    if not 0 < sample_time < np.inf:
-        raise DataError(
-            f"a sample time of {sample_time} s is impossible", remedy="give a positive time"
-        )
+    step = sample_time_of(recording, "be resampled")
+    require_positive("sample_time", sample_time)
     ratio = sample_time / step
     if ratio == 1:
         return recording
@@ -112,11 +110,3 @@ def _read_smoothed(x: Array, places: Array, ratio: float) -> Array:
     smooth = oaconvolve(beyond, low_pass, mode="valid")
     degree = min(3, x.size - 1)
     return np.asarray(make_interp_spline(np.arange(x.size), smooth, k=degree)(places))
-
-
-def _step(recording: Recording, wish: str, remedy: str) -> float:
-    if recording.sample_time is None:
-        raise DataError(
-            f"a recording without time cannot {wish}", file=recording.source, remedy=remedy
-        )
-    return recording.sample_time

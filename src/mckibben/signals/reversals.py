@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mckibben.arrays import Array
-from mckibben.errors import DataError
+from mckibben.arrays import Array, check_finite
+from mckibben.errors import DataError, require
 from mckibben.system.compiling import deferred
 
 Indices = NDArray[np.int64]
@@ -128,8 +128,7 @@ def reversals(x: ArrayLike, threshold: float | None = None) -> Indices:
     values = _checked(x)
     if threshold is None:
         threshold = swing_threshold(noise_level(values), float(np.ptp(values)), values.size)
-    if not threshold >= 0:
-        raise DataError(f"a threshold of {threshold} is impossible", remedy="give 0 or more")
+    require(threshold >= 0, "threshold", threshold, "0 or more", DataError)
     found = np.empty(values.size, dtype=np.int64)
     return found[: _turns(values, float(threshold), found)]
 
@@ -239,11 +238,5 @@ def _checked(x: ArrayLike) -> Array:
             f"a signal of shape {values.shape} has no branches",
             remedy="give a row of at least two samples",
         )
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise DataError(
-            f"the value is {values[bad[0]]}, and {bad.size} of {values.size} are not finite",
-            row=int(bad[0]) + 1,
-            remedy="cut those samples out",
-        )
+    check_finite(values)
     return values

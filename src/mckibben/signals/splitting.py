@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.recording import Recording
 from mckibben.signals.reversals import branches, reversals
 
@@ -55,8 +55,7 @@ def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tupl
     DataError
         On fewer than one block, or on more than one where the channel never turns.
     """
-    if n_blocks < 1:
-        raise DataError(f"{n_blocks} blocks are impossible", remedy="ask for at least 1")
+    require(n_blocks >= 1, "n_blocks", n_blocks, "1 or more", DataError)
     n = len(recording)
     if n_blocks == 1:
         return [(0, n)]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
+from mckibben.errors import DataError, require
 from mckibben.signals.checking import (
     as_time,
     generator,
@@ -49,8 +49,7 @@ def staircase(time: ArrayLike, levels: Sequence[float], hold: float, ramp: float
     if not len(levels):
         raise DataError("a staircase needs levels", remedy="give at least one")
     require_positive("hold", hold)
-    if not 0 <= ramp < np.inf:
-        raise DataError(f"a ramp of {ramp} s is impossible", remedy="give 0 or more seconds")
+    require(0 <= ramp < np.inf, "ramp", ramp, "0 s or more", DataError)
     heights = require_finite("levels", levels)
     step = np.clip(np.floor(t / (hold + ramp)), 0, heights.size - 1).astype(int)
     if ramp == 0:
@@ -136,10 +135,7 @@ def random_steps(
     t = as_time(time)
     require_order(low, high)
     n = _holds(t, shortest, ramp)
-    if not shortest <= longest < np.inf:
-        raise DataError(
-            f"longest {longest} s is below shortest {shortest} s", remedy="give shortest <= longest"
-        )
+    require(shortest <= longest < np.inf, "longest", longest, f"{shortest:g} s or more", DataError)
     rng = generator(seed)
     levels = rng.uniform(low, high, n + 1)
     levels[0] = low
@@ -155,11 +151,9 @@ def random_steps(
 def _holds(t: Array, hold: float, ramp: float) -> int:
     """Return how many holds it takes to fill the time."""
     require_positive("hold", hold)
-    if not 0 <= ramp < hold:
-        raise DataError(
-            f"a ramp of {ramp} s does not fit into a hold of {hold} s",
-            remedy="give 0 <= ramp < hold",
-        )
+    require(
+        0 <= ramp < hold, "ramp", ramp, f"0 s or more, less than a hold of {hold:g} s", DataError
+    )
     if t.min() < 0:
         raise DataError(
             f"time starts at {t.min():g} s", remedy="count time from the start of the first hold"

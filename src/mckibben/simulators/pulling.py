@@ -61,7 +61,7 @@ def pulling(model: Block) -> Pulling:
     if len(units) != 2 or len(along) != 1 or len(pressure) != 1 or gives != ["N"]:
         told = ", ".join(f"{channel.name} [{channel.unit or 1}]" for channel in block.inputs)
         raise ModelError(
-            f"{model.title!r} does not tell a muscle's force by its place and pressure: "
+            f"{model.title!r} does not give a muscle's force from its position and pressure: "
             f"it takes {told}",
             remedy="identify 'balance' on recordings with a measured force, 'multistate' or "
             "a force law",

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.errors import ModelError
+from mckibben.errors import require
 
 KEPT = 1_000_000
 """Steps that statistics are of, at most: the latest."""
@@ -94,11 +94,8 @@ class FixedRate:
     _back: float = field(default=0.0, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if not 0 < self.period < math.inf or not self.duration > 0:
-            raise ModelError(
-                f"a period of {self.period} s and a duration of {self.duration} s",
-                remedy="give positive times",
-            )
+        require(0 < self.period < math.inf, "period", self.period, "a positive time [s]")
+        require(self.duration > 0, "duration", self.duration, "a positive time [s]")
 
     @property
     def deadlines(self) -> Deadlines:

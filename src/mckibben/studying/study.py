@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.comparison.channels import Names, moved_by
+from mckibben.comparison.channels import moved_by
 from mckibben.comparison.leaderboard import Leaderboard
-from mckibben.comparison.planning import Settings, plan_of
+from mckibben.comparison.planning import plan_of
 from mckibben.comparison.ranking import Standing, ranked
 from mckibben.control import Tracked
 from mckibben.control.twin import COMMAND
@@ -117,18 +117,9 @@ def study(
     train: Recording | Sequence[Recording],
     test: Recording | Sequence[Recording] = (),
     *,
-    inputs: Names = None,
-    outputs: Names = None,
-    load: str | None = None,
-    validation: Sequence[Recording] = (),
     rig: str | None = None,
-    models: str | Sequence[str] = "all",
-    settings: Settings | None = None,
     seed: int = 0,
     jobs: int | None = None,
-    most_samples: int | None = None,
-    allow_shared: bool = False,
-    allow_early: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
@@ -136,6 +127,7 @@ def study(
     notes: Sequence[str] = (),
     model: Block | None = None,
     compensator: Block | None = None,
+    **choices: Any,
 ) -> Study:
     """Characterize recordings, choose a model by cross-validation, test it, and invert it if it can be.
 
@@ -148,9 +140,7 @@ def study(
 
     Parameters
     ----------
-    train, test, inputs, outputs, load, validation, models, settings, seed, jobs
-        As for `compare`.
-    most_samples, allow_shared, allow_early, folder, clear, progress
+    train, test, seed, jobs, folder, clear, progress
         As for `compare`.
     rig : str, optional
         Virtual rig to close loops on; default the one that recordings of several muscles say they come
@@ -162,6 +152,8 @@ def study(
         What was assumed or mended while reading, to be passed on.
     model, compensator : Block, optional
         What ran when ``train`` was logged, which is then reviewed first; see `review`.
+    **choices
+        What else `compare` takes: channels, models, settings, what is allowed.
 
     Returns
     -------
@@ -176,22 +168,9 @@ def study(
     reviewed = None
     if model is not None or compensator is not None:  # the test is not for a refit to see
         reviewed = review(recordings, model=model, compensator=compensator, seed=seed)
-        if inputs is None:
+        if choices.get("inputs") is None:
             recordings = [_driven(one) for one in recordings]
-    plan = plan_of(
-        recordings,
-        tests,
-        inputs=inputs,
-        outputs=outputs,
-        load=load,
-        validation=validation,
-        models=models,
-        settings=settings,
-        seed=seed,
-        most_samples=most_samples,
-        allow_shared=allow_shared,
-        allow_early=allow_early,
-    )
+    plan = plan_of(recordings, tests, seed=seed, **choices)
     kept, channels = plan.kept(folder), plan.data.channels
     if rig is not None and channels.single:
         raise DataError(

@@ -242,7 +242,8 @@ async def _closer(
         outputs, bands = await asyncio.to_thread(modelled)
         pairs = await asyncio.to_thread(desk.looked_at, [recording])
     except MckibbenError as error:
-        raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
+        problem = f"{', '.join(names)} on {recording.name}: {error.problem}"
+        raise ModelError(problem, remedy=error.remedy) from None
     measured = recording.matrix(desk.outputs)
     off = {  # the mean over outputs, as in the leaderboard
         name: float(np.sqrt(np.mean((found - measured)[one.rows] ** 2, axis=0)).mean())

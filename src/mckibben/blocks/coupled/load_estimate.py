@@ -132,19 +132,19 @@ class LoadEstimate(Block):
         n, n_loads = loads.shape
         if n_loads == 0:
             raise ModelError(
-                "a balance that knows no load tells none",
+                "a balance without a load estimates none",
                 remedy="identify it on recordings with a measured force",
             )
         if any(channel.unit != "bar" for channel in self.forward.given):
             raise ModelError(
-                "a load is told by measured pressures, and this balance knows "
+                "loads are estimated from pressures, and this balance has "
                 f"{self.forward.given[0].name} in {self.forward.given[0].unit}",
                 remedy="identify it from the pressure (`input=pressure`)",
             )
         if np.linalg.matrix_rank(loads) < n_loads:
             raise ModelError(
                 f"{n_loads} load(s) pull at {n} muscle(s) in the shares "
-                f"{self.forward.loads}, which do not tell them apart",
+                f"{self.forward.loads}, which do not distinguish them",
                 remedy="identify a balance with fewer loads",
             )
 
@@ -188,7 +188,7 @@ def load_of(model: Block) -> Block:
     placed = balance_in(model)
     if placed is None or not placed.solved or len(placed.behind) > 1:
         raise ModelError(
-            f"{model.title!r} does not tell loads by displacements and pressures",
+            f"{model.title!r} does not estimate loads from displacements and pressures",
             remedy="identify 'balance', on recordings with a measured force",
         )
     balance, before = placed.balance, placed.before

@@ -63,8 +63,8 @@ def steady_state(block: Any, recording: Recording) -> Recording:
         before = now.copy()
     if not change <= REPEATS * np.ptp(now):
         raise ModelError(
-            f"the response of {block.kind!r} to {recording.name} does not come to repeat "
-            f"itself in {PERIODS} periods",
+            f"the response of {block.kind!r} to {recording.name} is not periodic "
+            f"within {PERIODS} periods",
             remedy="use simulate, which starts from rest",
         )
     units = {block.outputs[0].name: block.outputs[0].unit}

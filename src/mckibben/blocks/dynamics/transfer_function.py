@@ -23,7 +23,7 @@ from mckibben.blocks.dynamics.starts import free_responses, start_on
 from mckibben.blocks.kernels import kernel, step
 from mckibben.blocks.linear import LinearSystem, Polynomials
 from mckibben.blocks.notation import FEW, Notation, summed
-from mckibben.errors import ModelError
+from mckibben.errors import ModelError, require
 from mckibben.recording import Recording
 
 
@@ -181,10 +181,8 @@ class TransferFunction(Block):
         """
         from scipy.signal import convolve, lfilter
 
-        if not isinstance(horizon, int) or horizon < 1:
-            raise ModelError(
-                f"the horizon is {horizon!r}", remedy="predict a whole number of samples, 1 or more"
-            )
+        whole = isinstance(horizon, int) and horizon >= 1
+        require(whole, "horizon", horizon, "a whole number of samples, 1 or more")
         c, d = [1.0, *self.noise_numerator], [1.0, *self.noise_denominator]
         name = self.output.name
         inputs, measured = self._inputs_from(recording), recording[name]
@@ -216,7 +214,7 @@ class TransferFunction(Block):
         if lead == 0:
             raise ModelError(
                 f"{self.kind!r} has no inverse: its output answers a sample late",
-                remedy="identify it with delay=0",
+                remedy="identify it with `settings[delay]=0`",
             )
         zeros = np.roots(self.numerator)
         if np.any(np.abs(zeros) >= 1 - 1e-9):

@@ -166,7 +166,7 @@ class EUPI(Invertible):
             raise ModelError(
                 "'eupi' has no inverse: a weight is negative, or its part without memory "
                 "does not increase",
-                remedy="identify it with non-negative weights (nonnegative=True)",
+                remedy="identify it with `settings[nonnegative]=true`",
             )
 
     def least_slope(self) -> float:

@@ -60,7 +60,7 @@ def check_invertible_sum(kind: str, thresholds: Sequence[float], weights: Sequen
         raise ModelError(
             f"{kind!r} has no inverse: its weights 0 to {first} add up to "
             f"{partial[first]:g}, so its output would not rise with its input",
-            remedy="identify it with non-negative weights (nonnegative=True)",
+            remedy="identify it with `settings[nonnegative]=true`",
         )
 
 

@@ -337,7 +337,7 @@ class Preisach(Triangle, Invertible):
             raise ModelError(
                 "'preisach' has no inverse: its weights must not be negative, and "
                 "positive on the diagonal",
-                remedy="identify it with nonnegative=true",
+                remedy="identify it with `settings[nonnegative]=true`",
             )
 
 

@@ -374,7 +374,7 @@ class Estimator(ABC):
             vars(self).update(before)
             raise
 
-    def _recording(self, u: ArrayLike, y: ArrayLike | None, sample_time: float | None) -> Recording:
+    def _recording(self, u: Any, y: Any, sample_time: float | None) -> Recording:
         """Return arrays as a recording with the channels of this estimator; ``y`` may be None."""
         channels: dict[str, Array] = {}
         for given, names in ((u, self.input), (y, self.output)):

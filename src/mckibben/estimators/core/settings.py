@@ -114,6 +114,7 @@ def check_settings(estimator: Any) -> None:
         except ValidationError as error:
             wanted = error.errors()[0]["msg"]
             raise ModelError(
-                f"{setting.name} is {value!r}: {wanted[0].lower()}{wanted[1:]}",
-                remedy=f"choose {setting.name} accordingly, or leave it out",
+                f"it is {value!r}: {wanted[0].lower()}{wanted[1:]}",
+                parameter=setting.name,
+                remedy="give another, or leave it out",
             ) from None

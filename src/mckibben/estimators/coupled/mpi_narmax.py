@@ -279,8 +279,8 @@ class RecurrentProblem:
             pasts = tuple(0.5 * (a + b) for a, b in zip(pasts, outputs, strict=True))
         if found is None:
             raise ModelError(
-                "the network leaves all bounds when it runs free",
-                remedy="raise ridge, lower n_sets, or fit balance",
+                "the network diverges in a free run",
+                remedy="raise `settings[ridge]`, lower `settings[n_sets]`, or fit balance",
             )
         if not self.settles(found):
             warnings.warn(

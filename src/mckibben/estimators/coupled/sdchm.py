@@ -261,7 +261,11 @@ class SDCHMEstimator(CoupledEstimator):
         try:
             estimator.set_params(**settings | (self.memory_settings or {}))
         except ValueError as error:
-            raise ModelError(f"memory_settings: {error}") from None
+            raise ModelError(
+                str(error).rstrip("."),
+                parameter="memory_settings",
+                remedy="give settings of the estimator in memory",
+            ) from None
         with whole_searches():
             block: Block = estimator.fit(recording).model_
         return block

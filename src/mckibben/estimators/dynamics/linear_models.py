@@ -137,7 +137,7 @@ class PredictionErrorEstimator(Estimator):
         if self.shared_poles and self.n_noise_poles:
             raise ModelError(
                 f"the noise shares the model's poles, and has {self.n_noise_poles} of its own",
-                remedy="use n_noise_poles=0, or shared_poles=false",
+                remedy="use `settings[n_noise_poles]=0`, or `settings[shared_poles]=false`",
             )
 
     @property

@@ -169,14 +169,14 @@ class NarxEstimator(SearchEstimator):
                 settle(path)
         if not tried:
             raise ModelError(
-                "every NARX model found leaves all bounds when it runs free",
-                remedy="use fewer terms or units, n_play=3, or allow_unstable=true to get "
-                "it nevertheless",
+                "every NARX model found diverges in a free run",
+                remedy="use fewer terms or units, `settings[n_play]=3`, or "
+                "`settings[allow_unstable]=true` to get it all the same",
             )
         tracker.best_cost, chosen = min(tried, key=lambda item: item[0])
         if not stable(chosen, data):
             warnings.warn(
-                "the NARX model leaves all bounds when its input is held or goes on: do not run it free",
+                "the NARX model diverges when its input is held or goes on: do not run it free",
                 ModelWarning,
                 stacklevel=4,
             )

@@ -158,6 +158,6 @@ def _segments(data: TrainingData, radii: Array, rule: str) -> tuple[Array, Array
             f"{data.input_unit} begin to move in turn: the longest goes "
             f"{max(longest.values()):.3g} {data.input_unit}, and after a reversal it "
             "takes twice a threshold",
-            remedy="use fewer operators, smaller thresholds, or method=ls",
+            remedy="use fewer operators, smaller thresholds, or `settings[method]=ls`",
         )
     return lengths, rises

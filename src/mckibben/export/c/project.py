@@ -17,7 +17,7 @@ from mckibben.blocks.fields import Channel
 from mckibben.blocks.kernels import in_scratch
 from mckibben.blocks.laws import input_limits, wander
 from mckibben.blocks.saving import to_text
-from mckibben.errors import ModelError, ModelWarning
+from mckibben.errors import ModelError, ModelWarning, require
 from mckibben.export.c.serving import Serving, served, served_files
 from mckibben.export.c.translator import Translation
 from mckibben.export.c.wiring import Call, Wiring
@@ -281,11 +281,8 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
         If it is missing, not positive, or not the block's own.
     """
     step = own_time(block) if sample_time is None and block.rate_dependent else sample_time
-    if step is not None and not 0 < step <= LONGEST_STEP:
-        raise ModelError(
-            f"the sample time is {step}",
-            remedy=f"give a positive time in seconds, at most {LONGEST_STEP:g}",
-        )
+    possible = step is None or 0 < step <= LONGEST_STEP
+    require(possible, "sample_time", step, f"a positive time, at most {LONGEST_STEP:g} s")
     if not block.rate_dependent:
         return None
     if step is None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
-from mckibben.errors import ModelError
+from mckibben.errors import ModelError, require
 from mckibben.export.templating import literal, render
 
 SERVER = tuple(Path(__file__).parent / "server" / f"mck_server.{end}" for end in ("c", "h"))
@@ -62,7 +62,7 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     for given, allowed in ((serving.limits, names), (serving.safe, names[n_in:])):
         if strange := sorted(set(given) - set(allowed)):
             raise ModelError(
-                f"{strange[0]!r:.60} is no channel to say that of",
+                f"{strange[0]!r:.60} is not one of its channels",
                 remedy=f"name one of {', '.join(allowed)}",
             )
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
@@ -75,8 +75,8 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
     unknown = [n for n, a, b in zip(names, low, high, strict=True) if not np.isfinite(b - a)]
     if unknown:
         raise ModelError(
-            f"the model does not know between what limits {', '.join(unknown)} may be",
-            remedy=f"give it for each of them, `limits[{unknown[0]}]=LOW:HIGH`",
+            f"the model has no limits of {', '.join(unknown)}",
+            remedy=f"give them for each, `limits[{unknown[0]}]=LOW:HIGH`",
         )
     for name, a, b in zip(names, low, high, strict=True):
         if not a < b:
@@ -156,17 +156,12 @@ def served(
 
 def _ticks(serving: Serving, period: float | None) -> int:
     """Return after how many silent ticks the watchdog acts."""
-    if period is None or not 1 <= 1e6 * period <= MOST_MICROSECONDS:
-        raise ModelError(
-            f"a served model ticks, and its time between steps is {period}",
-            remedy=f"give `sample_time=SECONDS`, from 1e-6 to {1e-06 * MOST_MICROSECONDS:.0f}",
-        )
-    ticks = serving.watchdog / period if math.isfinite(serving.watchdog) else math.inf
-    if not 1 <= ticks <= MOST_TICKS:
-        raise ModelError(
-            f"a watchdog of {serving.watchdog:g} s",
-            remedy=f"give a time from one sample time ({period:g} s) on",
-        )
+    step = period or 0.0
+    longest = 1e-6 * MOST_MICROSECONDS
+    require(1 <= 1e6 * step <= MOST_MICROSECONDS, "sample_time", period, f"1e-6 to {longest:.0f} s")
+    ticks = serving.watchdog / step if math.isfinite(serving.watchdog) else math.inf
+    longest = step * MOST_TICKS
+    require(1 <= ticks <= MOST_TICKS, "watchdog", serving.watchdog, f"{step:g} to {longest:g} s")
     return math.floor(ticks + 1e-9)
 
 

@@ -46,7 +46,7 @@ def multistate_friction(rig: Rig | None = None) -> Protocol:
     wide, strong = 1.0, 1.0
     if rig is not None:
         if "length" not in rig.inputs:
-            remedy = "change a test stand, as mckibben rig show mas10-test-stand prints it"
+            remedy = "change a copy of the rig mas10-test-stand"
             raise DataError(f"the rig {rig.name!r} imposes no length", remedy=remedy)
         wide = rig.start.get("length", rig.limits("length").high) / LONGEST
         strong = rig.limits("pressure").high / HIGHEST

@@ -53,15 +53,12 @@ def check_page(found: Validation, model_file: str) -> str:
     if found.description is not None:
         sections.append(Section("model", "Model", model_items(found.description)))
     untested = [f"Too short to be tested: {', '.join(found.untested)}."] * bool(found.untested)
-    verdict = Section(
-        "verdict", "", [Text([*words.check_sentences(found), *untested], listed=True)]
-    )
     more = len(found.recordings) - 6
     listed = ", ".join(found.recordings[:6]) + (f" and {more} more" if more > 0 else "")
     return Page(
         f"Check of {found.model}",
         f"{model_file}, running free on {listed}",
-        [verdict, *sections],
+        [Section("untested", "", [Text(untested)]), *sections],
         [
             Tile(
                 f"Residual of {one.output}",
@@ -81,7 +78,7 @@ def _output(one: OutputCheck, place: int, runs: list[Run]) -> list[Any]:
         [words.missed(one, each), f"{100 * each.share:.2g}", each.size, _p(each.p_value)]
         for each in one.missing
     ]
-    items: list[Any] = []
+    items: list[Any] = [Text(words.check_notes(one))]
     if missing:
         headings = ["Missed", "Share of the variance [%]", f"RMS [{one.unit}]", "p"]
         items.append(Table(headings, missing))

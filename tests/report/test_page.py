@@ -15,6 +15,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import mckibben
+from mckibben import example
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.hysteresis.gpi import GPI
 from mckibben.blocks.hysteresis.pi import PI
@@ -24,13 +26,17 @@ from mckibben.outputs import Results
 from mckibben.recording import Recording
 from mckibben.report import StudyFolder, write_report
 from mckibben.report.builder import Page, Section
+from mckibben.report.check_page import check_page
 from mckibben.report.commands import commands
 from mckibben.report.description_page import model_items
-from mckibben.report.page import page
+from mckibben.report.page import page, tiles
+from mckibben.report.words import answers
 from mckibben.studying.study import Study
 from tests.report.studies_by_hand import measured, renamed, study
 
 SECTIONS = {"headline", "leaderboard", "model", "checks", "recordings", "method"}
+MOST_WORDS = 1200
+MATHML = "http://www.w3.org/1998/Math/MathML"
 VOID = {"meta", "link", "input", "br", "img"}
 LOADING = {"src", "srcset", "href", "action", "poster", "data", "formaction", "xlink:href"}
 
@@ -122,6 +128,44 @@ def test_nothing_that_pages_are_made_of_leads_elsewhere() -> None:
     }
     assert len(made) > 40
     assert not found
+
+
+@pytest.mark.parametrize("blocks", [{"gpi": GPI.example()}, None])
+def test_every_model_of_a_figure_that_is_chosen_from_can_be_shown(blocks: Any) -> None:
+    parsed = Parsed(page(study() if blocks is None else study(blocks=blocks)))
+    chosen = {v for t, n, v in parsed.attributes if t == "input" and n == "value"}
+    for name in ("fit", "residuals"):
+        drawn = {trace["meta"] for plot in parsed.figures[name][0] for trace in plot["data"]}
+        assert drawn - {None} == chosen
+    assert sum(name == "checked" for _, name, _ in parsed.attributes) == 1
+
+
+def test_the_page_of_the_example_is_short_and_has_its_tiles_answers_and_title() -> None:
+    found = mckibben.study(
+        mckibben.read(example.TRAIN), mckibben.read(example.TEST), models="quick", jobs=1
+    )
+    html = page(found, title="A title of its own")
+    parsed = Parsed(html)
+    assert len(parsed.words.split()) <= MOST_WORDS
+    assert "A title of its own" in parsed.words
+    assert parsed.all("class").count("tile") == len(tiles(found)) == 4
+    assert set(parsed.all("id")) >= SECTIONS
+    for question, answer in answers(found):
+        assert question in parsed.words
+        assert answer.split()[0] in parsed.words
+    plain = re.sub(r"(?s)<script.*?</script>", "", html).replace(MATHML, "")
+    assert "://" not in plain
+
+
+def test_a_check_comes_from_the_builder_and_has_no_links() -> None:
+    found = study()
+    best = found.leaderboard.best
+    assert best is not None
+    assert best.block is not None
+    parsed = Parsed(check_page(mckibben.check(best.block, found.test), "model.json"))
+    assert {"headline", "output-0"} <= set(parsed.all("id"))
+    assert parsed.all("name").count("generator") == 1
+    assert not [v for t, n, v in parsed.attributes if n in LOADING and "//" in v]
 
 
 @pytest.mark.parametrize(

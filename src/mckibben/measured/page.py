@@ -156,7 +156,10 @@ def _section(one: Outcome) -> list[Any]:
     notes += words.comparison(board)
     notes += [f"failed: {row.model}: {row.reason}" for row in board.rows if row.reason]
     headings = ["model", *(column.label for column in columns)]
-    items += [Text([f"Split: {board.split}. {words.chosen(board)}"]), Table(headings, rows, best)]
+    items += [
+        Text([f"Split: {board.split}. {'' if chosen else words.chosen(board)}".strip()]),
+        Table(headings, rows, best),
+    ]
     return [*items, Text(notes, "note", listed=True)] if notes else items
 
 

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 PLOTLY = "plotly-basic.min.js.xz"
 """plotly.js 4.1.1 as published (plotly.js-basic-dist-min, MIT), packed: in Python 60 MB."""
 
+FIGURE = re.compile(r"[-−+±<>]? ?\d[\d.,e+−-]*( (to [-−]?\d\S*|\S+))?")
+"""A cell that holds a number, perhaps with its unit, or an interval."""
+
 PACKAGES = ("mckibben", "numpy", "scipy", "numba")
 
 Variants = list[list[interactive.Json]]
@@ -69,9 +72,7 @@ class Table:
 
         def numbers(place: int) -> float:
             cells = [row[place] for row in self.rows if row[place] not in (None, "")]
-            plain = [
-                isinstance(c, int | float) or bool(re.match(r"[-−+±<]? ?\d", str(c))) for c in cells
-            ]
+            plain = [isinstance(c, int | float) or bool(FIGURE.fullmatch(str(c))) for c in cells]
             return sum(plain) / max(len(plain), 1)
 
         return {k for k in range(1, len(self.headings)) if numbers(k) > 0.5}

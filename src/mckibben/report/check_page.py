@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from mckibben.numerals import percent
 from mckibben.recording import notes_by_file
 from mckibben.report import interactive, model_subjects, words
 from mckibben.report.builder import Figure, Page, Section, Table, Text, Tile
@@ -52,19 +53,22 @@ def check_page(found: Validation, model_file: str) -> str:
     if found.description is not None:
         sections.append(Section("model", "Model", model_items(found.description)))
     untested = [f"Too short to be tested: {', '.join(found.untested)}."] * bool(found.untested)
-    verdict = Section(
-        "verdict", "", [Text([*words.check_sentences(found), *untested], listed=True)]
-    )
     more = len(found.recordings) - 6
     listed = ", ".join(found.recordings[:6]) + (f" and {more} more" if more > 0 else "")
     return Page(
-        words.check_verdict(found),
-        f"{model_file} ({found.model}), running free on {listed}",
-        [verdict, *sections],
+        f"Check of {found.model}",
+        f"{model_file}, running free on {listed}",
+        [Section("untested", "", [Text(untested)]), *sections],
         [
-            Tile(one.output, f"{words.size(one.unit, one.rmse)}", "RMS residual", f"output-{k}")
+            Tile(
+                f"Residual of {one.output}",
+                words.size(one.unit, one.rmse),
+                f"RMS, {percent(one.rmse / one.span)} of its range" if one.span else "RMS",
+                f"output-{k}",
+            )
             for k, one in enumerate(found.outputs[:4])
         ],
+        answers=[("Is it right?", words.check_verdict(found, sized=False))],
     ).html()
 
 
@@ -74,7 +78,7 @@ def _output(one: OutputCheck, place: int, runs: list[Run]) -> list[Any]:
         [words.missed(one, each), f"{100 * each.share:.2g}", each.size, _p(each.p_value)]
         for each in one.missing
     ]
-    items: list[Any] = []
+    items: list[Any] = [Text(words.check_notes(one))]
     if missing:
         headings = ["Missed", "Share of the variance [%]", f"RMS [{one.unit}]", "p"]
         items.append(Table(headings, missing))

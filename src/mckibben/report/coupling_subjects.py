@@ -10,7 +10,6 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.comparison.channels import Channels, any_moves, moved_by
 from mckibben.diagnosis.conditions import FOLLOWS
-from mckibben.numerals import numeral
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
     N_AGES,
@@ -79,24 +78,6 @@ class Coupling:
         return tuple(
             (moved_by(recordings, self.own(output, recordings), others), output)
             for output in self.outputs
-        )
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """What moves every output, in words."""
-        return tuple(map(self._moved, self.outputs))
-
-    def _moved(self, output: str) -> str:
-        place = self.outputs.index(output)
-        effects, unit = self.effects[place], f" {self.units[place]}".rstrip()
-        if not np.isfinite(effects).all():
-            return f"Effects on {output} cannot be separated: inputs follow from each other."
-        first, *others = np.argsort(-np.abs(effects))[:MOST]
-        least = "".join(f", {self.inputs[k]} by {numeral(effects[k])}{unit}" for k in others)
-        return (
-            f"{self.inputs[first]} moves {output} by {numeral(effects[first])}{unit} over its range"
-            f"{least}; {numeral(100 * (1 - self.explained[place]), 2)} % of its variance is bent, or "
-            "remembers."
         )
 
     @property

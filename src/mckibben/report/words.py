@@ -362,9 +362,9 @@ def _spanning(limits: tuple[float, float], unit: str) -> str:
 # --- Residual check ---------------------------------------------------------------------------------
 
 
-def check_verdict(found: Validation) -> str:
+def check_verdict(found: Validation, *, sized: bool = True) -> str:
     """Return what the residual of every output follows first, in a sentence each."""
-    return " ".join(_residual(one) for one in found.outputs)
+    return " ".join(_residual(one, sized=sized) for one in found.outputs)
 
 
 def check_sentences(found: Validation) -> list[str]:
@@ -372,15 +372,22 @@ def check_sentences(found: Validation) -> list[str]:
     said = []
     for one in found.outputs:
         own = [] if one.exact else [_missed(one, each) for each in one.missing]
-        if one.whiteness.p_value is not None:
-            white = one.whiteness.p_value > WHITE
-            own.append(f"It is {'' if white else 'not '}white ({_p(one.whiteness.p_value)}).")
-        if one.missing and not one.exact:
-            own.append(_advice(_largest(one)))
         said += [
-            f"{one.output}: {each}" if len(found.outputs) > 1 else each for each in own if each
+            f"{one.output}: {each}" if len(found.outputs) > 1 else each
+            for each in (*own, *check_notes(one))
         ]
     return said
+
+
+def check_notes(one: OutputCheck) -> list[str]:
+    """Return whether a residual is white, and what to do about what it follows first."""
+    said = []
+    if one.whiteness.p_value is not None:
+        white = one.whiteness.p_value > WHITE
+        said.append(f"It is {'' if white else 'not '}white ({_p(one.whiteness.p_value)}).")
+    if one.missing and not one.exact:
+        said.append(_advice(_largest(one)))
+    return [*filter(None, said)]
 
 
 def missed(one: OutputCheck, finding: Finding) -> str:
@@ -711,22 +718,6 @@ def inverse(study: Study) -> str:
     return (
         f"{text}. On the muscle the error of the model adds, {numeral(own, 2)} {unit} on the test."
     )
-
-
-def verdict(study: Study) -> list[str]:
-    """Return which model is chosen, how far it is from others, and what limits it."""
-    board, best = study.leaderboard, study.leaderboard.best
-    if not (said := chosen(board)):
-        return ["No model is fitted yet." if board.pending else "No model could be identified."]
-    sentences = [said]
-    if best is not None and best.rmse_interval is not None:
-        low, high = (numeral(end, 3) for end in best.rmse_interval)
-        sentences.append(f"95 % interval of its test RMSE: {low} to {high} {board.unit}.")
-    if board.level:
-        sentences.append(f"{listing(board.level)}: {LEVEL}.")
-    if best is not None and best.caution is not None:
-        sentences.append(f"{best.model} is good only near the motions it was fitted to.")
-    return sentences
 
 
 def duration(recording: Recording) -> str:

@@ -190,6 +190,98 @@ Fields = Annotated[
 ]  # fmt: skip
 
 
+MOST = 2.0 * 1024**3
+"""Largest file that is read by default [bytes]."""
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How files are read; see `mckibben.read` for all but the last three.
+
+    Parameters
+    ----------
+    calibration : mapping of str to (str, float, float, str)
+        Channel -> column, gain, offset and unit.
+    between : (float, float), optional
+        Part of every recording [s].
+    resample : float, optional
+        Sample time to resample to [s].
+    zero : sequence of str
+        Channels that count from where the input is lowest, in each recording.
+    """
+
+    columns: Annotated[
+        Mapping[str, str],
+        Option("Column of a channel, as pressure=P1.", "CHANNEL=COLUMN", "--column", pair),
+    ] = field(default_factory=dict)
+    units: Annotated[
+        Mapping[str, str],
+        Option("Unit of a channel, as pressure=kPa.", "CHANNEL=UNIT", "--unit", pair),
+    ] = field(default_factory=dict)
+    constants: Annotated[
+        Mapping[str, tuple[float, str]],
+        Option(
+            "A channel that was held and has no column, as 'force=200 g'.",
+            "CHANNEL=VALUE UNIT",
+            "--constant",
+            constant,
+        ),
+    ] = field(default_factory=dict)
+    calibration: Annotated[
+        Mapping[str, tuple[str, float, float, str]],
+        Option(
+            "A channel in raw volts or counts, as pressure=A0:2.5:-0.5:bar.",
+            "CHANNEL=COLUMN:GAIN:OFFSET:UNIT",
+            "--calibrate",
+            calibration,
+        ),
+    ] = field(default_factory=dict)
+    most: Annotated[float, Option("Largest file read, as 2GB.", "SIZE", parse=size)] = MOST
+    rate: Annotated[float | None, Option("Samples per second, without a time column.", "HZ")] = None
+    gaps: Annotated[
+        Literal["error", "split", "interpolate"],
+        Option("Treatment of gaps in time and missing samples."),
+    ] = "error"
+    raw: Annotated[
+        bool, Option("Read codes for missing samples, and counter wraps, as measured.")
+    ] = False
+    rest_length: Annotated[
+        float | None,
+        Option("Length at displacement 0: converts contraction, displacement, length.", "MM"),
+    ] = None
+    between: Annotated[
+        tuple[float, float] | None,
+        Option("Part of every recording [s]; either may be left out.", "START:END", "", span),
+    ] = None
+    resample: Annotated[
+        float | None, Option("Sample time to resample to, without aliasing.", "SECONDS")
+    ] = None
+    zero: Annotated[
+        tuple[str, ...],
+        Option("Channel that counts from where the input is lowest; repeatable.", "CHANNEL"),
+    ] = ()
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments of `mckibben.read`."""
+        columns, units = dict(self.columns), dict(self.units)
+        for channel, (column, _, _, unit) in self.calibration.items():
+            columns[channel] = column
+            units.setdefault(channel, unit)
+        return {
+            "columns": columns,
+            "units": units,
+            "calibration": {
+                name: (gain, zero) for name, (_, gain, zero, _) in self.calibration.items()
+            },
+            "constants": dict(self.constants),
+            "rate": self.rate,
+            "gaps": self.gaps,
+            "raw": self.raw,
+            "rest_length": self.rest_length,
+            "most": self.most,
+        }
+
+
 @dataclass(frozen=True)
 class FitOptions:
     """Options of `fit`."""

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mckibben import options
 from mckibben.errors import DataError
-from mckibben.options import Option
+from mckibben.options import ReadOptions
 from mckibben.recording import Recording, is_frame
 from mckibben.recording import listed as recordings_of
 
@@ -20,116 +19,24 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.data_gaps import Gap
     from mckibben.files.choosing import Seen
 
-MOST = 2.0 * 1024**3
-"""Largest file that is read by default [bytes]."""
-
 Data = Recording | str | Path | Sequence[Recording | str | Path]
 """Recordings, or files or folders with some."""
 
 
-@dataclass(frozen=True)
-class ReadOptions:
-    """How files are read; see `mckibben.read` for all but the last three.
+def prepared(recordings: list[Recording], reading: ReadOptions) -> list[Recording]:
+    """Return recordings cut, resampled and zeroed."""
+    from mckibben.comparison.channels import recognised
+    from mckibben.signals import cut, resample, zeroed
 
-    Parameters
-    ----------
-    calibration : mapping of str to (str, float, float, str)
-        Channel -> column, gain, offset and unit.
-    between : (float, float), optional
-        Part of every recording [s].
-    resample : float, optional
-        Sample time to resample to [s].
-    zero : sequence of str
-        Channels that count from where the input is lowest, in each recording.
-    """
-
-    columns: Annotated[
-        Mapping[str, str],
-        Option("Column of a channel, as pressure=P1.", "CHANNEL=COLUMN", "--column", options.pair),
-    ] = field(default_factory=dict)
-    units: Annotated[
-        Mapping[str, str],
-        Option("Unit of a channel, as pressure=kPa.", "CHANNEL=UNIT", "--unit", options.pair),
-    ] = field(default_factory=dict)
-    constants: Annotated[
-        Mapping[str, tuple[float, str]],
-        Option(
-            "A channel that was held and has no column, as 'force=200 g'.",
-            "CHANNEL=VALUE UNIT",
-            "--constant",
-            options.constant,
-        ),
-    ] = field(default_factory=dict)
-    calibration: Annotated[
-        Mapping[str, tuple[str, float, float, str]],
-        Option(
-            "A channel in raw volts or counts, as pressure=A0:2.5:-0.5:bar.",
-            "CHANNEL=COLUMN:GAIN:OFFSET:UNIT",
-            "--calibrate",
-            options.calibration,
-        ),
-    ] = field(default_factory=dict)
-    most: Annotated[float, Option("Largest file read, as 2GB.", "SIZE", parse=options.size)] = MOST
-    rate: Annotated[float | None, Option("Samples per second, without a time column.", "HZ")] = None
-    gaps: Annotated[
-        Literal["error", "split", "interpolate"],
-        Option("Treatment of gaps in time and missing samples."),
-    ] = "error"
-    raw: Annotated[
-        bool, Option("Read codes for missing samples, and counter wraps, as measured.")
-    ] = False
-    rest_length: Annotated[
-        float | None,
-        Option("Length at displacement 0: converts contraction, displacement, length.", "MM"),
-    ] = None
-    between: Annotated[
-        tuple[float, float] | None,
-        Option(
-            "Part of every recording [s]; either may be left out.", "START:END", "", options.span
-        ),
-    ] = None
-    resample: Annotated[
-        float | None, Option("Sample time to resample to, without aliasing.", "SECONDS")
-    ] = None
-    zero: Annotated[
-        tuple[str, ...],
-        Option("Channel that counts from where the input is lowest; repeatable.", "CHANNEL"),
-    ] = ()
-
-    def arguments(self) -> dict[str, Any]:
-        """Return the arguments of `mckibben.read`."""
-        columns, units = dict(self.columns), dict(self.units)
-        for channel, (column, _, _, unit) in self.calibration.items():
-            columns[channel] = column
-            units.setdefault(channel, unit)
-        return {
-            "columns": columns,
-            "units": units,
-            "calibration": {
-                name: (gain, zero) for name, (_, gain, zero, _) in self.calibration.items()
-            },
-            "constants": dict(self.constants),
-            "rate": self.rate,
-            "gaps": self.gaps,
-            "raw": self.raw,
-            "rest_length": self.rest_length,
-            "most": self.most,
-        }
-
-    def prepare(self, recordings: list[Recording]) -> list[Recording]:
-        """Return recordings cut, resampled and zeroed."""
-        from mckibben.comparison.channels import recognised
-        from mckibben.signals import cut, resample, zeroed
-
-        if self.between is not None:
-            recordings = [cut(one, *self.between) for one in recordings]
-        if self.resample is not None:
-            recordings = [resample(one, self.resample) for one in recordings]
-        if self.zero:
-            drives = [recognised([one], list(one.channels))[0][0] for one in recordings]
-            pairs = zip(recordings, drives, strict=True)
-            recordings = [zeroed(one, list(self.zero), over) for one, over in pairs]
-        return recordings
+    if reading.between is not None:
+        recordings = [cut(one, *reading.between) for one in recordings]
+    if reading.resample is not None:
+        recordings = [resample(one, reading.resample) for one in recordings]
+    if reading.zero:
+        drives = [recognised([one], list(one.channels))[0][0] for one in recordings]
+        pairs = zip(recordings, drives, strict=True)
+        recordings = [zeroed(one, list(reading.zero), over) for one, over in pairs]
+    return recordings
 
 
 def items(data: Any) -> list[Recording | Path]:
@@ -184,7 +91,7 @@ def read_files(
             found.append(one)
         else:
             found += read(one, channels=channels, informative=informative, **reading.arguments())
-    return reading.prepare(found)
+    return prepared(found, reading)
 
 
 def read_sides(
@@ -334,7 +241,7 @@ def look(
         else:
             found, columns[str(file)] = look_into(file, **arguments)
             recordings += found
-    recordings = reading.prepare(recordings)
+    recordings = prepared(recordings, reading)
     gaps: tuple[Gap, ...] | str
     try:
         gaps = data_gaps(recordings, inputs, outputs)

@@ -37,13 +37,13 @@ from mckibben.options import (
     FMUOptions,
     InvertOptions,
     PlanOptions,
+    ReadOptions,
     StudyOptions,
     TrackOptions,
     given_options,
 )
 from mckibben.reading import (
     Data,
-    ReadOptions,
     files_of,
     loaded,
     read_files,

@@ -15,7 +15,15 @@ from pathlib import Path
 
 import click
 
-from mckibben.cli.output import InterruptionError, finish, forget_notes, note, say, visible
+from mckibben.cli.output import (
+    INTERRUPTED,
+    InterruptionError,
+    finish,
+    forget_notes,
+    note,
+    say,
+    visible,
+)
 from mckibben.cli.parameters import COMMANDS, as_command, as_flag
 from mckibben.errors import (
     CacheWarning,
@@ -27,7 +35,6 @@ from mckibben.errors import (
 )
 
 BAD_INPUT = 2
-INTERRUPTED = 130
 
 
 class Commands(click.Group):

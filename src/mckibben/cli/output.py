@@ -13,6 +13,9 @@ from mckibben.cli.parameters import as_command, as_flag, plainly
 from mckibben.errors import MckibbenError, in_terms_of
 from mckibben.system.atomic import to_json
 
+INTERRUPTED = 130
+"""Exit code of a command that was stopped."""
+
 _UNSEEN = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )

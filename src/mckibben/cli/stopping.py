@@ -13,14 +13,11 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from mckibben.cli.output import InterruptionError, say
+from mckibben.cli.output import INTERRUPTED, InterruptionError, say
 from mckibben.system.workers import leave
 
 if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Leaderboard
-
-INTERRUPTED = 130
-"""Exit code."""
 
 PATIENCE = 1.3
 """How long the work may take to stop before the program ends without it [s]."""

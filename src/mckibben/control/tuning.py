@@ -53,7 +53,7 @@ def tune_pid(
     sample_time : float
         Of the control to come [s].
     closed_loop_time : float, optional
-        Wished-for time constant [s]; default the dead time, or three samples if that is longer.
+        Desired time constant [s]; default the dead time, or three samples if that is longer.
     hold : float
         Time to settle before and after the step [s].
     scheduled : mapping, optional

@@ -117,7 +117,7 @@ def operator_sums(block: Block) -> Iterator[OperatorSum]:
 
 
 def tracking(loops: Mapping[str, Tracked], output: str, points: int = POINTS) -> Drawing:
-    """Draw a wished-for motion of one output, and what every controller made of it."""
+    """Draw a desired motion of one output, and what every controller made of it."""
     first = next(iter(loops.values())).recording
     wanted = over_time(first.time, first[f"reference_{output}"], points)
     curves = [Curve(*wanted, "reference", style="broad")]

@@ -10,10 +10,11 @@ from typing import Any
 from mckibben.checkpoints import Checkpoints
 from mckibben.errors import DataError
 from mckibben.files.sources import inside
+from mckibben.options import ReadOptions
 from mckibben.outputs import results_in
 from mckibben.papers.experiment import Progress, Reproduction, reproduce
 from mckibben.papers.paper import paper
-from mckibben.reading import ReadOptions, read_files
+from mckibben.reading import read_files
 from mckibben.recording import Recording
 from mckibben.report.reproduction import reproduction_page
 from mckibben.rigs import load_rig

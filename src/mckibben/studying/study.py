@@ -40,7 +40,7 @@ class Study(DrawsItself):
     train, test : tuple of Recording
         Data to fit, and data to test on.
     characterization : Characterization or None
-        What the muscle does; None of several, whose loops say nothing while all move.
+        What the muscle does; None of several muscles.
     leaderboard : Leaderboard
         Models in the order of the choice.
     predictions : mapping of str to tuple of array
@@ -48,19 +48,19 @@ class Study(DrawsItself):
     inverse : InverseCheck or None
         Of the first model of the leaderboard that has one, or None where no model has.
     loops : mapping of str to Tracked
-        What came of following a measured motion on a virtual rig, by controller.
+        Errors of following a measured motion on a virtual rig, by controller.
     plant : str or None
         The rig, and what is changed of the published one.
     not_looped : str
         Why no loop was closed on the rig that the recordings name; empty where it was.
     load : str or None
-        The channel that models are told as the load, where one was named.
+        The channel given to models as the load, where one was named.
     notes : tuple of str
         What was assumed or mended on the way.
     data_gaps : tuple of Gap
         What the recordings cannot identify, most important first.
     check : Validation, str or None
-        What the chosen model misses on the test, or why that cannot be told; None without a choice.
+        What the chosen model misses on the test, or why it was not checked; None without a choice.
     description : ModelDescription or None
         What the chosen model is: equations, parameters and how sure they are.
     review : Review or None
@@ -124,7 +124,6 @@ def study(
     clear: bool = True,
     progress: bool | Callable[[Standing], None] | None = None,
     found: Callable[[Study], None] | None = None,
-    notes: Sequence[str] = (),
     model: Block | None = None,
     compensator: Block | None = None,
     **choices: Any,
@@ -146,10 +145,8 @@ def study(
         Virtual rig to close loops on; default the one that recordings of several muscles say they come
         from, with what was changed of it.
     found : callable, optional
-        Told the study as far as it is: when it is known what the muscle does, before any model is
-        fitted, then whenever a model is finished.
-    notes : sequence of str
-        What was assumed or mended while reading, to be passed on.
+        Called with the study so far: once the muscle is characterized, before any model is fitted,
+        then whenever a model is finished.
     model, compensator : Block, optional
         What ran when ``train`` was logged, which is then reviewed first; see `review`.
     **choices
@@ -193,7 +190,7 @@ def study(
         predictions={},
         inverse=None,
         load=next(iter(channels.scheduling or ()), None),
-        notes=(*notes, *plan.empty.notes),
+        notes=plan.empty.notes,
         data_gaps=data_gaps(recordings, looped, channels.outputs, tests=tests),
         review=reviewed,
     )

@@ -1,4 +1,4 @@
-"""Compensate: a wished-for motion, what can be reached, the pressures, and whether that is right."""
+"""Compensate: a desired motion, what can be reached, the pressures, and whether that is right."""
 
 from __future__ import annotations
 

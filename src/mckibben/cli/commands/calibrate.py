@@ -11,8 +11,7 @@ from typing import Annotated, Literal
 
 from mckibben.cli.output import show
 from mckibben.cli.parameters import Files, Force, Json, ModelFile, command
-from mckibben.options import Option
-from mckibben.reading import ReadOptions
+from mckibben.options import Option, ReadOptions
 
 
 @command

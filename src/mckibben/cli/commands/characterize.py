@@ -6,8 +6,7 @@ from typing import Annotated
 
 from mckibben.cli.output import show
 from mckibben.cli.parameters import Files, Json, command
-from mckibben.options import Option
-from mckibben.reading import ReadOptions
+from mckibben.options import Option, ReadOptions
 
 
 @command

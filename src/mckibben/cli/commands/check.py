@@ -1,8 +1,8 @@
 """Test whether a saved model is right on recordings, and what it misses.
 
 The model runs free. Its residual is tested for following a lag, inputs, their branches (hysteresis),
-loads, time (drift), speed, holds (creep) and position. Recordings that the model was not fitted to
-say most. A folder stands for all recordings in it.
+loads, time (drift), speed, holds (creep) and position. Use
+recordings that the model was not fitted to. A folder stands for all recordings in it.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ from typing import Annotated
 
 from mckibben.cli.output import progress_bar, show
 from mckibben.cli.parameters import Files, Force, Json, ModelFile, command
-from mckibben.options import Option
-from mckibben.reading import ReadOptions
+from mckibben.options import Option, ReadOptions
 
 
 @command

@@ -14,8 +14,7 @@ from typing import Annotated
 from mckibben.cli.output import progress_bar, show
 from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command
 from mckibben.cli.stopping import stop_short, stoppable
-from mckibben.options import CompareOptions, Option
-from mckibben.reading import ReadOptions
+from mckibben.options import CompareOptions, Option, ReadOptions
 
 NO_MODEL = 1
 """Exit code where none of the models could be fitted."""

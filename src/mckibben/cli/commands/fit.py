@@ -11,8 +11,7 @@ from typing import Annotated
 
 from mckibben.cli.output import progress_bar, show
 from mckibben.cli.parameters import Argument, Files, Force, Json, command
-from mckibben.options import FitOptions, Option
-from mckibben.reading import ReadOptions
+from mckibben.options import FitOptions, Option, ReadOptions
 
 
 @command

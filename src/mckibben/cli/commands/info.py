@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 from mckibben.cli.output import show
 from mckibben.cli.parameters import Argument, Json, command
-from mckibben.options import Inputs, Option, Outputs
-from mckibben.reading import ReadOptions
+from mckibben.options import Inputs, Option, Outputs, ReadOptions
 
 
 @command

@@ -12,8 +12,7 @@ from typing import Annotated
 
 from mckibben.cli.output import progress_bar, show
 from mckibben.cli.parameters import Force, Json, ModelFile, command
-from mckibben.options import InvertOptions, Option
-from mckibben.reading import ReadOptions
+from mckibben.options import InvertOptions, Option, ReadOptions
 
 
 @command

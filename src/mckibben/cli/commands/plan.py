@@ -1,6 +1,6 @@
 """Write the motion to record next: random motion within limits, and what closes data gaps.
 
-It starts and ends at rest. Expected standard errors of a model's parameters stand beside it.
+It starts and ends at rest. Expected standard errors of a model's parameters are printed.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ from typing import Annotated
 
 from mckibben.cli.output import say, show
 from mckibben.cli.parameters import Argument, Force, Json, command
-from mckibben.options import Option, PlanOptions
-from mckibben.reading import ReadOptions
+from mckibben.options import Option, PlanOptions, ReadOptions
 
 
 @command

@@ -7,8 +7,7 @@ from typing import Annotated
 
 from mckibben.cli.output import say
 from mckibben.cli.parameters import Files, Force, command
-from mckibben.options import Option
-from mckibben.reading import ReadOptions
+from mckibben.options import Option, ReadOptions
 
 
 @command

@@ -11,8 +11,7 @@ from typing import Annotated
 from mckibben.cli.output import progress_bar, show
 from mckibben.cli.parameters import Argument, Force, Json, command
 from mckibben.cli.stopping import stoppable
-from mckibben.options import Jobs, Option, Seed
-from mckibben.reading import ReadOptions
+from mckibben.options import Jobs, Option, ReadOptions, Seed
 
 
 @command

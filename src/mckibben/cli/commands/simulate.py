@@ -11,8 +11,7 @@ from typing import Annotated
 
 from mckibben.cli.output import show
 from mckibben.cli.parameters import Argument, Force, Json, ModelFile, command
-from mckibben.options import Fields, Option
-from mckibben.reading import ReadOptions
+from mckibben.options import Fields, Option, ReadOptions
 
 
 @command

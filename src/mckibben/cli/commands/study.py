@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Annotated
 from mckibben.cli.output import progress_bar, say, show
 from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command, repeated
 from mckibben.cli.stopping import stop_short, stoppable
-from mckibben.options import Option, StudyOptions
-from mckibben.reading import ReadOptions
+from mckibben.options import Option, ReadOptions, StudyOptions
 
 if TYPE_CHECKING:
     from mckibben.studying.study import Study

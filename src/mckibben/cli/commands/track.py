@@ -1,6 +1,6 @@
 """Let a compensator, or a controller with it, follow a reference on a virtual rig, or on a model.
 
-Beside it stands what no compensation does: pressures read off one slow rise of the same plant.
+It is compared with no compensation: pressures read off one slow rise of the same plant.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ from typing import Annotated
 
 from mckibben.cli.output import progress_bar, show
 from mckibben.cli.parameters import Argument, Force, Json, command
-from mckibben.options import Option, TrackOptions
-from mckibben.reading import ReadOptions
+from mckibben.options import Option, ReadOptions, TrackOptions
 
 
 @command

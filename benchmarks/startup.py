@@ -15,8 +15,8 @@ RUNS = 5
 
 COMMANDS = {
     'python -c "import mckibben"': (["-c", "import mckibben"], 0.3),
-    'python -c "import mckibben; mckibben.GPIEstimator()"': (
-        ["-c", "import mckibben; mckibben.GPIEstimator()"],
+    'python -c "import mckibben; mckibben.PIEstimator()"': (
+        ["-c", "import mckibben; mckibben.PIEstimator()"],
         0.6,
     ),
     "mckibben info --models": (["-m", "mckibben", "info", "--models"], 1.5),

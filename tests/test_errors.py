@@ -20,7 +20,7 @@ from mckibben.cli.parameters import COMMANDS, Command, as_command, as_flag
 from mckibben.errors import KernelError, MckibbenError, ModelError, rendered
 
 FACES = ("app", "cli", "report")
-TEXTS = ("problem", "remedy", "instead", "no_inverse", "hint")
+TEXTS = ("problem", "remedy", "instead", "no_inverse", "made_again", "hint")
 RAISED = {name for name in dir(errors) if name.endswith(("Error", "Warning"))} | {"warn", "error"}
 
 

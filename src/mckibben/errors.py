@@ -3,15 +3,14 @@
 A remedy names parameters and operations in backquotes, and whoever shows it renders them in its own
 terms: Python as arguments, the command line as options, the workbench as controls.
 
-=========================== ======================== =====================
-in a remedy                 Python                   command line
-=========================== ======================== =====================
-```gaps```                  gaps                     --gaps
-```gaps=split```            gaps='split'             --gaps split
-```columns[force]=F```      columns={'force': 'F'}   --column force=F
-```settings[delay]=0```     settings={'delay': 0}    --set delay=0
-```track()```               track()                  mckibben track
-=========================== ======================== =====================
+======================= ======================== =====================
+in a remedy             Python                   command line
+======================= ======================== =====================
+gaps                    gaps                     --gaps
+gaps=split              gaps='split'             --gaps split
+columns[force]=F        columns={'force': 'F'}   --column force=F
+track()                 track()                  mckibben track
+======================= ======================== =====================
 """
 
 from __future__ import annotations
@@ -176,11 +175,18 @@ class KernelError(ModelError):
         return type(self), (str(self.file), self.row, self.construct, self.instead)
 
 
-class DataWarning(UserWarning):
+class MckibbenWarning(UserWarning):
+    """Base of every warning; parameters in its text are rendered as in remedies."""
+
+    def __str__(self) -> str:
+        return in_terms_of(str(self.args[0])) if self.args else ""
+
+
+class DataWarning(MckibbenWarning):
     """Something assumed or mended while reading a recording."""
 
 
-class ModelWarning(UserWarning):
+class ModelWarning(MckibbenWarning):
     """Something a model did that its user should know, such as clipping a reference."""
 
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from mckibben.errors import DataError, ModelError
 
@@ -51,13 +51,22 @@ def given_options(
     """
     from mckibben.signals.checking import generator
 
-    base: Any = kind() if options is None else options
+    base: Any = options if options is not None else kind()
+    if not issubclass(type(base), kind):
+        problem = f"these are no {kind.__name__}, but {type(base).__name__}"
+        raise ModelError(problem, parameter="options", remedy="give those of this operation")
     if strange := [name for name in given if name not in base.__dataclass_fields__]:
         raise ModelError(
             f"there is no option {strange[0]!r}",
             remedy=f"use {', '.join(base.__dataclass_fields__)}",
         )
     found = replace(base, **given) if given else base
+    for name, hint in get_type_hints(kind).items():
+        if get_origin(hint) is Literal and getattr(found, name) not in get_args(hint):
+            problem = f"it cannot be {getattr(found, name)!r:.60}"
+            raise ModelError(
+                problem, parameter=name, remedy=f"use one of {', '.join(get_args(hint))}"
+            )
     generator(getattr(found, "seed", 0))  # refuses what is no seed
     return found
 

@@ -288,7 +288,7 @@ class Recording(DrawsItself):
         ----------
         frame : pandas.DataFrame
             Its columns are channels, in the package's units (bar, mm, N, s, rad). A column or an index
-            named ``time`` [s], or an index of dates, is the time grid.
+            named ``time`` [s], or an index of dates or durations, is the time grid.
         sample_time : float, optional
             Time between rows [s], without such a column; none where neither is given.
         units : mapping of str to str, optional
@@ -302,17 +302,17 @@ class Recording(DrawsItself):
             On times that are not uniform, and samples that are none.
         """
         start, known, columns = 0.0, frame.attrs.get("mckibben", {}), frame
+        stamps = frame.index
         if "time" in frame:
-            time, columns = frame["time"].to_numpy(), frame.drop(columns="time")
-        elif frame.index.name == "time" or frame.index.dtype.kind == "M":
-            time = frame.index.to_numpy()
-        else:
-            time = None
-        if time is not None:
-            seconds = (time - time[0]) / np.timedelta64(1, "s") if time.dtype.kind == "M" else time
-            sample_time, start = known.get("grid") or _grid(np.asarray(seconds, dtype=float))
+            stamps, columns = frame["time"], frame.drop(columns="time")
+        kind = stamps.dtype.kind
+        if stamps.name == "time" or kind in "mM":
+            time = stamps.to_numpy(f"{kind}8[ns]" if kind in "mM" else None)
+            seconds = (time - time[:1]) / np.timedelta64(1, "s") if kind in "mM" else time
+            sample_time, start = _grid(_frozen("time", seconds), *known.get("grid") or ())
         channels = {str(name): columns[name].to_numpy() for name in columns}
-        units = known.get("units", {}) | dict(units or {})
+        carried = {name: unit for name, unit in known.get("units", {}).items() if name in channels}
+        units = carried | dict(units or {})
         return cls(channels, sample_time, units, start, known.get("meta", {}) | meta)
 
     def to_frame(self) -> Any:
@@ -454,10 +454,12 @@ def reading_notes(recordings: Iterable[Recording]) -> tuple[str, ...]:
     return tuple(f"{file}: {note}" for file, notes in found.items() for note in notes)
 
 
-def _grid(time: Array) -> tuple[float, float]:
-    """Return the sample time and the start of uniform times."""
+def _grid(time: Array, step: float = 0.0, start: float = 0.0) -> tuple[float, float]:
+    """Return the sample time and the start of uniform times: those given, where they are exact."""
+    if step and np.array_equal(start + step * np.arange(time.size), time):
+        return step, start
     steps = np.diff(time)
-    step = float((time[-1] - time[0]) / max(steps.size, 1)) if steps.size else 0.0
+    step = float(np.median(steps)) if steps.size else 0.0
     wrong = np.flatnonzero(~(np.abs(steps - step) <= 1e-3 * abs(step)))
     if wrong.size or not step > 0:
         raise DataError(
@@ -466,7 +468,7 @@ def _grid(time: Array) -> tuple[float, float]:
             row=int(wrong[0]) + 2 if wrong.size else None,
             remedy="resample the frame, or write it to a CSV and read that",
         )
-    return step, float(time[0])
+    return float(steps.mean()), float(time[0])
 
 
 def is_frame(given: object) -> bool:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from mckibben.arrays import Array
 from mckibben.signals.checking import generator
@@ -192,6 +191,8 @@ class BlockBootstrap:
             offset += n
             n_blocks += n / block
         freedom = max(n_blocks - 1, 1.0)
+        from scipy.special import stdtrit  # which takes a fifth of a second to import
+
         student = float(stdtrit(freedom, 0.975)) / NORMAL_95
         self._wider = student * float(np.sqrt(n_blocks / freedom))
 

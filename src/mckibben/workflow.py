@@ -269,15 +269,18 @@ def _compared(
     whole = chosen.models in ("all", "quick")
     names = list(registry.names("estimators") if whole else chosen.models)
     arguments["settings"] = settings_of_all(names, chosen.settings) if chosen.settings else {}
-    files, runs = expanded(files_of(train), files_of(test)), loaded(train)
-    sides: Sequence[Data] = (runs, [], loaded(test)) if runs else files
+    files = expanded(files_of(train), files_of(test))
+    runs: tuple[list[Recording], ...] = (loaded(train), [], loaded(test))
+    sides: list[Data] = [[*some, *more] for some, more in zip(files, runs, strict=True)]
     logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
     with (
         results_in(out, written(names), inputs=_paths(train, *sides, logs), force=force) as results,
         on_cluster(arguments.pop("dask")),
     ):
-        runs, checks, tests = read_sides(sides, chosen.inputs, chosen.outputs, chosen.load, reading)
-        arguments |= {"train": runs, "validation": [*validation, *checks], "test": tests}
+        fitted, checks, tests = read_sides(
+            sides, chosen.inputs, chosen.outputs, chosen.load, reading
+        )
+        arguments |= {"train": fitted, "validation": [*validation, *checks], "test": tests}
         yield arguments | {"folder": out, "clear": False}, results
 
 
@@ -457,7 +460,7 @@ def check(
     from mckibben.outputs import results_in
     from mckibben.report.check_page import write_check
 
-    files: Data = loaded(data) or expanded([], files_of(data))[2]
+    files: Data = [*loaded(data), *expanded([], files_of(data))[2]]
     names = ["validation.json", "report.html"]
     with results_in(out, names, inputs=_paths(model, files), force=force) as results:
         block = saved(model)
@@ -543,6 +546,9 @@ def export(
     from mckibben.outputs import refuse_inputs
 
     kinds = {"c": COptions, "fmu": FMUOptions, "ros2": ExportOptions}
+    if target not in kinds:
+        problem = f"there is no target {target!r:.60}"
+        raise ModelError(problem, parameter="target", remedy="use c, fmu or ros2")
     chosen: Any = given_options(kinds[target], options, given)
     out = Path(out)
     refuse_inputs(out, _paths(model))

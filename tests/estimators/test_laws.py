@@ -39,6 +39,7 @@ def settings(name: str) -> dict[str, Setting]:
 def test_settings_are_the_arguments_survive_cloning_and_have_forms(name: str) -> None:
     made = load("estimators", name)
     estimator = made(seed=7)
+    assert len(repr(estimator)) <= 240
     known = estimator.get_params()
     assert known.keys() == inspect.signature(made).parameters.keys()
     assert known == made().get_params() | {"seed": 7}

@@ -55,6 +55,28 @@ told()
     assert "scipy.optimize" in after
 
 
+@pytest.mark.parametrize(
+    ("start", "absent"),
+    [
+        ("import mckibben", {"numpy", "pydantic"}),
+        (
+            "from mckibben.cli.entry import run; sys.argv[1:] = ['--help']; run()",
+            {"numpy", "pydantic"},
+        ),
+        ("from mckibben import PIEstimator; PIEstimator()", HEAVY | {"scipy"}),
+    ],
+)
+def test_a_start_loads_little(start: str, absent: set[str], tmp_path: Path) -> None:
+    code = f"""
+import sys
+try:
+    {start}
+finally:
+    print(*sorted({absent} & set(sys.modules)), flush=True)
+"""
+    assert printed(code, tmp_path)[-1] == ""
+
+
 CALLED = """
 from mckibben.system.compiling import deferred
 

@@ -85,7 +85,7 @@ class Band(Block):
     kernel: ClassVar[Step] = band_step
     start_kernel: ClassVar[Start] = band_start
     parameters: ClassVar[tuple[str, ...]] = ("widening",)
-    made_again: ClassVar[str] = "calibrate the model again (mckibben calibrate)"
+    made_again: ClassVar[str] = "calibrate the model again, with `calibrate()`"
     notation: ClassVar[Notation] = Notation(
         r"y^{\pm} = y \pm q\,(1 + k\,|\dot y|)",
         widening="k_{k} [s/{out0}]",

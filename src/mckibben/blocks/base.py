@@ -7,11 +7,14 @@ else here is built on that.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
+from reprlib import Repr
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
 import numpy as np
@@ -39,6 +42,9 @@ VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
 """Named starts, and whether a start kernel takes them as if nothing had happened before.
 
 "fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamics.starts`."""
+
+SHORT = Repr()
+SHORT.maxother = 100  # characters of a part in the `repr` of a block
 
 Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 """Names of fields of channels: driven, scheduling, and given."""
@@ -139,6 +145,16 @@ class Block(DrawsItself, Parametrised):
         return ""
 
     # -- channels ----------------------------------------------------------------------------
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        cls.__repr__ = Block.__repr__  # type: ignore[method-assign]  # not the long one of dataclasses
+
+    def __repr__(self) -> str:
+        """Return the class and what is not at its default, cut to three lines of a terminal."""
+        values = [(f, getattr(self, f.name)) for f in dataclasses.fields(self)]  # type: ignore[arg-type]
+        changed = [f"{f.name}={SHORT.repr(value)}" for f, value in values if value != f.default]
+        return shorten(f"{type(self).__name__}({', '.join(changed)})", 240, placeholder=" ...)")
 
     @property
     def inputs(self) -> tuple[Channel, ...]:

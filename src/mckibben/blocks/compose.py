@@ -77,7 +77,7 @@ class Layout:
             return terms[0]
         return self._append(None, terms, 1)[0]
 
-    def resume(self, state: Sequence[float]) -> None:
+    def resume(self, state: Sequence[float] | Array) -> None:
         """Start the blocks called last from a state of them all."""
         left = np.array(state, dtype=np.float64)
         for call, block in reversed(list(self.calls())):

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
 
-from mckibben.arrays import NARROWEST
+from mckibben.arrays import NARROWEST, Array
 from mckibben.errors import ModelError
 
 Rule = Literal["first_sample", "virgin", "fitted"]
 """Name of a starting memory."""
 
-Initial = Rule | Sequence[float]
+Initial = Rule | Sequence[float] | Array
 """Memory before the first sample."""
 
 

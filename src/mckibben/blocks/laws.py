@@ -261,6 +261,12 @@ def _takes_recordings(trial: Trial) -> None:
         law = "a recording gives the outputs that an array gives"
         trial.same(modelled[channel.name], trial.outputs[:, index], law)
         trial.demand(modelled.units[channel.name] == channel.unit, "outputs carry their units")
+    half = len(trial.inputs) // 2
+    first = {name: samples[:half] for name, samples in columns.items()}
+    state = block.final_state(Recording(first, trial.sample_time, units))
+    law = "simulating on from final_state equals simulating in one go"
+    trial.same(trial.run(trial.inputs[half:], state), trial.outputs[half:], law)
+    trial.demand(len(repr(block)) <= 240 and "\n" not in repr(block), "repr takes three lines")
     for name in columns:
         others = {**columns, "unrelated": columns[name]}
         del others[name]

@@ -77,8 +77,8 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
     unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
     if unknown:
-        again = getattr(cls, "made_again", "save the model again")
-        raise ModelError(f"{kind!r} has no field {unknown[0]!r}", remedy=again)
+        remedy = getattr(cls, "made_again", "save the model again")
+        raise ModelError(f"{kind!r} has no field {unknown[0]!r}", remedy=remedy)
     return cls(**values)
 
 

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import click
 
-from mckibben.cli.output import InterruptionError, finish, say, visible
-from mckibben.cli.parameters import COMMANDS, as_command, as_flag, plainly
+from mckibben.cli.output import InterruptionError, finish, forget_notes, note, say, visible
+from mckibben.cli.parameters import COMMANDS, as_command, as_flag
 from mckibben.errors import (
     CacheWarning,
     DataError,
@@ -88,11 +88,12 @@ app = Commands(
 
 def run() -> None:
     """Run the command line: errors become one paragraph on standard error, and an exit code."""
+    forget_notes()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for category in (CacheWarning, DataWarning, ModelWarning):
             warnings.simplefilter("always", category)
-        warnings.showwarning = lambda message, *_: say(f"Note: {plainly(str(message))}", error=True)
+        warnings.showwarning = lambda message, *_: note(_text(message), error=True)
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, TextIOWrapper):  # whatever letters the terminal lacks
                 stream.reconfigure(errors="backslashreplace")
@@ -138,3 +139,8 @@ def _say(message: str, code: int) -> int:
     with suppress(OSError, AttributeError, ValueError, MckibbenError):
         finish()
     return code
+
+
+def _text(warning: Warning | str) -> str:
+    """Return the text of a warning with its parameters as they were written."""
+    return str(warning.args[0] if isinstance(warning, Warning) and warning.args else warning)

@@ -42,6 +42,22 @@ def say(text: str = "", *, end: str = "\n", flush: bool = False, error: bool = F
         print(visible(text), end=end, flush=flush)
 
 
+_noted: set[str] = set()
+
+
+def note(text: str, *, error: bool = False) -> None:
+    """Print a note, unless it was printed before; its parameters as flags."""
+    line = f"Note: {plainly(text)}"
+    if line not in _noted:
+        _noted.add(line)
+        say(line, error=error)
+
+
+def forget_notes() -> None:
+    """Begin a command: nothing was printed yet."""
+    _noted.clear()
+
+
 def finish() -> None:
     """Flush standard output."""
     with _to_output():
@@ -82,9 +98,12 @@ def show(
         say(to_json(result.to_dict() if hasattr(result, "to_dict") else result))
         return
     for line in lines():
-        say(in_terms_of(line, as_flag, as_command))
-    for note in notes:
-        say(f"Note: {plainly(note)}")
+        if line.startswith("Note: "):
+            note(line.removeprefix("Note: "))
+        else:
+            say(in_terms_of(line, as_flag, as_command))
+    for one in notes:
+        note(one)
     if paths := [str(path) for path in written if path is not None]:
         say(f"Written: {', '.join(paths)}")
 

@@ -43,8 +43,8 @@ from mckibben.system.workers import checked
 
 Watch = Callable[[str, float, float], None]
 
-SURE = 3.0
-"""Time after which the time left is estimated by the pace so far [s]."""
+SURE = 0.1
+"""Share of the work after which the time left is estimated by the pace so far."""
 
 
 @dataclass(frozen=True)
@@ -258,7 +258,7 @@ def ranked(
             rest = sum(efforts[name] for name in waiting)
             done = sum(efforts.values()) - rest
             spent = time.monotonic() - started
-            pace = spent / done if done and spent > SURE else 1 / workers
+            pace = spent / done if done > SURE * (done + rest) else 1 / workers
             counts = len(table.rows), len(plan.items)
             progress(Standing(*counts, working, best, plan.empty.unit, rest * pace))
 

@@ -1,7 +1,7 @@
 """The wire: an exported model on a microcontroller, led from Python over a serial line.
 
-The protocol is described in docs/deploy/link.md; the other end is what ``mckibben export c --link``
-writes.
+The protocol is described in docs/deploy/link.md; the other end is C99 that was
+exported with ``link``.
 """
 
 from __future__ import annotations

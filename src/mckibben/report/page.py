@@ -88,8 +88,8 @@ def page(study: Study, command: str = "", *, title: str = "") -> str:
     names = [one.recording.name for one in unique(pictured)]
     more = len(unique(every)) - len(names)
     return Page(
-        title or first.recording.name,
-        f"Hysteresis of {study.output} over {study.input if first.several else first.input}: "
+        title
+        or f"{study.output} over {study.input if first.several else first.input}".capitalize(),
         f"{', '.join(names)}{f' and {more} more' if more else ''}",
         [one for one in sections if one is not None],
         tiles(study),

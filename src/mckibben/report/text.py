@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mckibben.numerals import numeral
+from mckibben.recording import reading_notes
 from mckibben.report import words
 
 if TYPE_CHECKING:
@@ -322,7 +323,7 @@ def contents(found: Contents) -> Iterator[str]:
                 for name, one in about["channels"].items()
             ],
         )
-        yield from (f"Note: {note}" for note in recording.notes)
+        yield from (f"Note: {note}" for note in reading_notes([recording]))
     yield ""
     if isinstance(found.gaps, str):
         yield f"Data gaps: unknown, {found.gaps}"

@@ -49,9 +49,7 @@ BEYOND = 0.1
 FRICTION = (0.002, 0.1)
 """Smallest and largest threshold of a muscle's own friction, relative to its travel."""
 
-ARBITRARY = (
-    "its network is arbitrary where muscles move in other combinations (mckibben reproduce sdchm)"
-)
+ARBITRARY = "its network is arbitrary where muscles move in other combinations"
 
 LEAST_SLOPE = 0.05
 """Smallest slope of a displacement by itself, right after a reversal."""

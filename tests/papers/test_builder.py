@@ -142,6 +142,8 @@ def test_pages_name_the_paper_and_its_figures() -> None:
     html = reproduction_page(found)
     for part in (found.paper.title, found.paper.question, found.paper.authors):
         assert part in html
+    ids = re.findall(r'<[^<>]* id="([^"]*)"', html)
+    assert len(ids) == len(set(ids))  # scripts find their data by them
 
 
 def test_own_recordings_are_sorted_or_the_paper_says_what_is_missing() -> None:

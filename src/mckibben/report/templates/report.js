@@ -1,6 +1,6 @@
 "use strict";
 
-const source = document.getElementById("figures").textContent;
+const source = document.getElementById("figures-data").textContent;
 const choices = { recording: 0, models: new Set() };
 
 function unpack(key, value) {
@@ -40,7 +40,7 @@ function styled(layout) {
   return whole;
 }
 
-const config = { responsive: true, ...JSON.parse(document.getElementById("bar").textContent) };
+const config = { responsive: true, ...JSON.parse(document.getElementById("bar-data").textContent) };
 
 function draw(place) {
   const variants = figures[place.dataset.figure];

@@ -61,7 +61,8 @@ def control(name: str, key: str | None = None, value: str | None = None) -> str:
         return f"“{GAPS[value]}”"
     shown = _CONTROLS.get(name, name.replace("_", " "))
     of = f" of {key}" if key else ""
-    given = f" ({value})" if value and not value.isupper() else ""
+    placeholder = value is not None and value.isupper() and len(value) > 1  # such as UNIT, not N
+    given = f" ({value})" if value and not placeholder else ""
     return f"{shown}{of}{given}"
 
 

@@ -85,7 +85,7 @@ def parsed(option: Option, text: str, name: str) -> Any:
         raise DataError(
             f"{text!r:.80} is not of the form {option.metavar}",
             parameter=name,
-            remedy=f"write it so: {option.help}",
+            remedy=f"write it so: {option.help.rstrip('.')}",
         ) from None
 
 

@@ -15,6 +15,7 @@ import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from mckibben.errors import DataError
 from mckibben.system import ordinary
@@ -142,14 +143,21 @@ class Results:
     inputs : iterable of path
         What is read for the results; never replaced.
     force : bool
-        Whether files of the user's may be replaced.
+        Whether files of the user's, and results of another kind, may be replaced.
+    kind : str
+        What operation writes.
     """
 
     def __init__(
-        self, folder: Path, *, inputs: Iterable[str | Path] = (), force: bool = False
+        self,
+        folder: Path,
+        *,
+        inputs: Iterable[str | Path] = (),
+        force: bool = False,
+        kind: str = "",
     ) -> None:
         self.folder, self.new = folder, folder / UNFINISHED / "new"
-        self._inputs, self._force = list(inputs), force
+        self._inputs, self._force, self._kind = list(inputs), force, kind
         self._digests: dict[str, str] = {}
         _inside(folder, f"{UNFINISHED}/new/{RUN}")
         _finish(folder)
@@ -162,7 +170,11 @@ class Results:
 
         Only what is listed in ``run.json``, and was not changed since, is replaced without ``force``.
         """
-        listed = _listed(self.folder)
+        listed, earlier = _listed(self.folder), _noted(self.folder).get("kind", self._kind)
+        if earlier != self._kind and not self._force:  # whose files this run would remove
+            problem = f"it has results of {earlier}"
+            remedy = "give another folder, or replace all of them with `force`"
+            raise DataError(problem, file=self.folder, remedy=remedy)
         for name in (RUN, *names):
             path = _inside(self.folder, name)
             nearest = next(each for each in path.parents if os.path.lexists(each))
@@ -194,7 +206,8 @@ class Results:
         self.claim(self._digests)
         earlier = _listed(self.folder).items()
         removed = {n: old for n, old in earlier if n not in self._digests and self._removable(n)}
-        write_json(self.new / RUN, {"format": FORMAT, "version": 1, "files": self._digests})
+        run = {"format": FORMAT, "version": 1, "kind": self._kind, "files": self._digests}
+        write_json(self.new / RUN, run)
         journal = {"files": [*self._digests, RUN], "removed": removed}
         write_json(self.new / JOURNAL, journal)
         with written(self.folder):
@@ -217,6 +230,7 @@ def results_in(
     *,
     inputs: Iterable[str | Path] = (),
     force: bool = False,
+    kind: str = "",
 ) -> Iterator[Results | None]:
     """Open a folder of results, made where it is missing, to which this process alone writes.
 
@@ -228,6 +242,8 @@ def results_in(
         Files that will be written, by their path in the folder; claimed now.
     inputs, force
         As for `claim`.
+    kind : str
+        What operation writes. A folder has results of one.
 
     Raises
     ------
@@ -255,7 +271,7 @@ def results_in(
             remedy = "wait until it has ended, or give another folder"
             raise DataError(problem, file=folder, remedy=remedy) from None
     try:
-        found = Results(folder, inputs=inputs, force=force)
+        found = Results(folder, inputs=inputs, force=force, kind=kind)
         found.claim(names)
         yield found
     finally:
@@ -306,9 +322,15 @@ def _prune(folder: Path) -> None:
 
 def _listed(folder: Path) -> Mapping[str, str]:
     """Return the digests by file that the last run noted; none where it is absent or damaged."""
+    found = _noted(folder).get("files")
+    return found if isinstance(found, dict) else {}
+
+
+def _noted(folder: Path) -> Mapping[str, Any]:
+    """Return what the last run noted; nothing where it is absent or damaged."""
     try:
         found = json.loads(ordinary.read_text(folder / RUN, most=ordinary.DESCRIPTION))
-        return dict(found["files"]) if found["format"] == FORMAT else {}
+        return dict(found) if found["format"] == FORMAT else {}
     except (DataError, ValueError, TypeError, KeyError):
         return {}
 

@@ -6,7 +6,7 @@ returns a result that has numbers as ``to_dict()``. Parameters that they have in
 options : dataclass, optional
     Of `mckibben.options`; its fields may also be given by name.
 reading : ReadOptions, optional
-    How files are read.
+    How files are read; its fields may also be given by name.
 out : path, optional
     File or folder to write. The files of an earlier run are replaced when all is done.
 force : bool
@@ -25,7 +25,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_type_hints
 
 from mckibben import registry
 from mckibben.errors import DataError, ModelError
@@ -36,6 +36,7 @@ from mckibben.options import (
     FitOptions,
     FMUOptions,
     InvertOptions,
+    Options,
     PlanOptions,
     ReadOptions,
     StudyOptions,
@@ -82,7 +83,7 @@ def fit(
     from mckibben.comparison.shared_rows import check_shared
     from mckibben.estimators.catalogue import settings_of
 
-    chosen = given_options(FitOptions, options, given)
+    chosen, reading = _chosen(FitOptions, options, reading, given)
     settings = settings_of(model, chosen.settings)
     prior = chosen.prior or settings.get("prior")
     file = _claim(out, _paths(data, chosen.validation, chosen.residual_of, prior), force)
@@ -167,7 +168,7 @@ def compare(
     from mckibben.comparison.ranking import compare as rank
     from mckibben.report.results_folder import LEADERBOARD, write_leaderboard
 
-    chosen = given_options(CompareOptions, options, given)
+    chosen, reading = _chosen(CompareOptions, options, reading, given)
     with _compared(train, test, validation, chosen, reading, out, force, lambda _: LEADERBOARD) as (
         arguments,
         results,
@@ -202,7 +203,7 @@ def study(
     from mckibben.report.results_folder import StudyFolder, study_files
     from mckibben.studying.study import study as run
 
-    chosen = given_options(StudyOptions, options, given)
+    chosen, reading = _chosen(StudyOptions, options, reading, given)
     with _compared(train, test, validation, chosen, reading, out, force, study_files) as (
         arguments,
         results,
@@ -273,8 +274,10 @@ def _compared(
     runs: tuple[list[Recording], ...] = (loaded(train), [], loaded(test))
     sides: list[Data] = [[*some, *more] for some, more in zip(files, runs, strict=True)]
     logs = [getattr(chosen, name, None) for name in ("model", "compensator")]
+    read = _paths(train, *sides, logs)
+    kind = "study" if isinstance(chosen, StudyOptions) else "compare"
     with (
-        results_in(out, written(names), inputs=_paths(train, *sides, logs), force=force) as results,
+        results_in(out, written(names), inputs=read, force=force, kind=kind) as results,
         on_cluster(arguments.pop("dask")),
     ):
         fitted, checks, tests = read_sides(
@@ -310,7 +313,7 @@ def track(
     from mckibben.control.twin import COMMAND
     from mckibben.files import write
 
-    chosen = given_options(TrackOptions, options, given)
+    chosen, reading = _chosen(TrackOptions, options, reading, given)
     read = _paths(compensator, reference, chosen.rig, chosen.plant)
     file = _claim(out, read, force, recording=True)
     controller_file = _claim(controller_out, [*read, *_paths(out)], force)
@@ -399,7 +402,7 @@ def invert(
     **given: Any,
 ) -> Inverse:
     """Return the compensator of a model: desired output in, input out; or its estimate of force."""
-    chosen = given_options(InvertOptions, options, given)
+    chosen, reading = _chosen(InvertOptions, options, reading, given)
     chosen.check()
     file = _claim(out, _paths(model, chosen.learned), force)
     found = _inverse(saved(model, chosen.fields), chosen, reading, progress)
@@ -462,7 +465,7 @@ def check(
 
     files: Data = [*loaded(data), *expanded([], files_of(data))[2]]
     names = ["validation.json", "report.html"]
-    with results_in(out, names, inputs=_paths(model, files), force=force) as results:
+    with results_in(out, names, inputs=_paths(model, files), force=force, kind="check") as results:
         block = saved(model)
         needed = dict.fromkeys(channel.name for channel in (*block.inputs, *block.outputs))
         recordings = read_files(files, list(needed), reading)
@@ -490,7 +493,7 @@ def plan(
     from mckibben.files import write
     from mckibben.planning.planner import plan as make
 
-    chosen = given_options(PlanOptions, options, given)
+    chosen, reading = _chosen(PlanOptions, options, reading, given)
     arguments = {one.name: getattr(chosen, one.name) for one in fields(chosen)}
     read = _paths(data, chosen.rig, chosen.muscle, chosen.model)
     file = _claim(out, read, force, recording=True)
@@ -601,13 +604,29 @@ def unfinished(folder: str | Path) -> Path:
     return Path(folder) / UNFINISHED / "new"
 
 
+def _chosen(
+    kind: type[Options],
+    options: Options | None,
+    reading: ReadOptions | None,
+    given: Mapping[str, Any],
+) -> tuple[Options, ReadOptions | None]:
+    """Return options of an operation and of reading, either with fields given by name."""
+    names = {one.name for one in fields(ReadOptions)} - {*get_type_hints(kind)}
+    read = {name: value for name, value in given.items() if name in names}
+    rest = {name: value for name, value in given.items() if name not in read}
+    chosen = given_options(kind, options, rest)
+    return chosen, given_options(ReadOptions, reading, read) if read else reading
+
+
 def saved(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
-    """Return a model, read where it is a file, with some of its fields set."""
+    """Return a model, also of a file or of `fit` or `invert`, with some of its fields set."""
     from mckibben.blocks.saving import load
     from mckibben.blocks.setting import with_fields
 
     if model is None:
         return None
+    if isinstance(model, Fit | Inverse):
+        model = model.model if isinstance(model, Fit) else model.block
     return with_fields(load(model) if isinstance(model, str | Path) else model, settings or {})
 
 

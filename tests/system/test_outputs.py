@@ -189,6 +189,18 @@ def test_a_folder_of_the_user_s_named_as_ours_is_not_emptied(tmp_path: Path) -> 
     assert (tmp_path / UNFINISHED / "new" / "thesis.tex").read_text() == "mine"
 
 
+def test_results_of_another_operation_stay(tmp_path: Path) -> None:
+    run(tmp_path, EARLIER)
+    with pytest.raises(DataError), results_in(tmp_path, ["new"], kind="check"):
+        pass
+    assert held(tmp_path) == EARLIER
+    with results_in(tmp_path, ["new"], kind="check", force=True) as results:
+        assert results is not None
+        results.write_text("new", "1")
+        results.commit()
+    assert held(tmp_path) == {"new": "1"}
+
+
 def test_one_process_writes_to_a_folder(tmp_path: Path) -> None:
     other = "import sys, pathlib; from mckibben.outputs import results_in\n"
     other += "with results_in(sys.argv[1], ['a']): pass"

@@ -21,7 +21,7 @@ def write_folder(folder: Path, files: Mapping[str, str], *, force: bool = False)
     DataError
         If a file of the user's has the name of one, without ``force``, or it cannot be written.
     """
-    with results_in(folder, files, force=force) as results:
+    with results_in(folder, files, force=force, kind="export") as results:
         if results is not None:
             for name, text in files.items():
                 results.write_text(name, text)

@@ -213,7 +213,7 @@ def measure(
     if jobs != 1:
         workers.prepare()
     inputs = [one.folder for one in chosen]
-    with results_in(out, FILES, inputs=inputs, force=force) as results:
+    with results_in(out, FILES, inputs=inputs, force=force, kind="measured") as results:
         every: list[Outcome] = []
         for one in outcomes(chosen, models=models, seed=seed, jobs=jobs, folder=out, tell=progress):
             every.append(one)

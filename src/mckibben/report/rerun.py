@@ -50,7 +50,9 @@ def rerun(
     }
     given |= {"seed": seed, "jobs": jobs, "folder": out}
     inputs = [] if data is None else [data]
-    with results_in(out, ["report.html", "tables.json"], inputs=inputs, force=force) as results:
+    with results_in(
+        out, ["report.html", "tables.json"], inputs=inputs, force=force, kind="reproduce"
+    ) as results:
         with workers.Workers(1, cores=jobs or threads.cores()) as one:
             (outcome,) = one.results(
                 _again, [given], lambda index, *news: progress(*news) if progress and news else None

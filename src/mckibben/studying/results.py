@@ -35,8 +35,8 @@ class Fit:
     """
 
     name: str
-    model: Block
-    estimator: Estimator
+    model: Block = field(repr=False)
+    estimator: Estimator = field(repr=False)
     notes: tuple[str, ...] = ()
     file: Path | None = None
 
@@ -85,14 +85,14 @@ class Tracking:
         Recording and controller, where they were written.
     """
 
-    tracked: Tracked
-    uncompensated: Before
-    plant: Plant
+    tracked: Tracked = field(repr=False)
+    uncompensated: Before = field(repr=False)
+    plant: Plant = field(repr=False)
     law: str
     virtual: bool
     seed: int
-    controller: Any
-    reference: Recording
+    controller: Any = field(repr=False)
+    reference: Recording = field(repr=False)
     notes: tuple[str, ...] = ()
     file: Path | None = None
     controller_file: Path | None = None
@@ -138,7 +138,7 @@ class Inverse:
         Where it is saved.
     """
 
-    block: Block
+    block: Block = field(repr=False)
     kind: str
     reachable: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rmse: Mapping[str, float] = field(default_factory=dict)

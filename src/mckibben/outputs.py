@@ -41,6 +41,11 @@ LARGEST = 2**28
 """Bytes of a file that is looked at; a larger one counts as the user's."""
 
 
+def unfinished(folder: Path) -> Path:
+    """Return where the files of a run are until it is complete."""
+    return folder / UNFINISHED / "new"
+
+
 def claim(path: str | Path, *, inputs: Iterable[str | Path] = (), force: bool = False) -> None:
     """Refuse, before any work, an output that would replace what is not to be lost.
 
@@ -156,7 +161,7 @@ class Results:
         force: bool = False,
         kind: str = "",
     ) -> None:
-        self.folder, self.new = folder, folder / UNFINISHED / "new"
+        self.folder, self.new = folder, unfinished(folder)
         self._inputs, self._force, self._kind = list(inputs), force, kind
         self._digests: dict[str, str] = {}
         _inside(folder, f"{UNFINISHED}/new/{RUN}")
@@ -256,7 +261,7 @@ def results_in(
     from filelock import FileLock, Timeout
 
     folder = Path(folder)
-    place, new = folder / UNFINISHED, folder / UNFINISHED / "new"
+    place, new = folder / UNFINISHED, unfinished(folder)
     lock, existed = place / "lock", folder.exists()
     with written(folder):
         if new.exists() and not lock.exists():  # which stays as long as there is a run to finish
@@ -286,7 +291,7 @@ def results_in(
 
 def _finish(folder: Path) -> None:
     """Finish what is in a journal, if there is one: the process that wrote it may have been killed."""
-    place, new = folder / UNFINISHED / JOURNAL, folder / UNFINISHED / "new"
+    place, new = folder / UNFINISHED / JOURNAL, unfinished(folder)
     if not os.path.lexists(place):
         return
     try:

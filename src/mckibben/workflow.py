@@ -113,7 +113,7 @@ def fit(
     used = estimator.data(runs)
     check_shared({"fit": runs}, *([one.name for one in of] for of in (used.inputs, used.outputs)))
     with telling(progress, f"fitting {model}") as tell:
-        estimator.fit(runs, validation=checks, progress=_best_so_far(tell))
+        estimator.fit(runs, validation=checks, progress=tell)
     found: Block = estimator.model_ if base is None else Parallel((base, estimator.model_))
     if file is not None:
         found.save(file)
@@ -124,13 +124,6 @@ def fit(
             "voltage was recorded too; for a model of the valve's command: `input=voltage`"
         )
     return Fit(model, found, estimator, tuple(notes), file)
-
-
-def _best_so_far(tell: Tell | None) -> Callable[[float, float], None] | None:
-    """Return a progress callback that takes the share done and the least error so far."""
-    if tell is None:
-        return None
-    return lambda share, best: tell(share, f"best {best:.3g}" if math.isfinite(best) else "")
 
 
 def _residuals(base: Block, estimator: Any, runs: list[Recording]) -> list[Recording]:
@@ -424,7 +417,7 @@ def _inverse(
     if chosen.learned:
         runs = read_files(chosen.learned, None, reading)
         with telling(progress, "learning the inverse") as tell:
-            learned, rmse = trained_inverse(block, runs, chosen.seed, _best_so_far(tell))
+            learned, rmse = trained_inverse(block, runs, chosen.seed, tell)
         return Inverse(learned, "learned", rmse=rmse)
     if chosen.predictive:
         return Inverse(Predictive(block.inverse(), **chosen.of_predictive()), "predictive")
@@ -595,13 +588,6 @@ def _serving(chosen: COptions) -> Any:
         return None
     watchdog = 0.5 if chosen.watchdog is None else chosen.watchdog
     return Serving(chosen.limits, chosen.safe, watchdog)
-
-
-def unfinished(folder: str | Path) -> Path:
-    """Return where results are until a run is complete."""
-    from mckibben.outputs import UNFINISHED
-
-    return Path(folder) / UNFINISHED / "new"
 
 
 def _chosen(

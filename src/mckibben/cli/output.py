@@ -12,6 +12,7 @@ from typing import Any
 from mckibben.cli.parameters import as_command, as_flag, plainly
 from mckibben.errors import MckibbenError, in_terms_of
 from mckibben.system.atomic import to_json
+from mckibben.system.progress import words_of
 
 INTERRUPTED = 130
 """Exit code of a command that was stopped."""
@@ -126,10 +127,10 @@ def progress_bar(what: str, *, plainly: bool = False) -> Iterator[Callable[..., 
     if sys.stderr is None or not sys.stderr.isatty() or in_notebook:
         last = -1.0
 
-        def line(share: float, text: str = "") -> None:
+        def line(share: float, *told: str | float) -> None:
             nonlocal last
             if plainly and share > last:
-                say(f"{what} {text}", error=True)
+                say(f"{what} {words_of(*told)}", error=True)
                 last = share
 
         yield line
@@ -144,6 +145,6 @@ def progress_bar(what: str, *, plainly: bool = False) -> Iterator[Callable[..., 
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(f"{what} ...", total=1.0)
-        yield lambda share, text="": bar.update(
-            task, completed=share, description=visible(f"{what} {text}")
+        yield lambda share, *told: bar.update(
+            task, completed=share, description=visible(f"{what} {words_of(*told)}")
         )

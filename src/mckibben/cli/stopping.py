@@ -14,6 +14,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from mckibben.cli.output import INTERRUPTED, InterruptionError, say
+from mckibben.outputs import UNFINISHED
 from mckibben.system.workers import leave
 
 if TYPE_CHECKING:
@@ -106,9 +107,10 @@ def how_to_go_on(folder: Path | None) -> str:
     """Return what was finished of work that was stopped, and how to go on."""
     if folder is None:
         return "Stopped."
-    if not any((folder / "unfinished").rglob("*.*")):
+    place = folder / UNFINISHED
+    if not any(place.rglob("*.*")):
         return "Stopped before anything was finished."
-    return f"Stopped; the same command goes on from what is in {folder / 'unfinished'}."
+    return f"Stopped; the same command goes on from what is in {place}."
 
 
 def stop_short(board: Leaderboard, folder: Path | None) -> None:

@@ -44,16 +44,16 @@ def telling(progress: bool | Tell | None, what: str) -> Iterator[Tell | None]:
         def tell(first: Any, *rest: Any) -> None:
             share, words = getattr(first, "share", first), str(first)
             if share is first:
-                words = ", ".join(filter(None, [_words(*rest), time_left(share, started)]))
+                words = ", ".join(filter(None, [words_of(*rest), time_left(share, started)]))
             show(share, words)
 
         yield tell
 
 
-def _words(given: str | float = "", *_: object) -> str:
+def words_of(given: str | float = "", *_: object) -> str:
     """Return words, or the least error in words.
 
-    >>> _words(1.234), _words("folds"), _words(math.inf), _words()
+    >>> words_of(1.234), words_of("folds"), words_of(math.inf), words_of()
     ('best so far 1.23', 'folds', '', '')
     """
     if isinstance(given, str):

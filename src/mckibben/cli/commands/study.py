@@ -38,6 +38,7 @@ def study(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
+    from mckibben.outputs import unfinished
     from mckibben.recording import notes_by_file
     from mckibben.report import text
 
@@ -45,7 +46,7 @@ def study(
         if not so_far.leaderboard.rows and not as_json:
             for line in text.study_begun(so_far):
                 say(line)
-            live = workflow.unfinished(out) / "report.html"
+            live = unfinished(out) / "report.html"
             say(f"Report so far, updated with every model: {live}\n", flush=True)
 
     with stoppable(out), progress_bar("study:", plainly=True) as tell:

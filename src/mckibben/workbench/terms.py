@@ -1,0 +1,58 @@
+"""Errors in the terms of the workbench: controls where a remedy names parameters."""
+
+from __future__ import annotations
+
+from mckibben.errors import MckibbenError, in_terms_of, rendered
+
+GAPS = {
+    "error": "Refuse",
+    "split": "Split there",
+    "interpolate": "Bridge by straight lines",
+}
+"""What can be done about gaps."""
+
+CONTROLS = {
+    "allow_shared": "“Allow the same data in training and test”",
+    "calibration": "gain and offset",
+    "columns": "the field Channel",
+    "constants": "a held channel",
+    "encoding": "the field Encoding",
+    "force": "“Replace”",
+    "gaps": "the field Gaps",
+    "input": "the field Inputs",
+    "inputs": "the field Inputs",
+    "inverse": "“Its compensator”",
+    "load": "the field Load",
+    "output": "the field Outputs",
+    "outputs": "the field Outputs",
+    "rate": "the field Samples per second",
+    "raw": "“Codes and counters as measured”",
+    "resample": "“Resample”",
+    "rest_length": "the field Rest length",
+    "test": "a test recording",
+    "units": "the field Unit",
+    "zero": "“Zero”",
+}
+"""Parameters of operations, and the controls that set them."""
+
+
+def control(name: str, key: str | None = None, value: str | None = None) -> str:
+    """Return a parameter as a control of a page.
+
+    >>> control("gaps", None, "split"), control("units", "force", "N")
+    ('“Split there”', 'the field Unit of force (N)')
+    """
+    if name == "gaps" and value in GAPS:
+        return f"“{GAPS[value]}”"
+    of = f" of {key}" if key else ""
+    placeholder = value is not None and value.isupper() and len(value) > 1  # such as UNIT, not N
+    given = f" ({value})" if value and not placeholder else ""
+    return f"{CONTROLS.get(name, name.replace('_', ' '))}{of}{given}"
+
+
+def said(error: Exception | str) -> str:
+    """Return an error or a note in the terms of the workbench, without the folder of its file."""
+    if not isinstance(error, MckibbenError):
+        return in_terms_of(str(error), control)[:2000]
+    text = rendered(error, control)
+    return text.replace(f"{error.file}", error.file.name if error.file else "")[:2000]

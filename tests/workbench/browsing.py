@@ -18,7 +18,9 @@ OPTIONS = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--no-fir
 SLOW = 60_000
 """For anything to be there on a busy machine [ms]."""
 
-START = "from mckibben.workbench.main import serve; import sys; serve(sys.argv[1], port=0, show=False)"
+START = (
+    "from mckibben.workbench.main import serve; import sys; serve(sys.argv[1], port=0, show=False)"
+)
 
 
 @contextmanager

@@ -72,6 +72,11 @@ class Guard:
         elif not self._knows(headers):
             text = "Open the workbench by the link that it printed last; each can be used once."
             await _answer(scope, receive, send, 403, text)
+        elif not headers.get("content-length", "0").isdigit() or (
+            int(headers.get("content-length", "0")[:15]) > BODY
+        ):
+            text = f"This is more than {LARGEST // 2**20} MiB; use the command line."
+            await _answer(scope, receive, send, 413, text)
         else:
             await self.app(scope, _bounded(receive), send)
 

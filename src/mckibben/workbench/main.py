@@ -8,6 +8,7 @@ import logging
 import os
 import socket
 import threading
+import time
 import warnings
 import webbrowser
 from collections.abc import Callable
@@ -80,11 +81,16 @@ def serve(
         await asyncio.to_thread(state.settle)  # reads what is new, away from clicks
         build(state)
 
-    def started() -> None:
+    def ready() -> None:
+        """Say where it is once it listens, and load what the first job needs."""
+        for _ in range(200):
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+                break
+            time.sleep(0.05)
         announce(f"Workbench over {workspace.folder}: {links.link} (Ctrl-C ends it)")
-        threading.Thread(target=jobs.warm, daemon=True).start()
+        jobs.warm()
 
-    app.on_startup(started)
+    app.on_startup(lambda: threading.Thread(target=ready, daemon=True).start())
     door = workspace.folder / ".open.html"
     with contextlib.suppress(KeyboardInterrupt):
         try:

@@ -44,10 +44,14 @@ def control(name: str, key: str | None = None, value: str | None = None) -> str:
     """
     if name == "gaps" and value in GAPS:
         return f"“{GAPS[value]}”"
-    of = f" of {key}" if key else ""
-    placeholder = value is not None and value.isupper() and len(value) > 1  # such as UNIT, not N
-    given = f" ({value})" if value and not placeholder else ""
+    of = f" of {key}" if key and not _placeholder(key) else ""
+    given = f" ({value})" if value and not _placeholder(value) else ""
     return f"{CONTROLS.get(name, name.replace('_', ' '))}{of}{given}"
+
+
+def _placeholder(word: str) -> bool:
+    """Return whether a word is to be replaced, such as UNIT; N is a unit."""
+    return word.isupper() and len(word) > 1
 
 
 def said(error: Exception | str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -59,7 +58,7 @@ def _upload(state: State) -> Any:
 def content(state: State) -> None:
     """Show the recordings, and the one that is chosen; or what to do without any."""
     entries = state.workspace.entries()
-    if not entries and not _unread(state):
+    if not entries and not _unread(state) and "data.removed" not in state.chosen:
         _empty(state)
         return
     with ui.element("div").classes("columns"):
@@ -96,16 +95,13 @@ def _empty(state: State) -> None:
 
 
 async def _example(state: State) -> None:
-    from mckibben import example
-
     def add() -> list[str]:
-        names = []
-        for source, role in ((example.TRAIN, "train"), (example.TEST, "test")):
-            file = Path(str(source))
-            with state.workspace.receiving(file.name, file.stat().st_size) as (part, path):
-                part.write_bytes(file.read_bytes())
-            names += state.workspace.add(path.name, role=role)  # type: ignore[arg-type]
-        return names
+        from mckibben import example
+        from mckibben.files import read
+
+        runs = {"train": read(example.TRAIN), "test": read(example.TEST)}
+        put = state.workspace.add_recording
+        return [put(run, name=run.name, role=role) for role, (run,) in runs.items()]  # type: ignore[arg-type]
 
     state.recording = (await asyncio.to_thread(add))[0]
     state.changed()
@@ -194,6 +190,16 @@ def _recordings(state: State, entries: list[Entry]) -> None:
         def choose(at: int) -> None:
             state.recording = entries[at].name
             state.changed()
+
+        if removed := state.chosen.get("data.removed"):
+
+            def restore() -> None:
+                state.workspace.restore(state.chosen.pop("data.removed"))
+                state.changed()
+
+            with widgets.row():
+                ui.label(f"{removed} was removed.").classes("muted")
+                mark(widgets.button("Bring it back", restore, "undo"), "restore")
 
         names = [one.name for one in entries]
         chosen = names.index(state.recording) if state.recording in names else None
@@ -292,8 +298,8 @@ def _actions(state: State, entry: Entry) -> None:
 
     def remove() -> None:
         state.workspace.remove(entry.name)
+        state.chosen["data.removed"] = entry.name
         state.changed()
-        ui.notify(f"{entry.name} was removed; its file stays")
 
     picked = ui.toggle(ROLES, value=entry.role, on_change=widgets.guarded(role))
     mark(picked.props("dense no-caps unelevated toggle-color=primary"), "role")

@@ -194,13 +194,15 @@ async def ask(
         On the button.
     """
     form = Form(path, reading)
+    one = asyncio.Lock()
     await asyncio.to_thread(form.look)
     with widgets.dialog(f"How is {path.name} read?") as shown:
         mark(shown, "importing")
 
         async def again() -> None:
-            if await asyncio.to_thread(form.look):
-                columns.refresh()
+            async with one:
+                if await asyncio.to_thread(form.look):
+                    columns.refresh()
             understood.refresh()
             import_button.set_enabled(form.error is None)
 
@@ -234,10 +236,12 @@ async def ask(
             held.bind_value(form, "held").on_value_change(check).props(
                 "dense outlined debounce=600"
             )
+            ui.checkbox("Codes and counters as measured").bind_value(form, "raw").on_value_change(
+                check
+            )
         if lines := form.lines():
             with widgets.details("Lines, header and encoding of the text"):
                 _layout(form, lines, check)
-        ui.checkbox("Codes and counters as measured").bind_value(form, "raw").on_value_change(check)
         with widgets.row(classes="spread"):
             widgets.button("As found", lambda: _reset(form, again))
             import_button = mark(widgets.primary(verb, finish), "import")
@@ -324,7 +328,9 @@ def _layout(form: Form, lines: list[str], check: Callable[[], Any]) -> None:
     with widgets.row():
         for label, name in (("Header in line", "header"), ("Lines after it left out", "skip")):
             number = ui.number(label, min=0, precision=0).bind_value(form, name)
-            number.props('dense outlined debounce=600 clearable placeholder="as found"')
+            number.on_value_change(check).props(
+                'dense outlined debounce=600 clearable placeholder="as found"'
+            )
         ui.select(ENCODINGS, label="Encoding").bind_value(form, "encoding").on_value_change(
             check
         ).props("dense outlined")

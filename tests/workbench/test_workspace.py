@@ -1,0 +1,187 @@
+"""The folder: recordings as raw files with steps, and what earlier versions wrote."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben.errors import DataError
+from mckibben.files import write
+from mckibben.recording import Recording
+from mckibben.workbench.steps import LARGEST, Reading, Step
+from mckibben.workbench.workspace import Workspace
+
+N = 200
+
+
+def table(n: int = N, *, header: str = "time,pressure,displacement") -> bytes:
+    rows = (f"{k * 0.02:.2f},{1 + k % 50 * 0.1:.3f},{k % 50 * 0.2:.3f}" for k in range(n))
+    return "\n".join([header, *rows, ""]).encode()
+
+
+def received(workspace: Workspace, name: str, content: bytes) -> str:
+    with workspace.receiving(name, len(content)) as (part, path):
+        part.write_bytes(content)
+    return path.name
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return Workspace(tmp_path / "bench")
+
+
+@pytest.fixture
+def name(workspace: Workspace) -> str:
+    (found,) = workspace.add(received(workspace, "run.csv", table()))
+    return found
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
+class TestRecordings:
+    def test_steps_are_undone_one_by_one(self, workspace: Workspace, name: str) -> None:
+        whole = workspace.recording(name)
+        workspace.do(name, Step(do="slice", start=10, stop=110))
+        cut = workspace.recording(name)
+        workspace.do(name, Step(do="resample", sample_time=0.04))
+        assert (len(whole), len(cut)) == (N, 100)
+        assert workspace.recording(name).sample_time == 0.04
+        undone = workspace.undo(name)
+        assert undone is not None
+        assert undone.do == "resample"
+        assert workspace.recording(name) == cut
+        workspace.undo(name)
+        assert workspace.recording(name) == whole
+        assert workspace.undo(name) is None
+
+    def test_its_file_says_all_and_its_code_repeats_it(
+        self, workspace: Workspace, name: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        import mckibben
+
+        workspace.change(name, reading=Reading(units={"pressure": "kPa"}))
+        workspace.do(name, Step(do="slice", start=10, stop=110))
+        workspace.do(name, Step(do="low_pass", cutoff=5.0, channels=["pressure"]))
+        again = Workspace(workspace.folder).recording(name)
+        assert again == workspace.recording(name)
+        assert again["pressure"].max() < 0.1
+        monkeypatch.chdir(workspace.folder)
+        repeated = eval(workspace.entry(name).code(), {"mckibben": mckibben})
+        assert all(np.array_equal(repeated[one], again[one]) for one in again.channels)
+
+    def test_a_change_that_cannot_be_leaves_all_as_it_was(
+        self, workspace: Workspace, name: str
+    ) -> None:
+        before = workspace.entry(name)
+        with pytest.raises(DataError):
+            workspace.do(name, Step(do="low_pass", cutoff=1e9))
+        with pytest.raises(DataError):
+            workspace.change(name, reading=Reading(columns={"pressure": "no such"}))
+        assert workspace.entry(name) == before
+
+    def test_lines_header_encoding_sign_gaps(self, workspace: Workspace) -> None:
+        head = "Prüfstand\na,b,c\nzeit,druck,weg\ns,bar,mm\nx,y,z\n".encode("cp1252")
+        body = table().split(b"\n", 1)[1]
+        rows = body.split(b"\n")
+        upload = received(workspace, "a.csv", head + b"\n".join(rows[:100] + rows[110:]))
+        reading = Reading(header=3, skip=2, encoding="cp1252", gaps="split")
+        reading = reading.model_copy(update={"calibration": {"displacement": (-1.0, 0.0)}})
+        reading = reading.model_copy(update={"units": {"displacement": "mm"}})
+        with pytest.raises(DataError) as refused:
+            workspace.add(upload, reading=reading.model_copy(update={"gaps": "error"}))
+        assert refused.value.row == 106  # of the file as it is
+        names = workspace.add(upload, reading=reading)
+        assert [len(workspace.recording(one)) for one in names] == [100, 90]
+        assert workspace.recording(names[0])["displacement"].min() < -9
+
+    def test_split_rename_remove_restore(self, workspace: Workspace, name: str) -> None:
+        second = workspace.split(name, 120)
+        assert [len(workspace.recording(one)) for one in (name, second)] == [120, 80]
+        assert [workspace.entry(one).role for one in (name, second)] == ["train", "test"]
+        other = workspace.rename(second, "../two words")
+        assert other == "two-words"
+        assert len(workspace.recording(other)) == 80
+        workspace.remove(other)
+        assert [one.name for one in workspace.entries()] == [name]
+        workspace.restore(other)
+        assert len(workspace.recording(other)) == 80
+
+    def test_what_is_damaged_costs_itself_alone(self, workspace: Workspace, name: str) -> None:
+        folder = workspace.folder / "recordings"
+        (folder / "bad.json").write_text('{"role": "train", "steps": [{"do": "exec"}]}')
+        (folder / "worse.json").write_bytes(b"\xff[[[")
+        (folder / "lost.json").write_text('{"role": "train", "upload": "none.csv"}')
+        (folder / "out.json").write_text('{"role": "train", "upload": "../../secret.csv"}')
+        assert list(workspace.used()) == [name]
+        assert workspace.channels() == ["pressure", "displacement"]
+
+    def test_a_folder_of_an_earlier_version_opens(self, workspace: Workspace) -> None:
+        samples = {"pressure": np.linspace(1, 3, N), "displacement": np.linspace(0, 20, N)}
+        read = Recording(samples, 0.02, {"pressure": "bar", "displacement": "mm"})
+        folder = workspace.folder
+        write(read, folder / "recordings" / "old.csv")
+        write(read.slice(10, 60), folder / "recordings" / "old.2.csv")
+        described = {
+            "role": "test",
+            "origin": "file old.csv",
+            "call": "mckibben.read('/elsewhere/uploads/old.csv')",
+            "file": "old.2.csv",
+            "base": "old.csv",
+            "notes": ["an earlier note"],
+            "upload": "old.csv",
+            "part": 0,
+            "reading": {"calibration": {"pressure": [2.0, 0.5]}},
+            "steps": [{"do": "slice", "start": 10, "stop": 60}],
+        }
+        (folder / "recordings" / "old.json").write_text(json.dumps(described))
+        plain = described | {"file": "old.csv", "base": "", "upload": "", "steps": []}
+        (folder / "recordings" / "plain.json").write_text(json.dumps(plain))
+        (folder / "history" / "recordings.json").write_text('{"done": [], "undone": []}')
+        found = workspace.recording("old")
+        part = read.slice(10, 60)
+        assert all(np.array_equal(found[one], part[one]) for one in part.channels)
+        assert (found.start_time, found.units) == (part.start_time, part.units)
+        assert workspace.entry("old").role == "test"
+        assert len(workspace.recording("plain")) == N
+        workspace.undo("old")
+        assert len(workspace.recording("old")) == N
+
+
+class TestFiles:
+    @pytest.mark.parametrize(
+        ("given", "kept"),
+        [
+            ("../../etc/pass wd.csv", "pass-wd.csv"),
+            ("C:\\data\\con.CSV", "upload-con.csv"),
+            ("..csv", "upload.csv"),
+            ("<script>.csv", "script.csv"),
+        ],
+    )
+    def test_names_are_made_safe(self, workspace: Workspace, given: str, kept: str) -> None:
+        assert received(workspace, given, b"x") == kept
+        assert received(workspace, given, b"x") != kept  # nothing is written over
+
+    @pytest.mark.parametrize(("name", "size"), [("a.exe", 1), ("a.csv", 0), ("a.csv", LARGEST + 1)])
+    def test_no_other_files_are_taken(self, workspace: Workspace, name: str, size: int) -> None:
+        with pytest.raises(DataError), workspace.receiving(name, size):
+            pass
+        assert not list((workspace.folder / "uploads").iterdir())
+
+    @pytest.mark.parametrize("name", ["../x", "a/b", ".hidden", "a..b", "", "x" * 90])
+    def test_no_path_leads_out(self, workspace: Workspace, name: str) -> None:
+        with pytest.raises(DataError):
+            workspace.path("models", name)
+
+    def test_links_are_refused(self, workspace: Workspace, tmp_path: Path) -> None:
+        (workspace.folder / "models" / "m.json").symlink_to(tmp_path / "elsewhere.json")
+        with pytest.raises(DataError):
+            workspace.path("models", "m.json")
+        assert workspace.names("models") == []
+
+    def test_one_server_owns_a_folder(self, workspace: Workspace) -> None:
+        workspace.claim()
+        assert workspace.folder.stat().st_mode & 0o077 == 0
+        with pytest.raises(DataError):
+            Workspace(workspace.folder).claim()

@@ -78,11 +78,9 @@ def test_a_file_that_is_not_understood_is_corrected(
         upload(page, "réglé 1.csv", table(gap=True))
         dialog = seen(page, "importing")
         assert not seen(page, "import").is_enabled()
-        dialog.get_by_label("Gaps").click()
+        dialog.locator(".q-select").filter(has_text="Gaps").click()
         page.get_by_role("option", name="Bridge by straight lines").click()
-        channel = dialog.get_by_label("Channel of p1")
-        channel.fill("pressure")
-        channel.press("Enter")
+        dialog.get_by_label("Channel of p1").fill("pressure")
         dialog.get_by_label("Unit").nth(1).fill("kPa")
         page.wait_for_function("(b) => !b.disabled", arg=seen(page, "import").element_handle())
         seen(page, "import").click()
@@ -103,7 +101,7 @@ def test_a_file_that_is_not_understood_is_corrected(
 
 def test_errors_are_said_and_keys_suffice(browser: Any, bench: Workbench) -> None:
     with visited(browser, bench) as page:
-        upload(page, "a.csv", table())
+        upload(page, "a.csv", table().replace(b"p1", b"p1 [kPa]"))
         seen(page, "over-time")
         seen(page, "keep").click()
         page.get_by_text("no part is selected").wait_for(timeout=SLOW)

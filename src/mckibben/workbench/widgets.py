@@ -109,7 +109,7 @@ def details(title: str) -> Iterator[Any]:
 @contextmanager
 def dialog(title: str) -> Iterator[Any]:
     """Make and open a dialog; it is deleted when it closes. Yields it, with ``close()``."""
-    with ui.dialog() as found, ui.element("section").classes("card dialog"):
+    with ui.dialog() as found, ui.element("div").classes("card dialog"):
         with ui.element("div").classes("controls spread"):
             ui.label(title).classes("subtitle").props('role=heading aria-level="3"')
             ui.button(icon="close", on_click=found.close).props(

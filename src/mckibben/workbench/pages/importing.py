@@ -45,8 +45,8 @@ class Column:
     """The controls of a column."""
 
     seen: Seen
-    channel: str
-    unit: str
+    channel: str | None
+    unit: str | None
     gain: float | None = 1.0
     offset: float | None = 0.0
 
@@ -123,7 +123,7 @@ class Form:
         twice = {a.channel for a in named for b in named if a is not b and a.channel == b.channel}
         if twice:
             problem = "two columns are this channel"
-            raise DataError(problem, channel=min(twice), remedy="clear one of `columns`")
+            raise DataError(problem, channel=min(map(str, twice)), remedy="clear one of `columns`")
         header, skip = int(self.header or 0), int(self.skip or 0)
         layout: dict[str, Any] = {"header": header, "skip": skip, "encoding": self.encoding}
         before = (self.reading.header, self.reading.skip, self.reading.encoding)
@@ -141,7 +141,11 @@ class Form:
                 "columns": {
                     one.channel: one.seen.header for one in named if one.channel != one.seen.unasked
                 },
-                "units": {one.channel: one.unit for one in named if one.unit != one.seen.unit},
+                "units": {
+                    one.channel: one.unit or ""
+                    for one in named
+                    if (one.unit or "") != one.seen.unit
+                },
                 "calibration": {
                     one.channel: (one.gain or 1.0, one.offset or 0.0)
                     for one in named
@@ -285,15 +289,10 @@ def _columns(form: Form, check: Callable[[], Any]) -> None:
 
     def cells(column: Column) -> list[Any]:
         def channel() -> None:
-            names = list(
-                dict.fromkeys([*CHANNELS, *filter(None, [column.channel, column.seen.unasked])])
-            )
-            found = ui.select(names, with_input=True, new_value_mode="add-unique", clearable=True)
-            found.bind_value(column, "channel", forward=lambda value: value or "").on_value_change(
-                check
-            )
             label = f"Channel of {column.seen.header}".replace('"', "")
-            found.props(f'dense outlined placeholder="left out" aria-label="{label}"')
+            found = ui.input(placeholder="left out").bind_value(column, "channel")
+            found.on_value_change(check).style("min-width: 160px")
+            found.props(f'dense outlined clearable debounce=600 list=channels aria-label="{label}"')
 
         def unit() -> None:
             found = ui.input().bind_value(column, "unit").on_value_change(check)
@@ -317,6 +316,9 @@ def _columns(form: Form, check: Callable[[], Any]) -> None:
         return [column.seen.header, first, channel, unit, calibration]
 
     if form.columns:
+        with ui.element("datalist").props("id=channels"):
+            for name in CHANNELS:
+                ui.element("option").props(f"value={name}")
         heads = ["Column", "First values", "Channel", "Unit", "Gain, offset, sign"]
         widgets.table(heads, [cells(one) for one in form.columns])
 

@@ -32,7 +32,7 @@ LAYERS = (
     {"report"},
     {"measured"},
     {"workflow"},
-    {"app"},
+    {"app", "workbench"},
     {"cli"},
     {"__main__"},
 )

@@ -76,6 +76,12 @@ def test_a_file_that_is_not_understood_is_corrected(
 ) -> None:
     with visited(browser, bench) as page:
         upload(page, "réglé 1.csv", table(gap=True))
+        seen(page, "importing")
+        page.keyboard.press("Escape")
+        upload(page, "another.csv", table(gap=True))
+        page.get_by_text("How is it read?").nth(1).wait_for(timeout=SLOW)
+        gone(page, "importing")
+        page.get_by_text("How is it read?").first.click()
         dialog = seen(page, "importing")
         assert not seen(page, "import").is_enabled()
         dialog.locator(".q-select").filter(has_text="Gaps").click()
@@ -85,7 +91,9 @@ def test_a_file_that_is_not_understood_is_corrected(
         page.wait_for_function("(b) => !b.disabled", arg=seen(page, "import").element_handle())
         seen(page, "import").click()
         seen(page, "over-time")
-        (entry,) = Workspace(folder).entries()
+        gone(page, "importing")
+        entry, other = sorted(Workspace(folder).entries(), key=lambda one: one.name != "réglé-1")
+        assert other.way == entry.way
         found = Workspace(folder).recording(entry.name)
         assert entry.upload == "réglé-1.csv"
         assert entry.way.gaps == "interpolate"
@@ -94,9 +102,11 @@ def test_a_file_that_is_not_understood_is_corrected(
         # and it can be read in another way later
         seen(page, "correct").click()
         seen(page, "importing").get_by_label("Turn the sign").nth(2).click()
+        seen(page, "others").click()
         seen(page, "import").click()
         gone(page, "importing")
         assert Workspace(folder).recording(entry.name)["displacement"].min() == pytest.approx(-9.8)
+        assert Workspace(folder).recording(other.name)["displacement"].min() == 0
 
 
 def test_errors_are_said_and_keys_suffice(browser: Any, bench: Workbench) -> None:

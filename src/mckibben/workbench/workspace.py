@@ -331,6 +331,17 @@ class Workspace:
                 applied(self.raw(after), after.steps)
             self.put(after)
 
+    def read_again(self, name: str, reading: Reading) -> None:
+        """Read a recording's raw file in another way, and do its steps anew; or all stays as it was."""
+        entry = self.entry(name)
+        if entry.upload:
+            self.change(name, reading=reading)
+            return
+        raw = self.raw_path(entry)  # of an earlier version, which had no raw file
+        with self.receiving(raw.name, raw.stat().st_size) as (part, path):
+            part.write_bytes(raw.read_bytes())
+        self.change(name, upload=path.name, base="", part=0, reading=reading)
+
     def do(self, name: str, step: Step) -> None:
         """Do one more step to a recording; errors are those of the step."""
         self.change(name, steps=[*self.entry(name).steps, step])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -137,37 +138,52 @@ async def _received(state: State, event: events.UploadEventArguments) -> None:
 
 
 async def _ask(state: State, upload: str) -> None:
-    """Ask how a file that is not read yet is to be read."""
+    """Ask how a file that is not read yet is to be read, and the others that are not."""
+    workspace, unread = state.workspace, _unread(state)
 
-    async def take(reading: Reading) -> None:
-        names = await asyncio.to_thread(lambda: state.workspace.add(upload, reading=reading))
-        _unread(state).pop(upload, None)
+    async def take(reading: Reading, others: bool) -> None:
+        names = await asyncio.to_thread(partial(workspace.add, upload, reading=reading))
+        unread.pop(upload, None)
+        for other in list(unread) if others else []:
+            try:
+                await asyncio.to_thread(partial(workspace.add, other, reading=reading))
+                unread.pop(other, None)
+            except MckibbenError as error:
+                unread[other] = error
         state.recording = names[0]
         state.changed()
 
-    await importing.ask(state.workspace.path("uploads", upload), Reading(), take)
+    path = workspace.path("uploads", upload)
+    await importing.ask(path, Reading(), take, others="All files that are not read yet")
 
 
 async def _correct(state: State, entry: Entry) -> None:
-    """Ask how a recording is to be read instead."""
+    """Ask how a recording is to be read instead, and those that are read like it."""
     workspace = state.workspace
+    channels = _channels(state, entry.name)
+    alike = [
+        one.name
+        for one in workspace.entries()
+        if one.name != entry.name
+        and one.way == entry.way
+        and _channels(state, one.name) == channels
+    ]
 
-    async def take(reading: Reading) -> None:
-        def read() -> None:
-            entry_now = workspace.entry(entry.name)
-            if not entry_now.upload:  # of an earlier version, without a raw file
-                raw = workspace.raw_path(entry_now)
-                with workspace.receiving(raw.name, raw.stat().st_size) as (part, path):
-                    part.write_bytes(raw.read_bytes())
-                workspace.change(entry.name, upload=path.name, base="", part=0, reading=reading)
-            else:
-                workspace.change(entry.name, reading=reading)
-
-        await asyncio.to_thread(read)
+    async def take(reading: Reading, others: bool) -> None:
+        for name in [entry.name, *(alike if others else ())]:
+            await asyncio.to_thread(workspace.read_again, name, reading)
         state.changed()
 
     path = workspace.path("uploads", entry.upload) if entry.upload else workspace.raw_path(entry)
-    await importing.ask(path, entry.way, take, verb="Read it so")
+    others = f"The {len(alike)} others like it, too" if alike else ""
+    await importing.ask(path, entry.way, take, others=others, verb="Read it so")
+
+
+def _channels(state: State, name: str) -> list[str] | None:
+    try:
+        return list(state.workspace.recording(name).channels)
+    except MckibbenError:
+        return None
 
 
 def _discard(state: State, upload: str) -> None:

@@ -180,8 +180,9 @@ class Form:
 async def ask(
     path: Path,
     reading: Reading,
-    take: Callable[[Reading], Any],
+    take: Callable[[Reading, bool], Any],
     *,
+    others: str,
     verb: str = "Import",
 ) -> None:
     """Ask how a file is to be read, and call ``take`` with that once it can be.
@@ -193,7 +194,9 @@ async def ask(
     reading : Reading
         How it is read now.
     take : callable
-        Called with the reading; its errors are shown.
+        Called with the reading, and whether others are read so, too; its errors are shown.
+    others : str
+        Which others, for a check box; empty for none.
     verb : str
         On the button.
     """
@@ -213,7 +216,7 @@ async def ask(
         async def finish() -> None:
             await again()
             if form.error is None:
-                found = take(form.reading)
+                found = take(form.reading, all_so.value)
                 if found is not None:
                     await found
                 shown.close()
@@ -248,6 +251,9 @@ async def ask(
                 _layout(form, lines, check)
         with widgets.row(classes="spread"):
             widgets.button("As found", lambda: _reset(form, again))
+            ui.space()
+            all_so = mark(ui.checkbox(others, value=bool(others)), "others")
+            all_so.set_visibility(bool(others))
             import_button = mark(widgets.primary(verb, finish), "import")
             import_button.set_enabled(form.error is None)
 

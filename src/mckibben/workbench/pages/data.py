@@ -45,7 +45,12 @@ def build(state: State) -> None:
             mark(widgets.primary("Add files", lambda: files.run_method("pickFiles"), "add"), "add")
         with ui.element("div").style("display: none"):
             files = _upload(state)
-        content(state)
+        start(state)
+        with ui.element("div").classes("columns"):
+            with ui.element("div").classes("stack"):
+                listed(state)
+            with ui.element("div").classes("stack"):
+                shown(state)
 
 
 def _upload(state: State) -> Any:
@@ -55,22 +60,34 @@ def _upload(state: State) -> Any:
     )
 
 
+def _is_empty(state: State) -> bool:
+    known = state.workspace.names("recordings")
+    return not known and not _unread(state) and "data.removed" not in state.chosen
+
+
 @view
-def content(state: State) -> None:
-    """Show the recordings, and the one that is chosen; or what to do without any."""
-    entries = state.workspace.entries()
-    if not entries and not _unread(state) and "data.removed" not in state.chosen:
+def start(state: State) -> None:
+    """Show what to do while there are no recordings."""
+    if _is_empty(state):
         _empty(state)
-        return
-    with ui.element("div").classes("columns"):
-        with ui.element("div").classes("stack"):
-            _recordings(state, entries)
-            _sides(state)
-        with ui.element("div").classes("stack"):
-            chosen = next((one for one in entries if one.name == state.recording), None)
-            if chosen is not None:
-                _recording(state, chosen)
-            _next(entries)
+
+
+@view
+def listed(state: State) -> None:
+    """Show all recordings, and what drives and what moves."""
+    if not _is_empty(state):
+        _recordings(state, state.workspace.entries())
+        _sides(state)
+
+
+@view
+def shown(state: State) -> None:
+    """Show the recording that is chosen, and what comes next."""
+    entries = state.workspace.entries()
+    for entry in entries:
+        if entry.name == state.recording:
+            _recording(state, entry)
+    _next(entries)
 
 
 def _next(entries: list[Entry]) -> None:
@@ -204,8 +221,10 @@ def _recordings(state: State, entries: list[Entry]) -> None:
                 widgets.button("Discard", lambda upload=upload: _discard(state, upload))
 
         def choose(at: int) -> None:
-            state.recording = entries[at].name
-            state.changed()
+            if state.recording != entries[at].name:
+                state.recording = entries[at].name
+                listed.refresh()
+                shown.refresh()
 
         if removed := state.chosen.get("data.removed"):
 
@@ -346,10 +365,10 @@ def _part(state: State, entry: Entry, recording: Recording) -> None:
     drawing = draw(recording, "time", channels=channels)
     height = min(160 * len(channels) + 60, 420)
     unit = "s" if recording.sample_time is not None else "sample"
-    for shown in widgets.plot(drawing, height=height, dragged="select"):
-        shown.figure["layout"]["selectdirection"] = "h"
-        mark(shown, "over-time")
-        shown.on("plotly_selected", lambda event: pick(event.args), js_handler=PICKED)
+    for figure in widgets.plot(drawing, height=height, dragged="select"):
+        figure.figure["layout"]["selectdirection"] = "h"
+        mark(figure, "over-time")
+        figure.on("plotly_selected", lambda event: pick(event.args), js_handler=PICKED)
 
     def pick(ends: Any) -> None:
         low, high = sorted(map(float, ends))

@@ -259,6 +259,11 @@ def _plain(value: Any, palette: dict[str, str]) -> Any:
     return value
 
 
+SCROLL = """{const row = getHtmlElement(%d), list = row?.closest(".list");
+if (list) list.scrollTop = row.offsetTop - list.clientHeight / 2}"""
+"""Keeps the chosen row of a long list in sight when it is built again."""
+
+
 def table(
     columns: Sequence[str],
     rows: Sequence[Sequence[Any]],
@@ -270,7 +275,8 @@ def table(
 
     Numbers are to the right and have three digits. A cell that is callable makes its own elements.
     """
-    with ui.element("div").classes("wide"), ui.element("table").classes("table") as found:
+    scrolls = "wide" if on_choose is None else "wide list"
+    with ui.element("div").classes(scrolls), ui.element("table").classes("table") as found:
         with ui.element("thead"), ui.element("tr"):
             for at, name in enumerate(columns):
                 kind = "number" if rows and isinstance(rows[0][at], int | float) else ""
@@ -282,6 +288,8 @@ def table(
                 if on_choose is not None:
                     choose = guarded(lambda at=at: on_choose(at))
                     line.classes("choosable" + " chosen" * (at == chosen)).props("tabindex=0")
+                    if at == chosen:
+                        ui.run_javascript(SCROLL % line.id)
                     line.on("click", lambda choose=choose: choose(), [])
                     line.on("keydown.enter.self", lambda choose=choose: choose(), [])
                 with line:

@@ -63,6 +63,7 @@ class Reading(Plain):
     calibration: dict[Text, tuple[float, float]] = {}
     constants: dict[Text, tuple[float, Text]] = {}
     rate: Number = None
+    rest_length: Number = None
     gaps: Literal["error", "split", "interpolate"] = "error"
     raw: bool = False
     channels: list[Text] | None = None

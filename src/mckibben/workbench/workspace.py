@@ -100,9 +100,16 @@ class Entry(Plain):
         return self.reading or Reading()
 
     def code(self) -> str:
-        """Return the Python that reads it and repeats its steps, in the folder."""
+        """Return the Python that reads it and repeats its steps, in the folder.
+
+        Of a text with another header or encoding, with ``steps`` of this package imported.
+        """
         if self.base:
             found = f"mckibben.read({f'recordings/{self.base}'!r}, informative=False)[0]"
+        elif self.way.amends:
+            way = self.way.model_dump(exclude_defaults=True)
+            path = f"Path({f'uploads/{self.upload}'!r})"
+            found = f"steps.read_file({path}, steps.Reading(**{way!r}))[{self.part}]"
         else:
             words = [f"{name}={value!r}" for name, value in self.way.options().items()]
             given = ", ".join([repr(f"uploads/{self.upload}"), "informative=False", *words])

@@ -17,6 +17,7 @@ from mckibben.workbench.pages import importing
 from mckibben.workbench.state import State, view
 from mckibben.workbench.steps import Reading, Step
 from mckibben.workbench.terms import said
+from mckibben.workbench.virtual import FIRST, TITLES, record
 from mckibben.workbench.widgets import mark
 from mckibben.workbench.workspace import Entry
 
@@ -101,15 +102,51 @@ def _next(entries: list[Entry]) -> None:
 
 def _empty(state: State) -> None:
     with widgets.card():
-        with widgets.empty(
-            "show_chart",
-            "Start with a recording of your muscle",
-            "A file with columns such as time, pressure and displacement: CSV, Excel, MATLAB, HDF5, "
-            "TDMS, LabVIEW, Parquet or a ROS bag. Names and units of columns are recognised, and can "
-            "be corrected.",
+        with (
+            widgets.empty(
+                "show_chart",
+                "Start with a recording of your muscle",
+                "A file with columns such as time, pressure and displacement: CSV, Excel, MATLAB, "
+                "HDF5, TDMS, LabVIEW, Parquet or a ROS bag. Names and units of columns are "
+                "recognised, and can be corrected.",
+            ),
+            widgets.row(),
         ):
-            mark(widgets.button("Open the example", lambda: _example(state), "science"), "example")
+            example = widgets.button("Open the example", lambda: _example(state), "science")
+            mark(example, "example")
+            _virtual(state)
         _upload(state)
+
+
+def _virtual(state: State) -> None:
+    """Offer to record a virtual muscle, of which there are runs to choose."""
+    from mckibben import registry
+    from mckibben.signals.protocol import protocol
+
+    def ask() -> None:
+        with widgets.dialog("Record a virtual muscle") as shown:
+            names = {name: TITLES.get(name, name) for name in registry.names("protocols")}
+            rig = mark(ui.select(names, value=FIRST, label="Rig"), "rig").props("dense outlined")
+            runs = ui.select([], multiple=True, with_input=True, label="Runs")
+            runs.props("dense outlined use-chips")
+
+            def listed() -> None:
+                plan = protocol(str(rig.value))
+                found = {run.name: f"{run.name} ({run.role})" for run in plan.runs}
+                runs.set_options(found, value=list(found)[:2])
+
+            def start() -> None:
+                if not runs.value:
+                    raise DataError("no run is chosen", remedy="choose one under Runs")
+                chosen = {"protocol": rig.value, "runs": list(runs.value)}
+                state.jobs.submit(record, TITLES.get(rig.value, rig.value), **chosen)
+                shown.close()
+
+            rig.on_value_change(listed)
+            listed()
+            mark(widgets.primary("Record", start), "record")
+
+    mark(widgets.button("Record a virtual muscle", ask, "smart_toy"), "virtual")
 
 
 async def _example(state: State) -> None:
@@ -252,6 +289,7 @@ def _recordings(state: State, entries: list[Entry]) -> None:
                 "are judged by cross-validation alone."
             ).classes("muted")
         _upload(state)
+        _virtual(state)
 
 
 def _line(state: State, entry: Entry) -> list[Any]:

@@ -72,6 +72,7 @@ class Form:
     recordings: list[Recording] = field(default_factory=list)
     error: MckibbenError | None = None
     rate: float | None = None
+    rest_length: float | None = None
     gaps: str = "error"
     raw: bool = False
     header: float | None = None
@@ -81,12 +82,8 @@ class Form:
 
     def __post_init__(self) -> None:
         given = self.reading
-        self.rate, self.gaps, self.raw, self.encoding = (
-            given.rate,
-            given.gaps,
-            given.raw,
-            given.encoding,
-        )
+        for name in ("rate", "rest_length", "gaps", "raw", "encoding"):
+            setattr(self, name, getattr(given, name))
         self.header, self.skip = given.header or None, given.skip or None
         self.held = "; ".join(f"{c} = {v:g} {u}" for c, (v, u) in given.constants.items())
 
@@ -127,7 +124,8 @@ class Form:
         header, skip = int(self.header or 0), int(self.skip or 0)
         layout: dict[str, Any] = {"header": header, "skip": skip, "encoding": self.encoding}
         before = (self.reading.header, self.reading.skip, self.reading.encoding)
-        general = layout | {"rate": self.rate, "gaps": self.gaps, "raw": self.raw}
+        plain = ("rate", "rest_length", "gaps", "raw")
+        general = layout | {name: getattr(self, name) for name in plain}
         if not self.columns:
             given = self.reading.model_dump() | general | {"constants": self._held()}
             return Reading.model_validate(given)
@@ -234,8 +232,12 @@ async def ask(
         understood()
         columns()
         with widgets.row():
-            number = ui.number("Samples per second").bind_value(form, "rate").on_value_change(check)
-            number.props("dense outlined debounce=600 clearable")
+            for label, name in (
+                ("Samples per second", "rate"),
+                ("Rest length [mm]", "rest_length"),
+            ):
+                number = ui.number(label).bind_value(form, name).on_value_change(check)
+                number.props("dense outlined debounce=600 clearable")
             ui.select(GAPS, label="Gaps").bind_value(form, "gaps").on_value_change(check).props(
                 "dense outlined"
             )

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command
 from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import CompareOptions, Option, ReadOptions
@@ -37,9 +37,9 @@ def compare(
     from mckibben.report import text
 
     chosen = replace(options, models="quick") if quick else options
-    with stoppable(out), progress_bar("compare:", plainly=True) as tell:
+    with stoppable(out):
         board = workflow.compare(
-            files, test, chosen, reading=reading, out=out, force=force, progress=tell
+            files, test, chosen, reading=reading, out=out, force=force, progress=True
         )
         stop_short(board, out)
     written = [out / "leaderboard.json", out / "leaderboard.csv"] if out else []

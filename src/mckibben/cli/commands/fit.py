@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Argument, Files, Force, Json, command
 from mckibben.options import FitOptions, Option, ReadOptions
 
@@ -27,8 +27,7 @@ def fit(
     from mckibben import workflow
     from mckibben.report import text
 
-    with progress_bar(f"fitting {model}") as tell:
-        found = workflow.fit(
-            model, files, options, reading=reading, out=out, force=force, progress=tell
-        )
+    found = workflow.fit(
+        model, files, options, reading=reading, out=out, force=force, progress=True
+    )
     show(found, lambda: text.fit(found), as_json, found.notes, [out])

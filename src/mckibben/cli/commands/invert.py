@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Force, Json, ModelFile, command
 from mckibben.options import InvertOptions, Option, ReadOptions
 
@@ -27,8 +27,5 @@ def invert(
     from mckibben import workflow
     from mckibben.report import text
 
-    with progress_bar("invert:") as tell:
-        found = workflow.invert(
-            model, options, reading=reading, out=out, force=force, progress=tell
-        )
+    found = workflow.invert(model, options, reading=reading, out=out, force=force, progress=True)
     show(found, lambda: text.inverse(found), as_json, written=[out])

@@ -8,10 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Argument, Force, Json, command
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Jobs, Option, ReadOptions, Seed
+from mckibben.system.progress import telling
 
 
 @command
@@ -46,7 +47,7 @@ def reproduce(
         return
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give `listed`")
-    with stoppable(out), progress_bar(f"{name}:", plainly=True) as tell:
+    with stoppable(out), telling(True, name, lines=True) as tell:
         found = rerun(
             name, data, reading, rig=rig, out=out, quick=quick, seed=seed, jobs=jobs, force=force,
             progress=tell,

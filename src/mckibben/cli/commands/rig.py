@@ -7,10 +7,11 @@ from typing import Annotated, Any, Literal
 
 import click
 
-from mckibben.cli.output import progress_bar, say, show
+from mckibben.cli.output import say, show
 from mckibben.cli.parameters import Argument, Force, Json, command
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Jobs, Option, Seed, setting
+from mckibben.system.progress import telling
 
 Name = Annotated[str, Argument("RIG", "Name of a rig, or its file (.toml).")]
 Changes = Annotated[
@@ -133,7 +134,7 @@ def record(
     """
     from mckibben.studying.rig_runs import record_protocol
 
-    with stoppable(out), progress_bar(f"recording {protocol}:") as tell:
+    with stoppable(out), telling(True, f"recording {protocol}") as tell:
         recorded, earlier = record_protocol(
             protocol, out, rig=rig, changes=changes, file_format=file_format, only=only, seed=seed,
             jobs=jobs, force=force, progress=tell,

@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from mckibben.cli.output import progress_bar, say, show
+from mckibben.cli.output import say, show
 from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command, repeated
 from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import Option, ReadOptions, StudyOptions
@@ -49,7 +49,7 @@ def study(
             live = unfinished(out) / "report.html"
             say(f"Report so far, updated with every model: {live}\n", flush=True)
 
-    with stoppable(out), progress_bar("study:", plainly=True) as tell:
+    with stoppable(out):
         found = workflow.study(
             files,
             test,
@@ -58,7 +58,7 @@ def study(
             out=out,
             force=force,
             command=repeated(),
-            progress=tell,
+            progress=True,
             found=begun,
         )
         stop_short(found.leaderboard, out)

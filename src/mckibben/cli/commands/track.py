@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Argument, Force, Json, command
 from mckibben.options import Option, ReadOptions, TrackOptions
 
@@ -29,15 +29,14 @@ def track(
     from mckibben import workflow
     from mckibben.report import text
 
-    with progress_bar(f"{options.controller}:") as tell:
-        found = workflow.track(
-            compensator,
-            reference,
-            options,
-            reading=reading,
-            out=out,
-            controller_out=controller_out,
-            force=force,
-            progress=tell,
-        )
+    found = workflow.track(
+        compensator,
+        reference,
+        options,
+        reading=reading,
+        out=out,
+        controller_out=controller_out,
+        force=force,
+        progress=True,
+    )
     show(found, lambda: text.tracking(found), as_json, written=[out, controller_out])

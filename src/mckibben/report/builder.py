@@ -71,7 +71,7 @@ class Table:
         """Columns of numbers, which are set right."""
 
         def numbers(place: int) -> float:
-            cells = [row[place] for row in self.rows if row[place] not in (None, "")]
+            cells = [row[place] for row in self.rows if row[place] not in (None, "", "–", "-")]
             plain = [isinstance(c, int | float) or bool(FIGURE.fullmatch(str(c))) for c in cells]
             return sum(plain) / max(len(plain), 1)
 
@@ -111,7 +111,8 @@ class Equations:
     kind: str = "equations"
 
 
-Item = Text | Table | Figure | Code | Equations
+Item = Text | Table | Figure | Code | Equations | None
+"""None is left out."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ class Section:
 
     name: str
     heading: str
-    items: Sequence[Item | None]
+    items: Sequence[Item]
     chooser: Sequence[str] = ()
     """Recordings to choose between."""
     models: Sequence[Mapping[str, str]] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -26,10 +26,12 @@ from mckibben.report.drawing import (
 )
 
 if TYPE_CHECKING:
+    from mckibben.blocks.fields import Channel
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.control import Tracked
     from mckibben.diagnosis.check import OutputCheck
     from mckibben.diagnosis.patterns import Bin, Pattern
+    from mckibben.diagnosis.responses import FrequencyResponse
     from mckibben.diagnosis.review import Followed
     from mckibben.studying.inverting import InverseCheck
 
@@ -222,3 +224,34 @@ def parts(one: Followed, points: int = POINTS) -> Drawing:
         ),
         stacked=True,
     )
+
+
+def frequency_response(found: FrequencyResponse) -> Drawing:
+    """Draw gain and angle over frequency, with bounds, beside what was measured."""
+    f = found.frequency
+    panels: list[Panel] = []
+    gain, angle = _gain_label(found.input, found.output), "angle [deg]"
+    rows = (
+        (gain, found.gain, found.gain_interval, found.measured_gain),
+        (angle, found.angle, found.angle_interval, found.measured_angle),
+    )
+    for label, values, interval, measured in rows:
+        first = not panels
+        curves = [
+            Curve(found.measured_frequency, measured, "recorded" * first, "measured", "specks"),
+            Curve(f, values, "model" * first, "series-1"),
+        ]
+        if interval is not None:
+            low, high = interval
+            curves.append(Curve(f, low, "95 %" * first, "series-1", "fine"))
+            curves.append(Curve(f, high, "", "series-1", "fine"))
+        axes: Literal["xy", "x"] = "xy" if first else "x"
+        panels.append(Panel("frequency [Hz]", label, tuple(curves), logarithmic=axes))
+    note = "" if found.measured_frequency.size else "No frequency was recorded with high coherence."
+    return Drawing(tuple(panels), stacked=True, note=note)
+
+
+def _gain_label(given: Channel, wanted: Channel) -> str:
+    """Return what a gain is of, and its unit."""
+    unit = "" if given.unit == wanted.unit else f"{wanted.unit or '1'}/{given.unit or '1'}"
+    return axis_label(f"gain to {wanted.name}", unit)

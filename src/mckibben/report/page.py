@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.comparison.channels import any_moves, held_at_levels
 from mckibben.diagnosis.check import Validation
-from mckibben.numerals import number, numeral, percent
+from mckibben.numerals import numeral, percent
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
     coupling_subjects,
     interactive,
     model_subjects,
+    results,
     subjects,
     words,
 )
@@ -27,9 +28,7 @@ from mckibben.report.builder import (
     Tile,
     Variants,
 )
-from mckibben.report.columns import columns_of_board
 from mckibben.report.commands import commands
-from mckibben.report.description_page import model_items
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.figures import on_recording
 from mckibben.report.shown import Shown, drawn, shown, unique
@@ -79,7 +78,7 @@ def page(study: Study, command: str = "", *, title: str = "") -> str:
     view = _View(pictured, max(FEWEST_POINTS, min(POINTS, N_VALUES // n_values)))
     sections = (
         _review(study, view.points),
-        _leaderboard(board),
+        Section("leaderboard", "Leaderboard", results.leaderboard(board, COLUMNS)),
         _model(study, view),
         _checks(study, view),
         _recordings(study, every, view),
@@ -163,83 +162,7 @@ def _lead(one: Shown, board: Leaderboard) -> Figure:
 def _review(study: Study, points: int) -> Section | None:
     if study.review is None:
         return None
-    figures = [
-        Figure(
-            f"review {one.output}",
-            [interactive.plots(model_subjects.parts(one, points))],
-            f"Reference, measured motion, and parts of the error of {one.output}",
-            "The parts add up to the error: model, pressure (measured less commanded), command.",
-            "stacked",
-        )
-        for one in study.review.outputs
-    ]
-    return Section(
-        "review", "Closed loop", [Text(words.reviewed(study.review), listed=True), *figures]
-    )
-
-
-def _leaderboard(board: Leaderboard) -> Section:
-    columns = [
-        one for one in columns_of_board(board) if one.key in COLUMNS or one.key in board.outputs
-    ]
-    ranked = [row for row in board.ranking if row.reason is None and row.test and row.train]
-    given = [row.to_dict() for row in ranked]
-    names = [
-        row.model + " ≈" * (row.model in board.level) + "*" * bool(row.caution) for row in ranked
-    ]
-    flags = [" ".join(filter(None, (one.flag(each) for one in columns))) for each in given]
-    table = Table(
-        ["Model", *(f"{one.heading} [{one.unit}]" if one.unit else one.heading for one in columns)],
-        [
-            [name, *(one.text(each) for one in columns)]
-            for name, each in zip(names, given, strict=True)
-        ],
-        best=next((k for k, row in enumerate(ranked) if row is board.best), None),
-        titles=[
-            f"{_summary(row.model)} {flag}".strip() for row, flag in zip(ranked, flags, strict=True)
-        ],
-        keys=[[row.model, *(one.sorted_by(each) for one in columns)]
-              for row, each in zip(ranked, given, strict=True)],
-    )  # fmt: skip
-    by = words.CHOICES[board.chosen_by][1]
-    notes = [f"≈ {words.LEVEL}."] * bool(board.level)
-    notes += [f"* {words.CAREFUL}."] * any(row.caution for row in ranked)
-    failed = [f"{', '.join(some)}: failed, {reason}" for reason, some in board.failures.items()]
-    chart = None
-    if ranked:
-        drawing = model_subjects.leaderboard(board)
-        chart = Figure(
-            "leaderboard",
-            [interactive.plots(drawing)],
-            "Errors of all models with intervals",
-            "Test errors with 95 % intervals; strokes: on the data fitted; rings: validation.",
-            height=4 + 1.4 * len(board.rows),
-        )
-    return Section(
-        "leaderboard",
-        "Leaderboard",
-        [
-            Text(
-                [
-                    f"{board.split[0].upper()}{board.split[1:]}. Ordered by {by}; all models run free."
-                ]
-            ),
-            table
-            if ranked
-            else Text(["No model is fitted yet."] if board.pending else ["No model worked."]),
-            Text([*notes, *words.comparison(board), *words.not_validated(board)], "note"),
-            Text(failed, "failed", listed=True) if failed else None,
-            chart,
-        ],
-    )
-
-
-def _summary(model: str) -> str:
-    """Return the full name of a model and what it can; nothing of unknown ones."""
-    from mckibben import registry
-    from mckibben.estimators.catalogue import summary
-
-    return summary(model) if model in registry.names("estimators") else ""
+    return Section("review", "Closed loop", results.review(study.review, points))
 
 
 def _model(study: Study, view: _View) -> Section | None:
@@ -250,7 +173,7 @@ def _model(study: Study, view: _View) -> Section | None:
     fit = view.each(lambda one: on_recording(one, "fit", view.points))
     items: list[Any] = [Figure("fit", fit, "Measured and modelled output over time", toggled=True)]
     if study.description is not None:
-        items += model_items(study.description)
+        items += results.description(study.description)
     name = "Model" if board.best is None else f"Model: {board.best.model}"
     models = [{"name": one, "colour": series_colour(k)} for k, one in enumerate(ranked)]
     return Section("model", name, items, view.names, models)
@@ -263,13 +186,8 @@ def _checks(study: Study, view: _View) -> Section | None:
         label = "Residuals over input and over time"
         items.append(Figure("residuals", residuals, label, "", "", 2, toggled=True))
     if isinstance(study.check, Validation):
-        items.append(Text(words.check_sentences(study.check), listed=True))
         for one in study.check.outputs[:MOST_CHECKED]:
-            panels = [
-                interactive.plots(model_subjects.pattern(one, each))[0] for each in one.patterns
-            ]
-            caption = f"Mean residual of {one.output} on the test, with 95 % intervals."
-            items.append(Figure(f"patterns {one.output}", [panels], caption, caption, "", 2))
+            items += results.checked(one)
     check = study.inverse
     if check is not None and check.reachable is not None:
         low, high = (numeral(end, 3) for end in check.reachable)
@@ -277,13 +195,8 @@ def _checks(study: Study, view: _View) -> Section | None:
         caption = f"The inverse of {check.model} on the model, {low} to {high} {board.unit}."
         items.append(Figure("inverse", [interactive.plots(drawing)], caption, caption, "tall"))
     if study.loops:
-        rows = [
-            [name, *(one.rmse[output] for output in board.outputs), one.clipped]
-            for name, one in study.loops.items()
-        ]
-        headings = [f"{name} RMSE [{board.unit}]" for name in board.outputs]
         items.append(Text([f"A measured motion, followed on the virtual rig {study.plant}."]))
-        items.append(Table(["Controller", *headings, "Samples clipped"], rows))
+        items += results.loops(study.loops)
         for name in board.outputs:
             drawing = model_subjects.tracking(study.loops, name, view.points)
             label = f"Reference and followed {name}"
@@ -291,7 +204,7 @@ def _checks(study: Study, view: _View) -> Section | None:
                 Figure(f"tracking {name}", [interactive.plots(drawing)], label, f"{label}.")
             )
     elif study.not_looped:
-        items.append(Text([f"No loop was closed: {study.not_looped}"]))
+        items.append(Text([words.not_looped(study)]))
     return Section("checks", "Checks", items, view.names) if items else None
 
 
@@ -309,20 +222,9 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
         Table(["Recording", "File", "Length", "Used to"], listed),
         Figure("time", time, "Input and output over time", "", "stacked"),
     ]
-    if study.data_gaps:
-        gaps = [[words.gap_sentence(gap), words.gap_run(gap)] for gap in study.data_gaps]
-        items.append(Table(["Data gap", "Run that closes it"], gaps))
+    items += results.data_gaps(study.data_gaps)
     if study.characterization is not None:
-        rows = [
-            [quantity, value, " to ".join(map(number, limits or ())), unit]
-            for quantity, value, limits, unit, _ in words.characterization_rows(
-                study.characterization
-            )
-            if value is not None
-        ]
-        items.append(
-            Table(["Quantity", "Value", "95 % interval", "Unit"], rows, summary="Characterization")
-        )
+        items += results.characterization(study.characterization)
     if not (len(board.inputs) == len(board.outputs) == 1):
         items += _coupling(board, measured)
     load = study.load

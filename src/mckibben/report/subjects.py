@@ -126,7 +126,6 @@ def residuals(
 ) -> Drawing:
     """Draw measured less modelled output against the input, and against time."""
     u, measured = recording[input_name], recording[output_name]
-    made = "measured" if recording.origin == "measured" else "simulated"
     against_input, against_time = [], []
     for model, colour, modelled in _worst_to_best(outputs):
         left = measured - modelled
@@ -134,7 +133,7 @@ def residuals(
         against_input.append(Curve(*path, model, colour, _path_style(u, "fine"), model))
         against_time.append(Curve(*course, "", colour, "fine", model))
     x_label = axis_label(input_name, recording.units[input_name])
-    y_label = axis_label(f"{made} − model", recording.units[output_name])
+    y_label = axis_label(f"{recording.origin} − model", recording.units[output_name])
     marks = _test_mark(recording.time, test_from)
     return Drawing(
         (

@@ -259,7 +259,7 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
                     "unit": unit,
                     "note": note,
                 }
-                for name, value, limits, unit, note in words.characterization_rows(found)
+                for name, value, limits, unit, note in words.quantities(found)
                 if value is not None
             ]
             columns = [

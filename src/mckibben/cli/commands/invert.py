@@ -25,10 +25,10 @@ def invert(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     with progress_bar("invert:") as tell:
         found = workflow.invert(
             model, options, reading=reading, out=out, force=force, progress=tell
         )
-    show(found, lambda: text.inverse(found), as_json, written=[out])
+    show(found, lambda: text.lines(results.inverse(found)), as_json, written=[out])

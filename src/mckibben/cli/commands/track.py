@@ -27,7 +27,7 @@ def track(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     with progress_bar(f"{options.controller}:") as tell:
         found = workflow.track(
@@ -40,4 +40,4 @@ def track(
             force=force,
             progress=tell,
         )
-    show(found, lambda: text.tracking(found), as_json, written=[out, controller_out])
+    show(found, lambda: text.lines(results.tracking(found)), as_json, written=[out, controller_out])

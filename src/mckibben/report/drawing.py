@@ -99,6 +99,8 @@ class Panel:
         Words for y = 0, 1, ... from the top down, instead of numbers.
     logarithmic : {"", "x", "xy"}
         Which axes are.
+    least : float
+        Least height of the y axis, so that rounding does not fill it.
     """
 
     x_label: str
@@ -110,6 +112,17 @@ class Panel:
     zero: bool = False
     categories: tuple[str, ...] = ()
     logarithmic: Literal["", "x", "xy"] = ""
+    least: float = 0.0
+
+    @property
+    def y_range(self) -> tuple[float, float] | None:
+        """Ends of the y axis where they do not follow from the curves."""
+        every = [one.y[np.isfinite(one.y)] for one in self.curves]
+        values = np.concatenate([*every, np.zeros(1)]) if self.zero else np.concatenate(every)
+        if not values.size or np.ptp(values) >= self.least:
+            return None
+        middle = (values.min() + values.max()) / 2
+        return float(middle - self.least / 2), float(middle + self.least / 2)
 
 
 @dataclass(frozen=True)

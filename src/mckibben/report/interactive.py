@@ -98,6 +98,7 @@ def _plot(panels: tuple[Panel, ...]) -> Json:
             "domain": [bottom, min(bottom + height, 1.0)],
             "zeroline": panel.zero,
             **({"type": "log"} if "y" in panel.logarithmic else {}),
+            **({"range": list(panel.y_range)} if panel.y_range else {}),
             **_ticks(panel),
         }
         named = [_trace(curve, x, y) for curve in panel.curves]

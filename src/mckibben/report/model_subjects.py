@@ -158,7 +158,10 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
                 ),
             ),
             Panel(
-                label, axis_label("error", wanted.unit), (Curve(*error, "", "series-6", "fine"),)
+                label,
+                axis_label("error", wanted.unit),
+                (Curve(*error, "", "series-6", "fine"),),
+                least=1e-6 * float(np.ptp(reference)),
             ),
             Panel(
                 label,

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.comparison.channels import any_moves, held_at_levels
 from mckibben.diagnosis.check import Validation
+from mckibben.diagnosis.coupling import coupling, fullest
 from mckibben.numerals import numeral, percent
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
-    coupling_subjects,
     interactive,
     model_subjects,
     results,
@@ -232,7 +232,7 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
         runs = [one.recording for one in view.pictured]
         held = held_at_levels(runs, load)
         levels = view.each(
-            lambda one: coupling_subjects.loop_by(
+            lambda one: subjects.loop_by(
                 runs if held else [one.recording], one.input, one.output, load, view.points
             )
         )[: 1 if held else None]
@@ -246,14 +246,14 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
 
 def _coupling(board: Leaderboard, recordings: Sequence[Recording]) -> list[Any]:
     """Return how inputs move outputs, where there are several."""
-    found = coupling_subjects.coupling(list(recordings), board.inputs, board.outputs)
-    fullest = coupling_subjects.fullest(list(recordings), board.inputs)
-    label = f"Every output over every input, of {fullest.name}"
+    found = coupling(list(recordings), board.inputs, board.outputs)
+    one = fullest(list(recordings), board.inputs)
+    label = f"Every output over every input, of {one.name}"
     rows: list[list[Any]] = [
         [f"{output} [{found.units[k]}]", *found.effects[k].tolist(), 100 * found.explained[k]]
         for k, output in enumerate(found.outputs)
     ]
-    plots = interactive.plots(coupling_subjects.matrix(fullest, found))
+    plots = interactive.plots(subjects.matrix(one, found))
     return [
         Figure("coupling", [plots], label, f"{label}.", "matrix", min(len(found.inputs), 6)),
         Table(["Effect of the whole range of", *found.inputs, "explained [%]"], rows),

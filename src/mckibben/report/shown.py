@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.diagnosis.coupling import coupling
 from mckibben.recording import Recording
-from mckibben.report.coupling_subjects import coupling
 
 if TYPE_CHECKING:
     from mckibben.studying.study import Study

@@ -28,8 +28,8 @@ from mckibben.report import StudyFolder, write_report
 from mckibben.report.builder import Page, Section
 from mckibben.report.check_page import check_page
 from mckibben.report.commands import commands
-from mckibben.report.page import page, tiles
-from mckibben.report.results import description
+from mckibben.report.page import page
+from mckibben.report.results import description, tiles
 from mckibben.report.words import answers
 from mckibben.studying.study import Study
 from tests.report.studies_by_hand import measured, renamed, study

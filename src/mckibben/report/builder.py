@@ -182,16 +182,23 @@ class Page:
         lines = [f"# {plain(self.title)}", plain(self.subtitle)]
         for section in self.sections:
             lines += [f"## {plain(section.heading)}"] if section.heading else []
-            for item in filter(None, section.items):
-                if isinstance(item, Table):
-                    lines.append("\n".join(_table(item)))
-                elif isinstance(item, Code):
-                    lines.append(f"```\n{item.text}\n```")
-                elif isinstance(item, Text):
-                    start = "### " if item.style == "lead" else "- " if item.listed else ""
-                    mark = "\n" if item.listed else " "
-                    lines.append(mark.join(f"{start}{plain(one)}" for one in item.sentences))
+            lines.append(markdown(section.items))
         return "\n\n".join(filter(None, lines)) + "\n"
+
+
+def markdown(items: Sequence[Item]) -> str:
+    """Return texts, tables and code as Markdown."""
+    lines = []
+    for item in items:
+        if isinstance(item, Table):
+            lines.append("\n".join(_table(item)))
+        elif isinstance(item, Code):
+            lines.append(f"```\n{item.text}\n```")
+        elif isinstance(item, Text):
+            start = "### " if item.style == "lead" else "- " if item.listed else ""
+            mark = "\n" if item.listed else " "
+            lines.append(mark.join(f"{start}{plain(one)}" for one in item.sentences))
+    return "\n\n".join(filter(None, lines))
 
 
 def plain(text: str) -> str:
@@ -206,7 +213,11 @@ def _table(one: Table) -> Iterator[str]:
     for place, row in enumerate(one.rows):
         cells = []
         for column, value in enumerate(row):
-            cell = number(value) if isinstance(value, float) else plain(str(value))
+            cell = (
+                number(value, 4)
+                if isinstance(value, float)
+                else plain(str("–" if value is None else value))
+            )
             mark = one.marked.get((place, column), "")
             cell = f"**{cell}**" if "least" in mark else cell
             cells.append(f"<u>{cell}</u>" if "chosen" in mark else cell)

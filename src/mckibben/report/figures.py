@@ -395,15 +395,13 @@ def _tracked(found: Tracked, output: str | None = None) -> Drawing:
     return model_subjects.tracking({"achieved": found}, name)
 
 
-def _parts(found: Review, output: str | None = None) -> Drawing:
-    """Draw reference and motion, and below the error with its parts."""
-    return model_subjects.parts(_named({one.output: one for one in found.outputs}, output))
+def _of_output(drawn: Callable[[Any], Drawing]) -> Callable[..., Drawing]:
+    """Return what draws what was found of one output."""
 
+    def draw_output(found: Review | Validation, output: str | None = None) -> Drawing:
+        return drawn(_named({one.output: one for one in found.outputs}, output))
 
-def _autocorrelation(found: Validation, output: str | None = None) -> Drawing:
-    return model_subjects.autocorrelation(
-        _named({one.output: one for one in found.outputs}, output)
-    )
+    return draw_output
 
 
 def _pattern(found: Validation, output: str | None = None, against: str = "branch") -> Drawing:
@@ -440,8 +438,11 @@ FIGURES: Mapping[str, Mapping[str, Callable[..., Drawing]]] = MappingProxyType(
         },
         "characterization": {"cycles": _cycles},
         "tracked": {"time": _tracked},
-        "review": {"parts": _parts},
-        "validation": {"autocorrelation": _autocorrelation, "residual": _pattern},
+        "review": {"parts": _of_output(model_subjects.parts)},
+        "validation": {
+            "autocorrelation": _of_output(model_subjects.autocorrelation),
+            "residual": _pattern,
+        },
     }
 )
 """Name of a thing -> name of a figure, the usual one first -> what draws it."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mckibben.comparison.channels import any_moves, held_at_levels
 from mckibben.diagnosis.check import Validation
 from mckibben.diagnosis.coupling import coupling, fullest
-from mckibben.numerals import numeral, percent
+from mckibben.numerals import numeral
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
     interactive,
@@ -25,7 +25,6 @@ from mckibben.report.builder import (
     Section,
     Table,
     Text,
-    Tile,
     Variants,
 )
 from mckibben.report.commands import commands
@@ -91,7 +90,7 @@ def page(study: Study, command: str = "", *, title: str = "") -> str:
         or f"{study.output} over {study.input if first.several else first.input}".capitalize(),
         f"{', '.join(names)}{f' and {more} more' if more else ''}",
         [one for one in sections if one is not None],
-        tiles(study),
+        results.tiles(study),
         _lead(first, board),
         words.answers(study),
     ).html()
@@ -107,43 +106,6 @@ class _View:
     def each(self, draw: Callable[[Shown], Drawing]) -> Variants:
         """Return a figure for every recording."""
         return [interactive.plots(draw(one)) for one in self.pictured]
-
-
-def tiles(study: Study) -> tuple[Tile, ...]:
-    """Return the numbers of the first screen: loop, model, inverse, data gaps."""
-    board, found, best = study.leaderboard, study.characterization, study.leaderboard.best
-    loop = Tile("Loop width", "–", "several muscles: see Recordings", "recordings")
-    if found is not None and found.loop_width is not None:
-        width = f"{numeral(found.mid_width, 2)} {found.output_unit} at mid {found.input}"
-        loop = Tile("Loop width", f"{numeral(found.loop_width, 2)} %", width, "recordings")
-    elif found is not None:
-        loop = Tile("Loop width", "–", "no loop is shown", "recordings")
-    model = Tile(
-        "Best model", "–", "fitting" if board.pending else "none recommended", "leaderboard"
-    )
-    if best is not None:
-        error, share = numeral(best.test_error, 2), _share(study)
-        of = f" ({share} of the range)" if share else ""
-        model = Tile(
-            "Best model", best.model, f"{error} {board.unit} RMSE on the test{of}", "leaderboard"
-        )
-    inverse, check = Tile("Inverse", "–", "none", "checks"), study.inverse
-    if check is not None:
-        plain = check.uncompensated_error
-        against = "" if plain is None else f"; static map: {percent(plain)}"
-        note = f"{check.model}, error on the model itself{against}"
-        inverse = Tile("Inverse", percent(check.error), note, "checks")
-    gaps = [words.gap_name(gap) for gap in study.data_gaps]
-    listed = ", ".join(gaps[:3]) + " ..." * (len(gaps) > 3)
-    return loop, model, inverse, Tile("Data gaps", str(len(gaps)), listed, "recordings")
-
-
-def _share(study: Study) -> str:
-    """Return the chosen model's error over the range of what it is tested on."""
-    if not isinstance(study.check, Validation) or len(study.check.outputs) > 1:
-        return ""
-    (one,) = study.check.outputs
-    return percent(one.rmse / one.span) if one.span else ""
 
 
 def _lead(one: Shown, board: Leaderboard) -> Figure:

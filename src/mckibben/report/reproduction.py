@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.numerals import numeral
 from mckibben.report import builder, interactive
 from mckibben.report.builder import Code, Item, Page, Section, Text
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Mark, Panel, Style
 
 if TYPE_CHECKING:
-    from mckibben.papers.experiment import Cell, Figure, Reproduction, Table
+    from mckibben.papers.experiment import Figure, Reproduction, Table
     from mckibben.papers.paper import Item as Indexed
 
 RECORDED = ("", "simulated", "measured", "sensor", "extracted", "reference", "of every loop")
@@ -186,21 +185,18 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
     yield "| in the paper | what it is | here | exact, or how it differs | command |"
     yield "|---|---|---|---|---|"
     yield from (_indexed(item, found) for item in paper.items)
-    yield "\n## What came out\n"
-    yield from (f"- {sentence}" for sentence in found.summary)
-    yield "\n## Given, and found\n"
-    yield from (f"- Given: {text}" for text in paper.given)
-    yield from (f"- Found: {text}" for text in paper.found)
-    yield "\n## What differs from the paper\n"
-    yield from (f"- {note}" for note in found.notes)
-    yield "\n## Tables\n"
-    for table in found.tables:
-        yield f"### {heading(table, quick=found.quick)}\n"
-        yield "| " + " | ".join(table.columns) + " |\n|---|" + "---:|" * (len(table.columns) - 1)
-        for row in table.rows:
-            yield "| " + " | ".join(_cell(cell) for cell in row) + " |"
-        yield f"\n{table.text.note}\n" if table.text.note else ""
-    yield "## Figures\n"
+    parts: dict[str, list[Item]] = {
+        "What came out": [Text(found.summary, listed=True)],
+        "Given, and found": [
+            Text([f"Given: {text}" for text in paper.given], listed=True),
+            Text([f"Found: {text}" for text in paper.found], listed=True),
+        ],
+        "What differs from the paper": [Text(found.notes, listed=True)],
+        "Tables": tables(found),
+    }
+    for title, shown in parts.items():
+        yield f"\n## {title}\n\n{builder.markdown(shown)}"
+    yield "\n## Figures\n"
     for figure in found.figures:
         yield f"### {heading(figure, quick=found.quick)}\n"
         yield f"![{figure.text.title}]({pictures}/{figure.key}.png)\n"
@@ -223,9 +219,3 @@ def _indexed(item: Indexed, found: Reproduction) -> str:
 def _anchor(title: str) -> str:
     """Return the anchor that a heading has."""
     return re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", title.lower()))
-
-
-def _cell(cell: Cell) -> str:
-    if cell is None:
-        return ""
-    return cell.replace("|", "\\|") if isinstance(cell, str) else numeral(cell, 4)

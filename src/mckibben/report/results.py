@@ -14,7 +14,7 @@ from mckibben import registry
 from mckibben.numerals import numeral, percent
 from mckibben.recording import reading_notes
 from mckibben.report import interactive, model_subjects, words
-from mckibben.report.builder import Equations, Figure, Item, Table, Text
+from mckibben.report.builder import Equations, Figure, Item, Table, Text, Tile
 from mckibben.report.columns import columns_of_board
 from mckibben.report.drawing import POINTS
 
@@ -341,11 +341,49 @@ def study_begun(found: Study) -> list[Item]:
 
 
 def study(found: Study) -> list[Item]:
-    """Return the leaderboard, the three answers, the inverse, and the loops closed."""
+    """Return the leaderboard, the three answers, what else is on the first screen, and loops."""
     said = [f"{question} {answer}" for question, answer in words.answers(found)]
+    said += [f"{one.label}: {one.value}, {one.note}".rstrip(", ") for one in tiles(found)]
+    said += filter(None, [words.not_looped(found)])
     closed = loops(found.loops) if found.loops else []
-    said += [text for text in (words.inverse(found), words.not_looped(found)) if text]
     return [*leaderboard(found.leaderboard), Text(said), *closed]
+
+
+def tiles(study: Study) -> tuple[Tile, ...]:
+    """Return the numbers of the first screen: loop, model, inverse, data gaps."""
+    board, found, best = study.leaderboard, study.characterization, study.leaderboard.best
+    loop = Tile("Loop width", "–", "several muscles: see Recordings", "recordings")
+    if found is not None and found.loop_width is not None:
+        width = f"{numeral(found.mid_width, 2)} {found.output_unit} at mid {found.input}"
+        loop = Tile("Loop width", f"{numeral(found.loop_width, 2)} %", width, "recordings")
+    elif found is not None:
+        loop = Tile("Loop width", "–", "no loop is shown", "recordings")
+    model = Tile(
+        "Best model", "–", "fitting" if board.pending else "none recommended", "leaderboard"
+    )
+    if best is not None:
+        error, share = numeral(best.test_error, 2), _share(study)
+        of = f" ({share} of the range)" if share else ""
+        model = Tile(
+            "Best model", best.model, f"{error} {board.unit} RMSE on the test{of}", "leaderboard"
+        )
+    inverse, check = Tile("Inverse", "–", "none", "checks"), study.inverse
+    if check is not None:
+        plain = check.uncompensated_error
+        against = "" if plain is None else f"; static map: {percent(plain)}"
+        note = f"{check.model}, error on the model itself{against}"
+        inverse = Tile("Inverse", percent(check.error), note, "checks")
+    gaps = [words.gap_name(gap) for gap in study.data_gaps]
+    listed = ", ".join(gaps[:3]) + " ..." * (len(gaps) > 3)
+    return loop, model, inverse, Tile("Data gaps", str(len(gaps)), listed, "recordings")
+
+
+def _share(study: Study) -> str:
+    """Return the chosen model's error over the range of what it is tested on."""
+    check = study.check
+    if check is None or isinstance(check, str) or len(check.outputs) > 1:
+        return ""
+    return percent(check.outputs[0].rmse / check.outputs[0].span) if check.outputs[0].span else ""
 
 
 def loops(found: Mapping[str, Tracked]) -> list[Item]:
@@ -425,8 +463,15 @@ def review(found: Review, points: int = POINTS) -> list[Item]:
 
 
 def calibration(found: Calibration) -> list[Item]:
-    """Return how wide bands are."""
-    return [Text(words.calibrated(found))]
+    """Return what bands rest on, and how wide they are on average in cross-validation."""
+    band, n = found.band, found.band.units
+    said = f"Calibrated on {n} {band.unit}s, which allow levels up to {percent(n / (n + 1), 3)}."
+    rows = [
+        [channel.name, percent(band.level, 3), width, channel.unit, percent(ratio)]
+        for channel, width, ratio in zip(band.given, found.widths, found.over_constant, strict=True)
+    ]
+    headings = ["Output", "Level", "Width of its band", "Unit", "Of one of constant width"]
+    return [Text([said]), Table(headings, rows)]
 
 
 # --- Papers, rigs and devices -----------------------------------------------------------------------

@@ -110,8 +110,9 @@ def against(
         under = _measured_style(recording, under=True)
         drawn.append((recording.origin, "measured", y, under, None))
     for place, (model, modelled) in [*enumerate(outputs.items())][:N_COLOURS][::-1]:
-        values, style = (y - modelled, "fine") if left else (modelled, "line")
-        drawn.append((model, series_colour(place), values, style, model))  # type: ignore[arg-type]
+        style: Style = "fine" if left else "line"
+        values = y - modelled if left else modelled
+        drawn.append((model, series_colour(place), values, style, model))
     label = axis_label(f"{recording.origin} − model" if left else pair[1], recording.units[pair[1]])
     least, panels = 1e-6 * float(np.ptp(y)), []
     if kind != "fit":

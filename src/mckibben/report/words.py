@@ -490,19 +490,6 @@ def band_on_test(
     ]
 
 
-def calibrated(found: Calibration) -> list[str]:
-    """Return what a band rests on, and how wide it is."""
-    band, n = found.band, found.band.units
-    said = [f"Calibrated on {n} {band.unit}s, which allow levels up to {percent(n / (n + 1), 3)}."]
-    for channel, width, ratio in zip(band.given, found.widths, found.over_constant, strict=True):
-        said.append(
-            f"{channel.name}: the band for {percent(band.level, 3)} is {numeral(width, 3)} "
-            f"{channel.unit} wide on average in cross-validation, {numeral(ratio, 2)} of a band of "
-            "constant width."
-        )
-    return said
-
-
 def calibrated_on_blocks(found: Calibration) -> str:
     """Return what a band does not include whose units are blocks of runs."""
     return (
@@ -607,26 +594,6 @@ def _record_next(study: Study) -> str:
     first, *others = study.data_gaps
     more = f" ({counted(len(others), 'more gap')})" if others else ""
     return f"{gap_run(first, ranges=False)[:-1]}: {gap_name(first)} cannot be identified{more}."
-
-
-def inverse(study: Study) -> str:
-    """Return which model is inverted and how well it is followed, or that none is."""
-    check, unit = study.inverse, study.leaderboard.unit
-    if check is None:
-        return "" if study.leaderboard.pending else "No inverse: no recommended model has one."
-    error = percent(check.error)
-    if check.reachable is None:
-        motion = "its own output for the test" if check.own else "the motion of the test"
-        text = f"The inverse of {check.model} follows {motion} on the model itself, error {error}"
-    else:
-        low, high = (numeral(end, 3) for end in check.reachable)
-        text = f"The inverse of {check.model} reaches {low} to {high} {unit}, error {error}"
-    if check.uncompensated_error is not None:
-        text += f"; a static map: {percent(check.uncompensated_error)}"
-    own = next(row.test_error for row in study.leaderboard.rows if row.model == check.model)
-    return (
-        f"{text}. On the muscle the error of the model adds, {numeral(own, 2)} {unit} on the test."
-    )
 
 
 def not_looped(study: Study) -> str:

@@ -18,7 +18,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from mckibben.errors import in_terms_of
-from mckibben.numerals import number, percent, typeset, typeset_within
+from mckibben.numerals import number, numeral, percent, typeset, typeset_within
 from mckibben.report import interactive
 from mckibben.report.mathematics import mathml
 
@@ -201,6 +201,13 @@ def markdown(items: Sequence[Item]) -> str:
     return "\n\n".join(filter(None, lines))
 
 
+def cell(value: Any, digits: int = 3) -> str:
+    """Return what a cell of a table shows."""
+    return (
+        "–" if value is None else numeral(value, digits) if isinstance(value, float) else str(value)
+    )
+
+
 def plain(text: str) -> str:
     """Return words on one line, with nothing in them that Markdown would take for its own."""
     return re.sub(r"([\\`*\[\]<>|#])", r"\\\1", " ".join(text.split()))
@@ -213,14 +220,10 @@ def _table(one: Table) -> Iterator[str]:
     for place, row in enumerate(one.rows):
         cells = []
         for column, value in enumerate(row):
-            cell = (
-                number(value, 4)
-                if isinstance(value, float)
-                else plain(str("–" if value is None else value))
-            )
+            shown = typeset(cell(value, 4)) if isinstance(value, float) else plain(cell(value))
             mark = one.marked.get((place, column), "")
-            cell = f"**{cell}**" if "least" in mark else cell
-            cells.append(f"<u>{cell}</u>" if "chosen" in mark else cell)
+            shown = f"**{shown}**" if "least" in mark else shown
+            cells.append(f"<u>{shown}</u>" if "chosen" in mark else shown)
         yield f"| {' | '.join(cells)} |"
 
 

@@ -8,7 +8,6 @@ from mckibben.numerals import percent
 from mckibben.recording import notes_by_file
 from mckibben.report import interactive, model_subjects, results, words
 from mckibben.report.builder import Figure, Item, Page, Section, Text, Tile
-from mckibben.report.figures import on_recording
 from mckibben.report.shown import Shown
 from mckibben.system.atomic import to_json
 
@@ -76,26 +75,18 @@ def _output(one: OutputCheck, place: int, runs: list[Run]) -> list[Item]:
     items = results.checked(one)
     if place >= MOST_OUTPUTS:
         return items
+    about = [
+        Shown(run.recording, one.patterns[0].channel, one.output, {"model": modelled}, "test")
+        for run in runs
+        for modelled in [run.modelled[:, place]]
+    ]
+    labels = {
+        "fit": "Measured and modelled output over time",
+        "residuals": "Residuals over input and over time",
+    }
     figures: list[Item] = []
-    for kind, label in (
-        ("fit", "Measured and modelled output over time"),
-        ("residuals", "Residuals over input and over time"),
-    ):
-        drawn = [
-            interactive.plots(
-                on_recording(
-                    Shown(
-                        run.recording,
-                        one.patterns[0].channel,
-                        one.output,
-                        {"model": run.modelled[:, place]},
-                        "test",
-                    ),
-                    kind,
-                )
-            )
-            for run in runs
-        ]
+    for kind, label in labels.items():
+        drawn = [interactive.plots(each.draw(kind)) for each in about]
         figures.append(Figure(f"{kind}-{place}", drawn, label, columns=len(drawn[0])))
     white = [interactive.plots(model_subjects.autocorrelation(one))]
     label = "Autocorrelation of the residual"

@@ -25,7 +25,7 @@ from mckibben.report import (
     printed,
     subjects,
 )
-from mckibben.report.drawing import N_COLOURS, POINTS, Curve, Drawing, Panel, axis_label, left_out
+from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Panel, axis_label, left_out
 from mckibben.report.shown import Shown, shown, unique
 from mckibben.signals import decaying_triangle
 from mckibben.system.extras import demand
@@ -307,28 +307,11 @@ def _one_each(
     """Draw each recording in panels of its own."""
     panels: list[Panel] = []
     for one in runs[:N_COLOURS]:
-        drawing = on_recording(one, kind, models=models)
+        drawing = one.draw(kind, models=models)
         title = one.name if len(runs) > 1 else ""
         panels += [replace(panel, title=title) for panel in drawing.panels]
     named = [*(one.name for one in runs[N_COLOURS:]), *others]
     return replace(drawing, panels=tuple(panels), note=left_out(named))
-
-
-def on_recording(one: Shown, kind: str, points: int = POINTS, models: int | None = None) -> Drawing:
-    """Draw a recording with the outputs of models, perhaps of the first few only.
-
-    Parameters
-    ----------
-    kind : {"fit", "loops", "residuals"}
-        Over time; over the input; measured less modelled.
-    """
-    outputs = dict(list(one.outputs.items())[:models])
-    if not outputs:
-        raise ModelError(
-            "no model of this study worked", remedy="see the reasons in its leaderboard"
-        )
-    pair = one.input, one.output
-    return subjects.against(kind, one.recording, pair, outputs, one.test_from, points)
 
 
 def _weights(block: Block, recording: Recordings | None = None) -> Drawing:

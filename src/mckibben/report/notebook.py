@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.numerals import numeral
 from mckibben.recording import Recording
 from mckibben.report import results, words
-from mckibben.report.builder import Item, Table, Text
+from mckibben.report.builder import Item, Table, Text, cell
 from mckibben.report.drawing import along
 from mckibben.report.figures import pair_of
 from mckibben.report.printed import verbatim
@@ -54,7 +53,7 @@ class Card:
     def text(self) -> str:
         """Return the title and sentences, or rows where there are none, in at most three lines."""
         first, *_ = wrap(verbatim(self.title), WIDTH, max_lines=1, placeholder=" …") or [""]
-        rows = "; ".join(" ".join(map(_shown, row)) for row in self.table.rows)
+        rows = "; ".join(" ".join(map(cell, row)) for row in self.table.rows)
         rest = verbatim(" ".join(self.lines) or rows)
         return "\n".join([first, *wrap(rest, WIDTH, max_lines=2, placeholder=" …")])
 
@@ -83,12 +82,8 @@ def card(thing: Any) -> Card:
 
 
 def _row(cells: Sequence[Any], tag: str) -> str:
-    found = "".join(f'<{tag} style="{_CELL}">{_escaped(_shown(cell))}</{tag}>' for cell in cells)
+    found = "".join(f'<{tag} style="{_CELL}">{_escaped(cell(value))}</{tag}>' for value in cells)
     return f"<tr>{found}</tr>"
-
-
-def _shown(cell: Any) -> str:
-    return numeral(cell) if isinstance(cell, float) else "–" if cell is None else str(cell)
 
 
 def _escaped(text: str) -> str:

@@ -29,7 +29,6 @@ from mckibben.report.builder import (
 )
 from mckibben.report.commands import commands
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
-from mckibben.report.figures import on_recording
 from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
@@ -117,7 +116,7 @@ def _lead(one: Shown, board: Leaderboard) -> Figure:
         drawing = subjects.loop([one.recording], one.input, one.output)
     else:
         timed = len(moving) > 1 and one.recording.sample_time is not None
-        drawing = on_recording(one, "fit" if timed else "loops", models=1)
+        drawing = one.draw("fit" if timed else "loops", models=1)
     return Figure("lead", [interactive.plots(drawing)], "Loop, measured and modelled", caption)
 
 
@@ -132,7 +131,7 @@ def _model(study: Study, view: _View) -> Section | None:
     if not study.predictions:
         return None
     ranked = [row.model for row in board.rows if row.reason is None][:N_COLOURS]
-    fit = view.each(lambda one: on_recording(one, "fit", view.points))
+    fit = view.each(lambda one: one.draw("fit", view.points))
     items: list[Any] = [Figure("fit", fit, "Measured and modelled output over time", toggled=True)]
     if study.description is not None:
         items += results.description(study.description)
@@ -144,7 +143,7 @@ def _model(study: Study, view: _View) -> Section | None:
 def _checks(study: Study, view: _View) -> Section | None:
     board, items = study.leaderboard, list[Any]()
     if study.predictions:
-        residuals = view.each(lambda one: on_recording(one, "residuals", view.points))
+        residuals = view.each(lambda one: one.draw("residuals", view.points))
         label = "Residuals over input and over time"
         items.append(Figure("residuals", residuals, label, "", "", 2, toggled=True))
     if isinstance(study.check, Validation):

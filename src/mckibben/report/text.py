@@ -6,8 +6,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from mckibben.numerals import numeral
-from mckibben.report.builder import Code, Item, Table, Text
+from mckibben.report.builder import Code, Item, Table, Text, cell
 
 
 def lines(items: Sequence[Item]) -> Iterator[str]:
@@ -37,12 +36,8 @@ def table(one: Table) -> str:
         side: Any = "right" if place in one.figures else "left"
         grid.add_column(Verbatim(heading), justify=side, overflow="fold")
     for row in one.rows:
-        grid.add_row(*(Verbatim(_cell(value)) for value in row))
+        grid.add_row(*(Verbatim(cell(value, 4)) for value in row))
     console = Console() if sys.stdout is not None and sys.stdout.isatty() else Console(width=200)
     with console.capture() as printed:
         console.print(grid)
     return "\n".join(line.rstrip() for line in printed.get().splitlines())
-
-
-def _cell(value: Any) -> str:
-    return numeral(value, 4) if isinstance(value, float) else "–" if value is None else str(value)

@@ -22,6 +22,7 @@ from mckibben.report.drawing import Curve, Drawing, Panel, along, over_time
 from mckibben.report.figures import (
     FIGURES,
     draw,
+    pair_of,
     write_figure,
 )
 from mckibben.report.interactive import packed, plots, text
@@ -88,6 +89,29 @@ def test_residuals_are_measured_less_modelled() -> None:
     for panel in panels:
         np.testing.assert_allclose(panel.curves[0].y, 0.5)
     assert panels[1].marks[0].x == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(("error", "narrow"), [(1e-13, True), (0.1, False)])
+def test_rounding_fills_no_panel(error: float, narrow: bool) -> None:
+    recording = measured(200)
+    y = recording["displacement"]
+    outputs = {"gpi": y - error * np.sin(np.arange(200))}
+    for panel in subjects.against("residuals", recording, CHANNELS, outputs).panels:
+        assert (panel.y_range is not None) == narrow
+        if panel.y_range is not None:
+            assert panel.y_range[1] - panel.y_range[0] == pytest.approx(1e-6 * np.ptp(y))
+
+
+def test_the_pair_of_a_recording_is_what_drives_and_what_moves() -> None:
+    x = np.linspace(0.0, 1.0, 50)
+    for names, pair in (
+        (("displacement", "voltage"), ("voltage", "displacement")),
+        (("pressure", "angle"), ("pressure", "angle")),
+        (("force", "time_of_day"), None),
+    ):
+        assert pair_of(Recording(dict.fromkeys(names, x), 0.1)) == pair
+    still = Recording({"pressure": 0 * x, "displacement": x}, 0.1)
+    assert pair_of(still) is None
 
 
 def arm(rest: str = "", shared: bool = False) -> Recording:

@@ -178,7 +178,10 @@ def models(every: Mapping[str, Any]) -> list[Item]:
         [name, ", ".join(f"{key}={value}" for key, value in one["settings"].items())]
         for name, one in every.items()
     ]
-    return [Table(["Model", "What it is"], rows), Table(["Model", "Settings (`set`)"], settings)]
+    return [
+        Table(["Model", "What it is"], rows),
+        Table(["Model", "Settings (--set NAME=VALUE)"], settings),
+    ]
 
 
 def description(found: ModelDescription) -> list[Item]:
@@ -507,7 +510,7 @@ def rigs(found: Mapping[str, Any]) -> list[Item]:
             [[name, one["runs"], one["rig"]] for name, one in found["protocols"].items()],
         ),
         Table(
-            ["Signal (`signal`)", "Settings"],
+            ["Signal (--signal NAME:SETTING=VALUE,...)", "Settings"],
             [
                 [name, ", ".join(f"{key} ({kind})" for key, kind in settings.items())]
                 for name, settings in found["signals"].items()

@@ -11,18 +11,18 @@ from mckibben.report.builder import Code, Item, Table, Text, cell
 
 def lines(items: Sequence[Item]) -> Iterator[str]:
     """Return texts and tables as lines; notes begin with ``Note: ``."""
-    before: Item = None
-    for item in items:
+    joined = True
+    for item in filter(None, items):
+        lead = isinstance(item, Text) and item.style == "lead"
+        yield from [""] * (lead or (isinstance(item, Table) and not joined))
+        joined = lead
         if isinstance(item, Text):
             start = "Note: " if item.style == "note" else "- " if item.listed else ""
-            yield from [""] * (item.style == "lead")
             yield from (f"{start}{sentence}" for sentence in item.sentences)
         elif isinstance(item, Table):
-            yield from [""] * isinstance(before, Table)
             yield table(item)
         elif isinstance(item, Code):
             yield f"{item.what}: {item.text}"
-        before = item
 
 
 def table(one: Table) -> str:

@@ -287,8 +287,8 @@ def check_notes(one: OutputCheck) -> list[str]:
     """Return whether a residual is white, and what to do about what it follows first."""
     said = []
     if one.whiteness.p_value is not None:
-        white = one.whiteness.p_value > WHITE
-        said.append(f"It is {'' if white else 'not '}white ({_p(one.whiteness.p_value)}).")
+        white = "white" if one.whiteness.p_value > WHITE else "not white"
+        said.append(f"The residual of {one.output} is {white} ({_p(one.whiteness.p_value)}).")
     if one.missing and not one.exact:
         said.append(_advice(_largest(one)))
     return [*filter(None, said)]

@@ -46,29 +46,25 @@ class Card:
         return [line for one in self.items if isinstance(one, Text) for line in one.sentences]
 
     @property
-    def table(self) -> Table:
-        """The first table."""
-        return next((one for one in self.items if isinstance(one, Table)), Table((), ()))
+    def tables(self) -> list[Table]:
+        """Every table."""
+        return [one for one in self.items if isinstance(one, Table)]
 
     def text(self) -> str:
         """Return the title and sentences, or rows where there are none, in at most three lines."""
         first, *_ = wrap(verbatim(self.title), WIDTH, max_lines=1, placeholder=" …") or [""]
-        rows = "; ".join(" ".join(map(cell, row)) for row in self.table.rows)
-        rest = verbatim(" ".join(self.lines) or rows)
+        rest = verbatim(" ".join(self.lines or map(_read_out, self.tables)))
         return "\n".join([first, *wrap(rest, WIDTH, max_lines=2, placeholder=" …")])
 
     def html(self) -> str:
         """Return it for a notebook: escaped, without scripts or colours of its own."""
         parts = [f"<strong>{_escaped(self.title)}</strong>"]
         parts += [f"<div>{_escaped(line)}</div>" for line in self.lines]
-        if rows := self.table.rows:
-            cells = [
-                _row(self.table.headings, "th"),
-                *(_row(row, "td") for row in rows[:MOST_ROWS]),
-            ]
-            parts.append(f'<table style="border-collapse:collapse">{"".join(cells)}</table>')
-        if len(rows) > MOST_ROWS:
-            parts.append(f"<div>and {len(rows) - MOST_ROWS} more</div>")
+        for table in self.tables:
+            rows = [_row(table.headings, "th"), *(_row(x, "td") for x in table.rows[:MOST_ROWS])]
+            parts.append(f'<table style="border-collapse:collapse">{"".join(rows)}</table>')
+            if len(table.rows) > MOST_ROWS:
+                parts.append(f"<div>and {len(table.rows) - MOST_ROWS} more</div>")
         if self.path is not None:
             parts.append(_picture(*self.path))
         return f'<div style="{_BOX}">{"".join(parts)}</div>'
@@ -79,6 +75,16 @@ def card(thing: Any) -> Card:
     pair = pair_of(thing) if isinstance(thing, Recording) else None
     path = None if pair is None else (thing[pair[0]], thing[pair[1]])
     return Card(TITLES[thing.face](thing), results.FACES[thing.face](thing), path)
+
+
+def _read_out(table: Table) -> str:
+    """Return a table as a sentence: every cell after its heading, where there are several."""
+    heads = [f"{heading} " * (len(table.headings) > 2) for heading in table.headings[1:]]
+    rows = [
+        f"{row[0]} {', '.join(f'{head}{cell(x)}' for head, x in zip(heads, row[1:], strict=True))}"
+        for row in table.rows
+    ]
+    return f"{'; '.join(rows)}."
 
 
 def _row(cells: Sequence[Any], tag: str) -> str:

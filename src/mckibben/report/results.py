@@ -158,12 +158,13 @@ def block(found: Block) -> list[Item]:
     """Return what a model takes, gives and is."""
     from mckibben.blocks.setting import summary
 
-    return model(summary(found))
+    rows = list(zip(found.parameter_names, map(float, found.pack()), strict=False))
+    return [*model(summary(found)), Table(["Parameter", "Value"], rows) if rows else None]
 
 
 def model(about: Mapping[str, Any]) -> list[Item]:
     """Return what a saved model is, from its `summary`."""
-    settable = ", ".join(f"{name}={value}" for name, value in about["settable"].items())
+    settable = ", ".join(f"{name}={value}" for name, value in about["settable"].items()) or "–"
     rows = [
         [key.replace("_", " "), ", ".join(value) if isinstance(value, list) else str(value)]
         for key, value in {**about, "settable": settable}.items()
@@ -310,14 +311,15 @@ def leaderboard(board: Leaderboard, keys: Sequence[str] = BOARD) -> list[Item]:
     ranked = [row for row in board.ranking if row.reason is None and row.test and row.train]
     split = f"{board.split[0].upper()}{board.split[1:]}"
     by = words.CHOICES[board.chosen_by][1]
-    items: list[Item] = [Text([f"{split}. Ordered by {by}; all models run free."])]
-    if not ranked:
-        items.append(Text(["No model is fitted yet." if board.pending else "No model worked."]))
-    else:
-        items.append(board_table(board, ranked, keys))
     chosen, marks = words.chosen(board), words.marks(board)
-    items.append(Text([chosen]) if chosen else None)
-    items.append(Text(marks, "muted") if marks else None)
+    if not ranked:
+        chosen = "No model is fitted yet." if board.pending else "No model worked."
+    items: list[Item] = [
+        Text([chosen]) if chosen else None,
+        Text([f"{split}. Ordered by {by}; all models run free."]),
+        board_table(board, ranked, keys) if ranked else None,
+        Text(marks, "muted") if marks else None,
+    ]
     notes = [*words.comparison(board), *words.not_validated(board)]
     items.append(Text(notes, "note", listed=True) if notes else None)
     failed = [f"{', '.join(some)}: failed, {reason}" for reason, some in board.failures.items()]

@@ -25,10 +25,10 @@ def check(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
     from mckibben.report.check_page import check_json
 
     found = workflow.check(model, files, reading=reading, out=out, force=force, progress=True)
     about = {"folder": str(out)} | check_json(found, str(model))
     written = [out / "report.html", out / "validation.json"]
-    show(about, lambda: text.check(found), as_json, written=written)
+    show(about, lambda: text.lines(results.check(found)), as_json, written=written)

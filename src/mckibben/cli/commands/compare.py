@@ -34,7 +34,7 @@ def compare(
     as_json: Json = False,
 ) -> int:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     chosen = replace(options, models="quick") if quick else options
     with stoppable(out):
@@ -43,6 +43,6 @@ def compare(
         )
         stop_short(board, out)
     written = [out / "leaderboard.json", out / "leaderboard.csv"] if out else []
-    show(board, lambda: text.leaderboard(board), as_json, written=written)
+    show(board, lambda: text.lines(results.leaderboard(board)), as_json, board.notes, written)
     failed = sum(map(len, board.failures.values()))
     return NO_MODEL if board.rows and failed == len(board.rows) else 0

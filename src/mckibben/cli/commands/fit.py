@@ -25,9 +25,9 @@ def fit(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     found = workflow.fit(
         model, files, options, reading=reading, out=out, force=force, progress=True
     )
-    show(found, lambda: text.fit(found), as_json, found.notes, [out])
+    show(found, lambda: text.lines(results.fit(found)), as_json, found.notes, [out])

@@ -25,7 +25,7 @@ def invert(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     found = workflow.invert(model, options, reading=reading, out=out, force=force, progress=True)
-    show(found, lambda: text.inverse(found), as_json, written=[out])
+    show(found, lambda: text.lines(results.inverse(found)), as_json, written=[out])

@@ -37,13 +37,13 @@ def reproduce(
 ) -> None:
     from mckibben.errors import DataError
     from mckibben.papers.paper import papers
-    from mckibben.report import text
+    from mckibben.report import reproduction, results, text
     from mckibben.report.rerun import rerun
 
     if listed:
         every = papers()
         about = [{"name": key} | one.about() for key, one in every.items()]
-        show(about, lambda: text.papers(every), as_json)
+        show(about, lambda: text.lines(results.papers(every)), as_json)
         return
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give `listed`")
@@ -53,4 +53,4 @@ def reproduce(
             progress=tell,
         )  # fmt: skip
     written = [out / "report.html", out / "tables.json"] if out else []
-    show(found, lambda: text.reproduction(found), as_json, found.notes, written)
+    show(found, lambda: text.lines(reproduction.items(found)), as_json, found.notes, written)

@@ -23,11 +23,11 @@ Changes = Annotated[
 @command
 def list_(as_json: Json = False) -> None:
     """List the rigs, the protocols made for them, and the signals that can drive them."""
-    from mckibben.report import text
+    from mckibben.report import results, text
     from mckibben.studying.rig_runs import catalogue
 
     found = catalogue()
-    show(found, lambda: text.rigs(found), as_json)
+    show(found, lambda: text.lines(results.rigs(found)), as_json)
 
 
 @command
@@ -88,7 +88,7 @@ def run(
     from mckibben.errors import DataError
     from mckibben.files import read, write
     from mckibben.outputs import claim_recording
-    from mckibben.report import text
+    from mckibben.report import results, text
     from mckibben.rigs import load_rig
     from mckibben.studying.rig_runs import at_first_commands, commands
 
@@ -110,7 +110,7 @@ def run(
     spans = {k: [float(v.min()), float(v.max())] for k, v in recording.channels.items()}
     about = {"file": str(out), "n_samples": len(recording), "ranges": spans}
     about["saturated"] = dict(recording.meta.get("saturated", {}))
-    show(about, lambda: text.ranges(recording), as_json, written=[out])
+    show(about, lambda: text.lines(results.recording(recording)), as_json, written=[out])
 
 
 @command

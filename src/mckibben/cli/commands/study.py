@@ -40,11 +40,11 @@ def study(
     from mckibben import workflow
     from mckibben.outputs import unfinished
     from mckibben.recording import notes_by_file
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     def begun(so_far: Study) -> None:
         if not so_far.leaderboard.rows and not as_json:
-            for line in text.study_begun(so_far):
+            for line in text.lines(results.study_begun(so_far)):
                 say(line)
             live = unfinished(out) / "report.html"
             say(f"Report so far, updated with every model: {live}\n", flush=True)
@@ -66,7 +66,8 @@ def study(
     about["notes"] = notes_by_file([*found.train, *found.test])
     show(
         about if as_json else found,
-        lambda: text.study(found),
+        lambda: text.lines(results.study(found)),
         as_json,
+        found.leaderboard.notes,
         written=[out / "report.html"],
     )

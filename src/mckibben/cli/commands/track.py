@@ -27,7 +27,7 @@ def track(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     found = workflow.track(
         compensator,
@@ -39,4 +39,4 @@ def track(
         force=force,
         progress=True,
     )
-    show(found, lambda: text.tracking(found), as_json, written=[out, controller_out])
+    show(found, lambda: text.lines(results.tracking(found)), as_json, written=[out, controller_out])

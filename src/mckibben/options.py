@@ -40,9 +40,12 @@ class Option:
 
 
 def given_options(
-    kind: type[Options], options: Options | None, given: Mapping[str, Any]
+    kind: type[Options],
+    options: Options | None,
+    given: Mapping[str, Any],
+    others: Sequence[str] = (),
 ) -> Options:
-    """Return options with some fields given by name.
+    """Return options with some fields given by name; ``others`` are names beside, for the remedy.
 
     Raises
     ------
@@ -58,7 +61,7 @@ def given_options(
     if strange := [name for name in given if name not in base.__dataclass_fields__]:
         raise ModelError(
             f"there is no option {strange[0]!r}",
-            remedy=f"use {', '.join(base.__dataclass_fields__)}",
+            remedy=f"use {', '.join((*base.__dataclass_fields__, *others))}",
         )
     found = replace(base, **given) if given else base
     for name, hint in get_type_hints(kind).items():

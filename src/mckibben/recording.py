@@ -227,8 +227,8 @@ class Recording(DrawsItself):
 
     @property
     def origin(self) -> str:
-        """What its samples are called: what a virtual rig gave was not measured."""
-        return "virtual" if "(virtual)" in str(self.meta.get("rig", "")) else "measured"
+        """What its samples are called: a virtual rig's are not measured."""
+        return "simulated" if "(virtual)" in str(self.meta.get("rig", "")) else "measured"
 
     @property
     def name(self) -> str:

@@ -298,6 +298,7 @@ def track(
     """
     from mckibben.blocks.base import Block
     from mckibben.blocks.feedback import FeedforwardFeedback
+    from mckibben.blocks.inverse import drives
     from mckibben.control import BlockController, before, control_law, dead_time_undone, tune_pid
     from mckibben.control import track as close
     from mckibben.control.identified import beyond_known
@@ -311,6 +312,13 @@ def track(
     file = _claim(out, read, force, recording=True)
     controller_file = _claim(controller_out, [*read, *_paths(out)], force)
     block, plant = saved(compensator, chosen.fields), _plant(chosen, reading)
+    if not any(drives(channel) or channel.name.startswith(COMMAND) for channel in block.outputs):
+        gives = ", ".join(channel.name for channel in block.outputs)
+        raise ModelError(
+            f"it gives {gives}, and a compensator gives pressures or commands",
+            parameter="compensator",
+            remedy="give what `invert()` makes of the model",
+        )
     (run, *_) = read_files(reference, None, reading)
     wanted = asked(plant, run, block)
     BlockController(block).connect(offered(plant, wanted))  # before anything is tuned
@@ -445,6 +453,7 @@ def check(
     out: str | Path | None = None,
     force: bool = False,
     progress: Progress = None,
+    **given: Any,
 ) -> Validation:
     """Test whether a model is right on recordings, and what it misses; see `mckibben.diagnosis.check`.
 
@@ -456,6 +465,7 @@ def check(
     from mckibben.outputs import results_in
     from mckibben.report.check_page import write_check
 
+    reading = given_options(ReadOptions, reading, given)
     files: Data = [*loaded(data), *expanded([], files_of(data))[2]]
     names = ["validation.json", "report.html"]
     with results_in(out, names, inputs=_paths(model, files), force=force, kind="check") as results:
@@ -506,6 +516,7 @@ def review(
     refit: bool = True,
     seed: int = 0,
     reading: ReadOptions | None = None,
+    **given: Any,
 ) -> Review:
     """Return how a logged loop followed its reference, and why no better; see `diagnosis.review`.
 
@@ -513,6 +524,7 @@ def review(
     """
     from mckibben.diagnosis.review import review as find
 
+    reading = given_options(ReadOptions, reading, given)
     ran = {"model": saved(model), "compensator": saved(compensator)}
     return find(read_files(log, None, reading), refit=refit, seed=seed, **ran)
 
@@ -600,7 +612,7 @@ def _chosen(
     names = {one.name for one in fields(ReadOptions)} - {*get_type_hints(kind)}
     read = {name: value for name, value in given.items() if name in names}
     rest = {name: value for name, value in given.items() if name not in read}
-    chosen = given_options(kind, options, rest)
+    chosen = given_options(kind, options, rest, sorted(names))
     return chosen, given_options(ReadOptions, reading, read) if read else reading
 
 

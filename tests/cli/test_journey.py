@@ -30,7 +30,7 @@ def model(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> Path:
     result = cli("fit", "gpi", files[0], *channels, "-o", path, *settings)
     assert result.code == 0, result.err
     assert len(load(path).weights) == 6  # type: ignore[attr-defined]
-    assert "standard error" in result.out
+    assert "Standard error" in result.out
     assert re.search(r"rising slope +\d\S* +\d\S* +1/bar", result.out)
     return path
 

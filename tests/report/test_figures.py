@@ -14,13 +14,15 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mckibben.blocks.hysteresis.gpi import GPI
+from mckibben.diagnosis.coupling import coupling
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
-from mckibben.report import coupling_subjects, printed, subjects
+from mckibben.report import printed, subjects
 from mckibben.report.drawing import Curve, Drawing, Panel, along, over_time
 from mckibben.report.figures import (
     FIGURES,
     draw,
+    pair_of,
     write_figure,
 )
 from mckibben.report.interactive import packed, plots, text
@@ -83,10 +85,33 @@ def test_outputs_belong_to_their_recording_and_tested_ones_come_first() -> None:
 def test_residuals_are_measured_less_modelled() -> None:
     recording = measured(200)
     outputs = {"gpi": recording["displacement"] - 0.5}
-    panels = subjects.residuals(recording, *CHANNELS, outputs, test_from=150).panels
+    panels = subjects.against("residuals", recording, CHANNELS, outputs, 150).panels
     for panel in panels:
         np.testing.assert_allclose(panel.curves[0].y, 0.5)
     assert panels[1].marks[0].x == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(("error", "narrow"), [(1e-13, True), (0.1, False)])
+def test_rounding_fills_no_panel(error: float, narrow: bool) -> None:
+    recording = measured(200)
+    y = recording["displacement"]
+    outputs = {"gpi": y - error * np.sin(np.arange(200))}
+    for panel in subjects.against("residuals", recording, CHANNELS, outputs).panels:
+        assert (panel.y_range is not None) == narrow
+        if panel.y_range is not None:
+            assert panel.y_range[1] - panel.y_range[0] == pytest.approx(1e-6 * np.ptp(y))
+
+
+def test_the_pair_of_a_recording_is_what_drives_and_what_moves() -> None:
+    x = np.linspace(0.0, 1.0, 50)
+    for names, pair in (
+        (("displacement", "voltage"), ("voltage", "displacement")),
+        (("pressure", "angle"), ("pressure", "angle")),
+        (("force", "time_of_day"), None),
+    ):
+        assert pair_of(Recording(dict.fromkeys(names, x), 0.1)) == pair
+    still = Recording({"pressure": 0 * x, "displacement": x}, 0.1)
+    assert pair_of(still) is None
 
 
 def arm(rest: str = "", shared: bool = False) -> Recording:
@@ -102,16 +127,16 @@ INPUTS, OUTPUTS = ("u1", "u2"), ("y1", "y2")
 
 
 def test_effects_are_those_of_inputs_over_their_ranges() -> None:
-    found = coupling_subjects.coupling([arm()], INPUTS, OUTPUTS)
+    found = coupling([arm()], INPUTS, OUTPUTS)
     np.testing.assert_allclose(found.effects, [[6, 0], [2, 10]], atol=0.1)
     assert found.own("y2") == "u2"
-    together = coupling_subjects.coupling([arm(shared=True)], INPUTS, OUTPUTS)
+    together = coupling([arm(shared=True)], INPUTS, OUTPUTS)
     assert np.isnan(together.effects).all()
 
 
 def test_an_output_is_drawn_over_an_input_that_moves_where_it_is_drawn() -> None:
     runs = [arm("u1"), arm("u2")]
-    found = coupling_subjects.coupling(runs, INPUTS, OUTPUTS)
+    found = coupling(runs, INPUTS, OUTPUTS)
     assert found.pairs(runs) == (("u1", "y1"), ("u2", "y2"))
     assert found.pairs(runs[:1]) == (("u2", "y1"), ("u2", "y2"))
     assert found.pairs(runs[1:]) == (("u1", "y1"), ("u1", "y2"))

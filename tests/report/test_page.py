@@ -28,8 +28,8 @@ from mckibben.report import StudyFolder, write_report
 from mckibben.report.builder import Page, Section
 from mckibben.report.check_page import check_page
 from mckibben.report.commands import commands
-from mckibben.report.description_page import model_items
-from mckibben.report.page import page, tiles
+from mckibben.report.page import page
+from mckibben.report.results import description, tiles
 from mckibben.report.words import answers
 from mckibben.studying.study import Study
 from tests.report.studies_by_hand import measured, renamed, study
@@ -251,7 +251,7 @@ def test_units_and_names_from_files_lead_nowhere(unit: str) -> None:
     u, y = moved["pressure"], model.simulate(moved["pressure"]) + 0.1 * moved["displacement"]
     units = {push.name: unit, bend.name: unit}
     found = describe(model, [Recording({push.name: u, bend.name: y}, 0.05, units)])
-    html = Page("", "", [Section("model", "", model_items(found))]).html()
+    html = Page("", "", [Section("model", "", description(found))]).html()
     shown = Parsed(html[html.index("<section") : html.index("</main>")])
     assert {"math", "table"} <= shown.tags
     assert not shown.tags & {"img", "a", "iframe", "mfrac", "code"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -51,7 +52,10 @@ LONG = ("comparing", "studying", "identifying pi", "checking", "tuning")
 )
 @pytest.mark.filterwarnings("ignore::mckibben.ModelWarning")
 def test_true_shows_a_bar_and_a_callable_is_told(
-    what: str, run: Recording, capfd: pytest.CaptureFixture[str]
+    what: str,
+    run: Recording,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     told: list[Any] = []
     WORK[what](run, lambda *given: told.append(given))
@@ -60,7 +64,20 @@ def test_true_shows_a_bar_and_a_callable_is_told(
     assert shares == sorted(shares)
     assert 0 <= shares[0] <= shares[-1] <= 1
     assert capfd.readouterr() == ("", "")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     WORK[what](run, True)
     out, error = capfd.readouterr()
     assert what in error
     assert not out
+
+
+@pytest.mark.long
+def test_without_a_terminal_steps_are_lines(
+    run: Recording, capfd: pytest.CaptureFixture[str]
+) -> None:
+    WORK["fitting"](run, True)
+    assert capfd.readouterr() == ("", "")
+    mckibben.compare(run, models=["pi", "gpi"], jobs=1, progress=True)
+    lines = capfd.readouterr().err.splitlines()
+    assert len(lines) >= 2
+    assert all(line.startswith("comparing: ") for line in lines)

@@ -91,7 +91,7 @@ class Desk:
 
     def looked_at(self, recordings: Sequence[Recording] = ()) -> tuple[tuple[str, str], ...]:
         """Return what every output of recordings, or of all there are, is drawn over, and the output."""
-        from mckibben.report.coupling_subjects import coupling
+        from mckibben.diagnosis.coupling import coupling
 
         used = list(self.workspace.used().values())
         sides = self.sides

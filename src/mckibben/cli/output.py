@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,7 +11,6 @@ from typing import Any
 from mckibben.cli.parameters import as_command, as_flag, plainly
 from mckibben.errors import MckibbenError, in_terms_of
 from mckibben.system.atomic import to_json
-from mckibben.system.progress import words_of
 
 INTERRUPTED = 130
 """Exit code of a command that was stopped."""
@@ -110,41 +108,3 @@ def show(
         note(one)
     if paths := [str(path) for path in written if path is not None]:
         say(f"Written: {', '.join(paths)}")
-
-
-@contextmanager
-def progress_bar(what: str, *, plainly: bool = False) -> Iterator[Callable[..., None]]:
-    """Show progress on standard error; yields what is called with the share done, and words.
-
-    Parameters
-    ----------
-    what : str
-        Work in hand.
-    plainly : bool
-        Whether to print a line for every step where standard error is no terminal; else nothing.
-    """
-    in_notebook = "JPY_PARENT_PID" in os.environ  # has a terminal that cannot go back in a line
-    if sys.stderr is None or not sys.stderr.isatty() or in_notebook:
-        last = -1.0
-
-        def line(share: float, *told: str | float) -> None:
-            nonlocal last
-            if plainly and share > last:
-                say(f"{what} {words_of(*told)}", error=True)
-                last = share
-
-        yield line
-        return
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
-
-    columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}", markup=False),
-        *(() if plainly else (TimeRemainingColumn(),)),  # whose words have a time left, if plainly
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(f"{what} ...", total=1.0)
-        yield lambda share, *told: bar.update(
-            task, completed=share, description=visible(f"{what} {words_of(*told)}")
-        )

@@ -190,7 +190,7 @@ def compare(
     kept, board = plan.kept(folder), plan.board()
     try:
         with (
-            telling(progress, "comparing") as tell,
+            telling(progress, "comparing", lines=True) as tell,
             closing(ranked(plan, jobs=jobs, kept=kept, progress=tell, watch=watch)) as rankings,
         ):
             for ranking in rankings:

@@ -155,7 +155,7 @@ class Validation(DrawsItself):
 
     model: str
     recordings: tuple[str, ...]
-    outputs: tuple[OutputCheck, ...]
+    outputs: tuple[OutputCheck, ...] = field(repr=False)
     untested: tuple[str, ...] = ()
     runs: tuple[Run, ...] = field(default=(), repr=False)
     description: ModelDescription | None = field(default=None, repr=False)

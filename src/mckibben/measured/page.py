@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from mckibben.measured.sets import sets_in
 from mckibben.numerals import numeral
 from mckibben.report import words
 from mckibben.report.builder import Code, Item, Page, Section, Table, Text
-from mckibben.report.columns import columns_of_board
+from mckibben.report.results import board_table
 
 SHOWN = 8
 """Models of a section, and the chosen one; the rest are in the file beside."""
@@ -140,25 +141,28 @@ def _section(one: Outcome) -> list[Any]:
     board, tested = one.board, _tested(one)
     if board is None or not board.rows:
         return [*items, Text([f"Not compared: {one.failed}"])]
-    columns = [column for column in columns_of_board(board) if column.key in KEYS]
     chosen = board.best.model if board.best else ""
     shown = [row for k, row in enumerate(tested) if k < SHOWN or row.model == chosen]
-    given = [row.to_dict() for row in shown]
-    rows = [[row["model"], *(column.text(row) for column in columns)] for row in given]
-    best = next((k for k, row in enumerate(shown) if row.model == chosen), None)
-    for figure in one.task.published:
-        cells = [f"{figure.rmse:g}" if column.key == "test" else "–" for column in columns]
-        rows.append([f"{figure.what} (printed)", *cells])
+    table = board_table(board, shown, KEYS)
+    printed = [
+        [
+            f"{figure.what} (printed)",
+            *(
+                f"{figure.rmse:g}" if name.startswith("test RMSE") else "–"
+                for name in table.headings[1:]
+            ),
+        ]
+        for figure in one.task.published
+    ]
     notes = []
     if one.notes:  # that of the first file in full
         more = f" (and {len(one.notes) - 1} more of the kind)" if len(one.notes) > 1 else ""
         notes = [f"as read: {one.notes[0]}{more}"]
-    notes += words.comparison(board)
+    notes += [*words.marks(board), *words.comparison(board)]
     notes += [f"failed: {row.model}: {row.reason}" for row in board.rows if row.reason]
-    headings = ["model", *(column.label for column in columns)]
     items += [
         Text([f"Split: {board.split}. {'' if chosen else words.chosen(board)}".strip()]),
-        Table(headings, rows, best),
+        replace(table, rows=[*table.rows, *printed], titles=(), keys=()),
     ]
     return [*items, Text(notes, "note", listed=True)] if notes else items
 

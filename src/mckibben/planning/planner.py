@@ -7,7 +7,7 @@ the free run where residuals are correlated, of all recordings and the plan toge
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -105,9 +105,9 @@ class Plan:
     """
 
     recording: Recording
-    steps: tuple[Step, ...]
-    parameters: tuple[Parameter, ...] = ()
-    gaps: tuple[Gap, ...] = ()
+    steps: tuple[Step, ...] = field(repr=False)
+    parameters: tuple[Parameter, ...] = field(default=(), repr=False)
+    gaps: tuple[Gap, ...] = field(default=(), repr=False)
     extrapolated: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from mckibben.errors import in_terms_of
-from mckibben.numerals import number, percent, typeset, typeset_within
+from mckibben.numerals import number, numeral, percent, typeset, typeset_within
 from mckibben.report import interactive
 from mckibben.report.mathematics import mathml
 
@@ -71,7 +71,7 @@ class Table:
         """Columns of numbers, which are set right."""
 
         def numbers(place: int) -> float:
-            cells = [row[place] for row in self.rows if row[place] not in (None, "")]
+            cells = [row[place] for row in self.rows if row[place] not in (None, "", "–", "-")]
             plain = [isinstance(c, int | float) or bool(FIGURE.fullmatch(str(c))) for c in cells]
             return sum(plain) / max(len(plain), 1)
 
@@ -111,7 +111,8 @@ class Equations:
     kind: str = "equations"
 
 
-Item = Text | Table | Figure | Code | Equations
+Item = Text | Table | Figure | Code | Equations | None
+"""None is left out."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ class Section:
 
     name: str
     heading: str
-    items: Sequence[Item | None]
+    items: Sequence[Item]
     chooser: Sequence[str] = ()
     """Recordings to choose between."""
     models: Sequence[Mapping[str, str]] = ()
@@ -181,16 +182,30 @@ class Page:
         lines = [f"# {plain(self.title)}", plain(self.subtitle)]
         for section in self.sections:
             lines += [f"## {plain(section.heading)}"] if section.heading else []
-            for item in filter(None, section.items):
-                if isinstance(item, Table):
-                    lines.append("\n".join(_table(item)))
-                elif isinstance(item, Code):
-                    lines.append(f"```\n{item.text}\n```")
-                elif isinstance(item, Text):
-                    start = "### " if item.style == "lead" else "- " if item.listed else ""
-                    mark = "\n" if item.listed else " "
-                    lines.append(mark.join(f"{start}{plain(one)}" for one in item.sentences))
+            lines.append(markdown(section.items))
         return "\n\n".join(filter(None, lines)) + "\n"
+
+
+def markdown(items: Sequence[Item]) -> str:
+    """Return texts, tables and code as Markdown."""
+    lines = []
+    for item in items:
+        if isinstance(item, Table):
+            lines.append("\n".join(_table(item)))
+        elif isinstance(item, Code):
+            lines.append(f"```\n{item.text}\n```")
+        elif isinstance(item, Text):
+            start = "### " if item.style == "lead" else "- " if item.listed else ""
+            mark = "\n" if item.listed else " "
+            lines.append(mark.join(f"{start}{plain(one)}" for one in item.sentences))
+    return "\n\n".join(filter(None, lines))
+
+
+def cell(value: Any, digits: int = 3) -> str:
+    """Return what a cell of a table shows."""
+    return (
+        "–" if value is None else numeral(value, digits) if isinstance(value, float) else str(value)
+    )
 
 
 def plain(text: str) -> str:
@@ -205,10 +220,10 @@ def _table(one: Table) -> Iterator[str]:
     for place, row in enumerate(one.rows):
         cells = []
         for column, value in enumerate(row):
-            cell = number(value) if isinstance(value, float) else plain(str(value))
+            shown = typeset(cell(value, 4)) if isinstance(value, float) else plain(cell(value))
             mark = one.marked.get((place, column), "")
-            cell = f"**{cell}**" if "least" in mark else cell
-            cells.append(f"<u>{cell}</u>" if "chosen" in mark else cell)
+            shown = f"**{shown}**" if "least" in mark else shown
+            cells.append(f"<u>{shown}</u>" if "chosen" in mark else shown)
         yield f"| {' | '.join(cells)} |"
 
 

@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.numerals import percent
 from mckibben.recording import notes_by_file
-from mckibben.report import interactive, model_subjects, words
-from mckibben.report.builder import Figure, Page, Section, Table, Text, Tile
-from mckibben.report.description_page import model_items
-from mckibben.report.figures import on_recording
+from mckibben.report import interactive, model_subjects, results, words
+from mckibben.report.builder import Figure, Item, Page, Section, Text, Tile
 from mckibben.report.shown import Shown
 from mckibben.system.atomic import to_json
 
@@ -35,10 +33,10 @@ def check_json(found: Validation, model_file: str) -> dict[str, Any]:
     }
 
 
-def write_check(results: Results, found: Validation, model_file: str) -> None:
+def write_check(folder: Results, found: Validation, model_file: str) -> None:
     """Write ``validation.json`` and ``report.html``."""
-    results.write_text("validation.json", to_json(check_json(found, model_file)) + "\n")
-    results.write_text("report.html", check_page(found, model_file))
+    folder.write_text("validation.json", to_json(check_json(found, model_file)) + "\n")
+    folder.write_text("report.html", check_page(found, model_file))
 
 
 def check_page(found: Validation, model_file: str) -> str:
@@ -51,7 +49,7 @@ def check_page(found: Validation, model_file: str) -> str:
         for k, one in enumerate(found.outputs)
     ]
     if found.description is not None:
-        sections.append(Section("model", "Model", model_items(found.description)))
+        sections.append(Section("model", "Model", results.description(found.description)))
     untested = [f"Too short to be tested: {', '.join(found.untested)}."] * bool(found.untested)
     more = len(found.recordings) - 6
     listed = ", ".join(found.recordings[:6]) + (f" and {more} more" if more > 0 else "")
@@ -72,56 +70,25 @@ def check_page(found: Validation, model_file: str) -> str:
     ).html()
 
 
-def _output(one: OutputCheck, place: int, runs: list[Run]) -> list[Any]:
+def _output(one: OutputCheck, place: int, runs: list[Run]) -> list[Item]:
     """Return what a page shows of an output: what is missed, residuals, and all tests."""
-    missing = [
-        [words.missed(one, each), f"{100 * each.share:.2g}", each.size, _p(each.p_value)]
-        for each in one.missing
+    items = results.checked(one)
+    if place >= MOST_OUTPUTS:
+        return items
+    about = [
+        Shown(run.recording, one.patterns[0].channel, one.output, {"model": modelled}, "test")
+        for run in runs
+        for modelled in [run.modelled[:, place]]
     ]
-    items: list[Any] = [Text(words.check_notes(one))]
-    if missing:
-        headings = ["Missed", "Share of the variance [%]", f"RMS [{one.unit}]", "p"]
-        items.append(Table(headings, missing))
-    if place < MOST_OUTPUTS:
-        first, fits, residuals = one.patterns[0].channel, [], []
-        for run in runs:
-            about = Shown(
-                run.recording, first, one.output, {"model": run.modelled[:, place]}, "test"
-            )
-            fits.append(interactive.plots(on_recording(about, "fit")))
-            residuals.append(interactive.plots(on_recording(about, "residuals")))
-        panels = [interactive.plots(model_subjects.pattern(one, each))[0] for each in one.patterns]
-        white = [interactive.plots(model_subjects.autocorrelation(one))]
-        items += [
-            Figure(f"fit-{place}", fits, "Measured and modelled output over time"),
-            Figure(
-                f"residuals-{place}",
-                residuals,
-                "Residuals over input and over time",
-                "",
-                columns=2,
-            ),
-            Figure(
-                f"patterns-{place}",
-                [panels],
-                "Mean residuals with intervals",
-                "Mean residuals, with 95 % intervals that allow for autocorrelation.",
-                columns=2,
-            ),
-            Figure(
-                f"autocorrelation-{place}",
-                white,
-                "Autocorrelation of the residual",
-                "Autocorrelation of the residual; band: white noise.",
-            ),
-        ]
-    tests = [
-        [words.missed(one, each), f"{100 * each.share:.2g}", _p(each.p_value)]
-        for each in one.suspects
-    ]
-    items.append(Table(["Test", "Share of the variance [%]", "p"], tests, summary="All tests"))
-    return items
-
-
-def _p(value: float | None) -> str:
-    return "–" if value is None else "< 0.000001" if value < 1e-6 else f"{value:.2g}"
+    labels = {
+        "fit": "Measured and modelled output over time",
+        "residuals": "Residuals over input and over time",
+    }
+    figures: list[Item] = []
+    for kind, label in labels.items():
+        drawn = [interactive.plots(each.draw(kind)) for each in about]
+        figures.append(Figure(f"{kind}-{place}", drawn, label, columns=len(drawn[0])))
+    white = [interactive.plots(model_subjects.autocorrelation(one))]
+    label = "Autocorrelation of the residual"
+    figures.append(Figure(f"autocorrelation-{place}", white, label, f"{label}; band: white noise."))
+    return [*items, *figures]

@@ -99,6 +99,8 @@ class Panel:
         Words for y = 0, 1, ... from the top down, instead of numbers.
     logarithmic : {"", "x", "xy"}
         Which axes are.
+    least : float
+        Least height of the y axis, so that rounding does not fill it.
     """
 
     x_label: str
@@ -110,6 +112,17 @@ class Panel:
     zero: bool = False
     categories: tuple[str, ...] = ()
     logarithmic: Literal["", "x", "xy"] = ""
+    least: float = 0.0
+
+    @property
+    def y_range(self) -> tuple[float, float] | None:
+        """Ends of the y axis where they do not follow from the curves."""
+        every = [one.y[np.isfinite(one.y)] for one in self.curves]
+        values = np.concatenate([*every, np.zeros(int(self.zero))])
+        if not values.size or np.ptp(values) >= self.least:
+            return None
+        middle = (values.min() + values.max()) / 2
+        return float(middle - self.least / 2), float(middle + self.least / 2)
 
 
 @dataclass(frozen=True)
@@ -135,15 +148,7 @@ class Drawing:
 
 
 def over_time(time: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
-    """Return time and y thinned to at most ``points``, with every extremum to the eye.
-
-    Parameters
-    ----------
-    time, y : array, shape (n,)
-        Uniform time [s], and what is drawn over it.
-    points : int, at least 2
-        Most points left.
-    """
+    """Return uniform time and y thinned to at most ``points``, with every extremum to the eye."""
     from mckibben.signals import decimate_minmax
 
     time, y = decimate_minmax(time, y, max_points=points)
@@ -151,21 +156,9 @@ def over_time(time: Array, y: Array, points: int = POINTS) -> tuple[Array, Array
 
 
 def along(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array, Array]:
-    """Return places in time, x and y of a path thinned to at most ``points``.
+    """Return sample numbers, x and y of a path thinned to at most ``points``, 4 or more.
 
-    Extrema of both x and y are kept, so that a loop keeps its tips and its width.
-
-    Parameters
-    ----------
-    x, y : array, shape (n,)
-        In order of time.
-    points : int, at least 4
-        Most points left.
-
-    Returns
-    -------
-    places, x, y : array, shape (m,)
-        ``places`` are sample numbers.
+    Extrema of both x and y stay, so that a loop keeps its tips and its width.
     """
     from mckibben.signals import decimate_minmax
 

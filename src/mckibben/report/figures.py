@@ -13,7 +13,9 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.free_run import run_free
+from mckibben.comparison.channels import Channels, any_moves, channels_of
 from mckibben.control.identified import known_ranges
+from mckibben.diagnosis.coupling import coupling
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.base import driving
 from mckibben.recording import Recording
@@ -23,8 +25,7 @@ from mckibben.report import (
     printed,
     subjects,
 )
-from mckibben.report.coupling_subjects import coupling
-from mckibben.report.drawing import N_COLOURS, POINTS, Curve, Drawing, Panel, axis_label, left_out
+from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Panel, axis_label, left_out
 from mckibben.report.shown import Shown, shown, unique
 from mckibben.signals import decaying_triangle
 from mckibben.system.extras import demand
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.control import Tracked
     from mckibben.diagnosis.characterization import Characterization
-    from mckibben.diagnosis.check import OutputCheck, Validation
+    from mckibben.diagnosis.check import Validation
     from mckibben.diagnosis.review import Review
     from mckibben.rigs.rig import Rig
     from mckibben.studying.study import Study
@@ -49,10 +50,6 @@ SCREEN = 6.4 / printed.COLUMN
 
 PERIOD, CYCLES, SAMPLE_TIME = 10.0, 3, 0.02
 """Of the falling triangle that loops of models and rigs are drawn with [s]."""
-
-DRIVING = ("pressure", "voltage")
-MOVED = ("displacement", "length", "contraction", "angle", "force")
-"""What drives, and what is moved, by the first word of a channel's name."""
 
 
 def draw(thing: Any, kind: str | None = None, **choices: Any) -> Drawing:
@@ -149,19 +146,12 @@ def interact(thing: Any, kind: str | None, choices: Mapping[str, Any]) -> Any:
 
 
 def pair_of(recording: Recording) -> tuple[str, str] | None:
-    """Return the first channel that drives and the first that is moved, or None without either."""
-
-    def first(quantities: Sequence[str]) -> str | None:
-        found = (
-            name
-            for quantity in quantities
-            for name in recording.channels
-            if name.partition("_")[0] == quantity and np.ptp(recording[name]) > 0
-        )
-        return next(found, None)
-
-    given, moved = first(DRIVING), first(MOVED)
-    return None if given is None or moved is None else (given, moved)
+    """Return the first pair of channels that move, of those that drive and are moved, or None."""
+    try:
+        pairs = channels_of([recording]).pairs()
+    except DataError:
+        return None
+    return next((pair for pair in pairs if all(any_moves([recording], (x,)) for x in pair)), None)
 
 
 # --- Recordings and rigs ----------------------------------------------------------------------------
@@ -197,28 +187,38 @@ def _several(recordings: Recordings) -> Sequence[Recording]:
     return [recordings] if isinstance(recordings, Recording) else recordings
 
 
-def _rig_run(rig: Rig, given: str | None, wanted: str | None) -> tuple[Recording, str, str]:
-    """Return what a falling triangle of one input does to a rig, the other inputs at rest."""
-    driven = given or rig.inputs[0]
-    moved = [name for name in rig.outputs if not name.startswith("pressure")]
-    own = driven.replace("pressure", "displacement")
-    ends = rig.limits(driven)
-    t = SAMPLE_TIME * np.arange(round(CYCLES * PERIOD / SAMPLE_TIME) + 1)
-    resting = zip(rig.inputs, rig.resting[0], strict=True)
-    channels = {name: np.full(t.size, value) for name, value in resting}
-    channels[driven] = decaying_triangle(t, period=PERIOD, high=ends.high, low=ends.low)
-    run = rig.run(Recording(channels, SAMPLE_TIME, meta={"name": rig.name}))
-    return run, driven, wanted or (own if own in moved else (moved or [*rig.outputs])[0])
+def _triangle(
+    name: str,
+    driven: str,
+    ends: tuple[float, float],
+    others: Mapping[str, float],
+    step: float = SAMPLE_TIME,
+    units: Mapping[str, str] | None = None,
+) -> Recording:
+    """Return a falling triangle of one input, with the other inputs held."""
+    t = step * np.arange(round(CYCLES * PERIOD / step) + 1)
+    channels = {other: np.full(t.size, value) for other, value in others.items()}
+    channels[driven] = decaying_triangle(t, period=PERIOD, low=ends[0], high=ends[1])
+    return Recording(channels, step, units or {}, meta={"name": name})
 
 
-def _rig_loop(rig: Rig, input: str | None = None, output: str | None = None) -> Drawing:  # noqa: A002
-    run, given, moved = _rig_run(rig, input, output)
-    return subjects.loop([run], given, moved)
+def _of_rig(drawn: Callable[..., Drawing]) -> Callable[..., Drawing]:
+    """Return what draws what a falling triangle of one input does to a rig, the other inputs at rest."""
 
+    def draw_rig(
+        rig: Rig,
+        input: str | None = None,  # noqa: A002
+        output: str | None = None,
+    ) -> Drawing:
+        driven, resting = input or rig.inputs[0], dict(zip(rig.inputs, rig.resting[0], strict=True))
+        ends = rig.limits(driven).low, rig.limits(driven).high
+        run = rig.run(_triangle(rig.name, driven, ends, resting))
+        moved = [name for name in rig.outputs if name not in rig.inputs] or [*rig.outputs]
+        pairs = Channels(tuple(rig.inputs), tuple(moved)).pairs()
+        own = next((wanted for given, wanted in pairs if given == driven), moved[0])
+        return drawn([run], input=driven, output=output or own)
 
-def _rig_time(rig: Rig, input: str | None = None, output: str | None = None) -> Drawing:  # noqa: A002
-    run, *pair = _rig_run(rig, input, output)
-    return subjects.time_course([run], pair)
+    return draw_rig
 
 
 # --- Models and leaderboards ------------------------------------------------------------------------
@@ -240,14 +240,11 @@ def _block_loop(
             remedy="set `high=`, or a measured `recording=`",
         )
     low, top = ranges.get(driven, (0.0, 0.0))
+    middle = {name: float(np.mean(ranges.get(name, (0.0, 0.0)))) for name in names}
+    ends = low, top if high is None else high
     step = block.sample_time or SAMPLE_TIME
-    t = step * np.arange(round(CYCLES * PERIOD / step) + 1)
-    channels = {name: np.full(t.size, np.mean(ranges.get(name, (0.0, 0.0)))) for name in names}
-    channels[driven] = decaying_triangle(
-        t, period=PERIOD, high=top if high is None else high, low=low
-    )
     units = {channel.name: channel.unit for channel in block.inputs}
-    run = block.simulate(Recording(channels, step, units, meta={"name": block.title}))
+    run = block.simulate(_triangle(block.title, driven, ends, middle, step, units))
     return subjects.loop([run], driven, given)
 
 
@@ -310,32 +307,11 @@ def _one_each(
     """Draw each recording in panels of its own."""
     panels: list[Panel] = []
     for one in runs[:N_COLOURS]:
-        drawing = on_recording(one, kind, models=models)
+        drawing = one.draw(kind, models=models)
         title = one.name if len(runs) > 1 else ""
         panels += [replace(panel, title=title) for panel in drawing.panels]
     named = [*(one.name for one in runs[N_COLOURS:]), *others]
     return replace(drawing, panels=tuple(panels), note=left_out(named))
-
-
-def on_recording(one: Shown, kind: str, points: int = POINTS, models: int | None = None) -> Drawing:
-    """Draw a recording with the outputs of models, perhaps of the first few only.
-
-    Parameters
-    ----------
-    kind : {"fit", "loops", "residuals"}
-        Over time; over the input; measured less modelled.
-    """
-    outputs = dict(list(one.outputs.items())[:models])
-    if not outputs:
-        raise ModelError(
-            "no model of this study worked", remedy="see the reasons in its leaderboard"
-        )
-    run, given, moved = one.recording, one.input, one.output
-    if kind == "fit":
-        return subjects.fit_over_time(run, moved, outputs, one.test_from, points)
-    if kind == "loops":
-        return subjects.fit_loops(run, given, moved, outputs, points)
-    return subjects.residuals(run, given, moved, outputs, one.test_from, points)
 
 
 def _weights(block: Block, recording: Recordings | None = None) -> Drawing:
@@ -402,25 +378,20 @@ def _tracked(found: Tracked, output: str | None = None) -> Drawing:
     return model_subjects.tracking({"achieved": found}, name)
 
 
-def _parts(found: Review, output: str | None = None) -> Drawing:
-    """Draw reference and motion, and below the error with its parts."""
-    return model_subjects.parts(_named({one.output: one for one in found.outputs}, output))
+def _of_output(drawn: Callable[[Any], Drawing]) -> Callable[..., Drawing]:
+    """Return what draws what was found of one output."""
 
+    def draw_output(found: Review | Validation, output: str | None = None) -> Drawing:
+        return drawn(_named({one.output: one for one in found.outputs}, output))
 
-def _checked(found: Validation, output: str | None) -> OutputCheck:
-    return _named({one.output: one for one in found.outputs}, output)
-
-
-def _autocorrelation(found: Validation, output: str | None = None) -> Drawing:
-    return model_subjects.autocorrelation(_checked(found, output))
+    return draw_output
 
 
 def _pattern(found: Validation, output: str | None = None, against: str = "branch") -> Drawing:
     """Draw means of an output's residual over inputs, loads, outputs or branches."""
-    one = _checked(found, output)
-    return model_subjects.pattern(
-        one, _named({each.against: each for each in one.patterns}, against)
-    )
+    one = _named({one.output: one for one in found.outputs}, output)
+    pattern = _named({each.against: each for each in one.patterns}, against)
+    return model_subjects.pattern(one, pattern)
 
 
 def _named(known: Mapping[str, T], name: str | None) -> T:
@@ -435,7 +406,7 @@ _AGAINST = {kind: _against(kind) for kind in ("loops", "fit", "residuals")}
 FIGURES: Mapping[str, Mapping[str, Callable[..., Drawing]]] = MappingProxyType(
     {
         "recording": {"loop": _loop, "time": _time},
-        "rig": {"loop": _rig_loop, "time": _rig_time},
+        "rig": {"loop": _of_rig(_loop), "time": _of_rig(_time)},
         "block": {"loop": _block_loop, "weights": _weights, **_AGAINST},
         "leaderboard": {"errors": model_subjects.leaderboard, **_AGAINST},
         "study": {
@@ -450,8 +421,11 @@ FIGURES: Mapping[str, Mapping[str, Callable[..., Drawing]]] = MappingProxyType(
         },
         "characterization": {"cycles": _cycles},
         "tracked": {"time": _tracked},
-        "review": {"parts": _parts},
-        "validation": {"autocorrelation": _autocorrelation, "residual": _pattern},
+        "review": {"parts": _of_output(model_subjects.parts)},
+        "validation": {
+            "autocorrelation": _of_output(model_subjects.autocorrelation),
+            "residual": _pattern,
+        },
     }
 )
 """Name of a thing -> name of a figure, the usual one first -> what draws it."""

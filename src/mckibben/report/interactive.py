@@ -98,6 +98,7 @@ def _plot(panels: tuple[Panel, ...]) -> Json:
             "domain": [bottom, min(bottom + height, 1.0)],
             "zeroline": panel.zero,
             **({"type": "log"} if "y" in panel.logarithmic else {}),
+            **({"range": list(panel.y_range)} if panel.y_range else {}),
             **_ticks(panel),
         }
         named = [_trace(curve, x, y) for curve in panel.curves]
@@ -111,27 +112,17 @@ def _plot(panels: tuple[Panel, ...]) -> Json:
                 | {"arrowwidth": 1.6, "arrowcolor": "--ink"}
             )
         for mark in panel.marks:
-            layout["shapes"].append(
-                {"type": "line", "xref": x, "yref": f"{y} domain", "x0": mark.x, "x1": mark.x}
-                | {"y0": 0, "y1": 1, "line": {"color": "--muted", "width": 1, "dash": "dot"}}
-            )
+            here = {"xref": x, "yref": f"{y} domain"}
+            line: Json = {"type": "line", "x0": mark.x, "x1": mark.x, "y0": 0, "y1": 1}
+            line["line"] = {"color": "--muted", "width": 1, "dash": "dot"}
+            layout["shapes"].append(here | line)
             at, anchor = (mark.x, "left") if mark.until is None else (mark.until, "right")
-            layout["annotations"].append(
-                {"xref": x, "yref": f"{y} domain", "x": at, "y": 1, "text": text(mark.text)}
-                | {"xanchor": anchor, "yanchor": "bottom", "showarrow": False}
-            )
+            word = {"x": at, "y": 1, "text": text(mark.text), "showarrow": False}
+            layout["annotations"].append(here | word | {"xanchor": anchor, "yanchor": "bottom"})
             if mark.until is not None:
-                layout["shapes"].append(
-                    {
-                        "type": "rect",
-                        "xref": x,
-                        "yref": f"{y} domain",
-                        "x0": mark.x,
-                        "x1": mark.until,
-                    }
-                    | {"y0": 0, "y1": 1, "line": {"width": 0}, "fillcolor": "--accent"}
-                    | {"opacity": 0.12, "layer": "below"}
-                )
+                area = {"type": "rect", "x1": mark.until, "line": {"width": 0}}
+                look = {"fillcolor": "--accent", "opacity": 0.12, "layer": "below"}
+                layout["shapes"].append(here | line | area | look)
         if panel.title:
             layout["title"] = {"text": text(panel.title)}
     return {"data": traces, "layout": layout}

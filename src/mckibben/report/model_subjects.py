@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.equations import channel_units, unit_of
 from mckibben.blocks.hysteresis.eupi import EUPI
@@ -19,6 +20,7 @@ from mckibben.report.drawing import (
     Curve,
     Drawing,
     Panel,
+    Style,
     axis_label,
     over_time,
     series_colour,
@@ -29,7 +31,8 @@ if TYPE_CHECKING:
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.control import Tracked
     from mckibben.diagnosis.check import OutputCheck
-    from mckibben.diagnosis.patterns import Bin, Pattern
+    from mckibben.diagnosis.patterns import Pattern
+    from mckibben.diagnosis.responses import FrequencyResponse
     from mckibben.diagnosis.review import Followed
     from mckibben.studying.inverting import InverseCheck
 
@@ -116,17 +119,26 @@ def operator_sums(block: Block) -> Iterator[OperatorSum]:
             yield from operator_sums(part)
 
 
+Course = tuple[Array, str, str, Style]
+"""What is drawn over time: values, name, colour and style."""
+
+
+def _courses(time: Array, points: int, *given: Course) -> tuple[Curve, ...]:
+    return tuple(
+        Curve(*over_time(time, y, points), name, colour, style) for y, name, colour, style in given
+    )
+
+
 def tracking(loops: Mapping[str, Tracked], output: str, points: int = POINTS) -> Drawing:
     """Draw a desired motion of one output, and what every controller made of it."""
     first = next(iter(loops.values())).recording
-    wanted = over_time(first.time, first[f"reference_{output}"], points)
-    curves = [Curve(*wanted, "reference", style="broad")]
-    for place, (name, found) in enumerate(loops.items()):
-        if place < N_COLOURS:
-            followed = over_time(found.recording.time, found.recording[output], points)
-            curves.append(Curve(*followed, name, series_colour(place)))
-    label = axis_label(output, first.units[output])
-    return Drawing((Panel(time_label(first), label, tuple(curves)),))
+    ways: list[Course] = [
+        (found.recording[output], name, series_colour(place), "line")
+        for place, (name, found) in enumerate([*loops.items()][:N_COLOURS])
+    ]
+    wanted: Course = (first[f"reference_{output}"], "reference", "measured", "broad")
+    curves = _courses(first.time, points, wanted, *ways)
+    return Drawing((Panel(time_label(first), axis_label(output, first.units[output]), curves),))
 
 
 def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
@@ -137,35 +149,22 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
     timed : bool
         Whether ``check.time`` is in seconds, and not in samples.
     """
-    (wanted,), (given,) = check.inverse.inputs[:1], check.inverse.outputs[:1]
-    label = "time [s]" if timed else "sample"
-    t = check.time
+    wanted, given = check.inverse.inputs[0], check.inverse.outputs[0]
     reference, output = check.reference[:, 0], check.output[:, 0]
-    error = over_time(t, output - reference)
-    plain = check.uncompensated
-    without = [] if plain is None else [over_time(t, plain[:, 0])]
-    return Drawing(
-        (
-            Panel(
-                label,
-                axis_label(wanted.name, wanted.unit),
-                (
-                    Curve(*over_time(t, reference), "reference", style="broad"),
-                    *(Curve(*each, "no compensation", "series-2") for each in without),
-                    Curve(*over_time(t, output), "model behind its inverse", "series-1"),
-                ),
-            ),
-            Panel(
-                label, axis_label("error", wanted.unit), (Curve(*error, "", "series-6", "fine"),)
-            ),
-            Panel(
-                label,
-                axis_label(given.name, given.unit),
-                (Curve(*over_time(t, check.pressure[:, 0]), "", "input"),),
-            ),
-        ),
-        stacked=True,
-    )
+    rows: list[tuple[str, str, list[Course]]] = [
+        (wanted.name, wanted.unit, [(reference, "reference", "measured", "broad")]),
+        ("error", wanted.unit, [(output - reference, "", "series-6", "fine")]),
+        (given.name, given.unit, [(check.pressure[:, 0], "", "input", "line")]),
+    ]
+    if check.uncompensated is not None:
+        rows[0][2].append((check.uncompensated[:, 0], "no compensation", "series-2", "line"))
+    rows[0][2].append((output, "model behind its inverse", "series-1", "line"))
+    x, least = "time [s]" if timed else "sample", 1e-6 * float(np.ptp(reference))
+    panels = [
+        Panel(x, axis_label(name, unit), _courses(check.time, POINTS, *given), least=least)
+        for name, unit, given in rows
+    ]
+    return Drawing(tuple(panels), stacked=True)
 
 
 def autocorrelation(one: OutputCheck) -> Drawing:
@@ -187,38 +186,51 @@ def pattern(one: OutputCheck, against: Pattern) -> Drawing:
     curves: list[Curve] = []
     for label, colour in groups:
         bins = [each for each in against.bins if each.label == label]
-        curves += _means(bins, label, colour)
+        x = np.array([(each.low + each.high) / 2 for each in bins])
+        ends = np.array([each.interval for each in bins]).reshape(-1, 2)
+        curves += [Curve(x, end, "", colour, "fine") for end in ends.T]
+        curves.append(Curve(x, np.array([each.mean for each in bins]), label, colour, "beads"))
     what = "modelled " if against.against == "output" else ""
     x_label = axis_label(f"{what}{against.channel}", against.unit)
-    y_label = axis_label("measured − model", one.unit)
-    return Drawing((Panel(x_label, y_label, tuple(curves), zero=True),))
-
-
-def _means(bins: list[Bin], label: str, colour: str) -> list[Curve]:
-    x = np.array([(each.low + each.high) / 2 for each in bins])
-    ends = np.array([each.interval for each in bins]).reshape(-1, 2)
-    return [
-        Curve(x, ends[:, 0], "", colour, "fine"),
-        Curve(x, ends[:, 1], "", colour, "fine"),
-        Curve(x, np.array([each.mean for each in bins]), label, colour, "beads"),
-    ]
+    y_label = axis_label("residual", one.unit)
+    return Drawing((Panel(x_label, y_label, tuple(curves), zero=True, least=1e-6 * one.span),))
 
 
 def parts(one: Followed, points: int = POINTS) -> Drawing:
     """Draw reference and measured motion, and below the error with its parts."""
-    wanted = over_time(one.time, one.reference, points)
-    got = over_time(one.time, one.measured, points)
-    error = over_time(one.time, one.measured - one.reference, points)
-    curves = [
-        Curve(*over_time(one.time, part, points), kind, series_colour(place))
-        for place, (kind, part) in enumerate(one.parts.items())
+    above: list[Course] = [
+        (one.reference, "reference", "measured", "broad"),
+        (one.measured, "recorded", "series-1", "line"),
     ]
-    above = (Curve(*wanted, "reference", style="broad"), Curve(*got, "recorded", "series-1"))
-    below = (Curve(*error, "error", style="broad"), *curves)
-    return Drawing(
-        (
-            Panel("time [s]", axis_label(one.output, one.unit), above),
-            Panel("time [s]", axis_label("error", one.unit), below, zero=True),
-        ),
-        stacked=True,
+    below: list[Course] = [
+        (one.measured - one.reference, "error", "measured", "broad"),
+        *((y, kind, series_colour(k), "line") for k, (kind, y) in enumerate(one.parts.items())),
+    ]
+    panels = [
+        Panel("time [s]", axis_label(name, one.unit), _courses(one.time, points, *given), zero=zero)
+        for name, given, zero in ((one.output, above, False), ("error", below, True))
+    ]
+    return Drawing(tuple(panels), stacked=True)
+
+
+def frequency_response(found: FrequencyResponse) -> Drawing:
+    """Draw gain and angle over frequency, with bounds, beside what was measured."""
+    given, wanted = found.input, found.output
+    unit = "" if given.unit == wanted.unit else f"{wanted.unit or '1'}/{given.unit or '1'}"
+    gain = axis_label(f"gain to {wanted.name}", unit)
+    rows: tuple[tuple[str, Literal["xy", "x"], Any, Any, Any], ...] = (
+        (gain, "xy", found.gain, found.gain_interval, found.measured_gain),
+        ("angle [deg]", "x", found.angle, found.angle_interval, found.measured_angle),
     )
+    panels = []
+    for label, axes, values, interval, measured in rows:
+        name = label == gain  # in the first legend only
+        curves = [
+            Curve(found.measured_frequency, measured, "recorded" * name, "measured", "specks"),
+            Curve(found.frequency, values, "model" * name, "series-1"),
+        ]
+        for end, word in zip(interval or (), ("95 %", ""), strict=False):
+            curves.append(Curve(found.frequency, end, word * name, "series-1", "fine"))
+        panels.append(Panel("frequency [Hz]", label, tuple(curves), logarithmic=axes))
+    note = "" if found.measured_frequency.size else "No frequency was recorded with high coherence."
+    return Drawing(tuple(panels), stacked=True, note=note)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.comparison.channels import any_moves, held_at_levels
 from mckibben.diagnosis.check import Validation
-from mckibben.numerals import number, numeral, percent
+from mckibben.diagnosis.coupling import coupling, fullest
+from mckibben.numerals import numeral
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
-    coupling_subjects,
     interactive,
     model_subjects,
+    results,
     subjects,
     words,
 )
@@ -24,14 +25,10 @@ from mckibben.report.builder import (
     Section,
     Table,
     Text,
-    Tile,
     Variants,
 )
-from mckibben.report.columns import columns_of_board
 from mckibben.report.commands import commands
-from mckibben.report.description_page import model_items
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
-from mckibben.report.figures import on_recording
 from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
@@ -79,7 +76,7 @@ def page(study: Study, command: str = "", *, title: str = "") -> str:
     view = _View(pictured, max(FEWEST_POINTS, min(POINTS, N_VALUES // n_values)))
     sections = (
         _review(study, view.points),
-        _leaderboard(board),
+        Section("leaderboard", "Leaderboard", results.leaderboard(board, COLUMNS)),
         _model(study, view),
         _checks(study, view),
         _recordings(study, every, view),
@@ -92,7 +89,7 @@ def page(study: Study, command: str = "", *, title: str = "") -> str:
         or f"{study.output} over {study.input if first.several else first.input}".capitalize(),
         f"{', '.join(names)}{f' and {more} more' if more else ''}",
         [one for one in sections if one is not None],
-        tiles(study),
+        results.tiles(study),
         _lead(first, board),
         words.answers(study),
     ).html()
@@ -110,43 +107,6 @@ class _View:
         return [interactive.plots(draw(one)) for one in self.pictured]
 
 
-def tiles(study: Study) -> tuple[Tile, ...]:
-    """Return the numbers of the first screen: loop, model, inverse, data gaps."""
-    board, found, best = study.leaderboard, study.characterization, study.leaderboard.best
-    loop = Tile("Loop width", "–", "several muscles: see Recordings", "recordings")
-    if found is not None and found.loop_width is not None:
-        width = f"{numeral(found.mid_width, 2)} {found.output_unit} at mid {found.input}"
-        loop = Tile("Loop width", f"{numeral(found.loop_width, 2)} %", width, "recordings")
-    elif found is not None:
-        loop = Tile("Loop width", "–", "no loop is shown", "recordings")
-    model = Tile(
-        "Best model", "–", "fitting" if board.pending else "none recommended", "leaderboard"
-    )
-    if best is not None:
-        error, share = numeral(best.test_error, 2), _share(study)
-        of = f" ({share} of the range)" if share else ""
-        model = Tile(
-            "Best model", best.model, f"{error} {board.unit} RMSE on the test{of}", "leaderboard"
-        )
-    inverse, check = Tile("Inverse", "–", "none", "checks"), study.inverse
-    if check is not None:
-        plain = check.uncompensated_error
-        against = "" if plain is None else f"; static map: {percent(plain)}"
-        note = f"{check.model}, error on the model itself{against}"
-        inverse = Tile("Inverse", percent(check.error), note, "checks")
-    gaps = [words.gap_name(gap) for gap in study.data_gaps]
-    listed = ", ".join(gaps[:3]) + " ..." * (len(gaps) > 3)
-    return loop, model, inverse, Tile("Data gaps", str(len(gaps)), listed, "recordings")
-
-
-def _share(study: Study) -> str:
-    """Return the chosen model's error over the range of what it is tested on."""
-    if not isinstance(study.check, Validation) or len(study.check.outputs) > 1:
-        return ""
-    (one,) = study.check.outputs
-    return percent(one.rmse / one.span) if one.span else ""
-
-
 def _lead(one: Shown, board: Leaderboard) -> Figure:
     """Return the measured loop with the chosen model's; over time where several inputs move."""
     moving = [name for name in board.inputs if any_moves([one.recording], (name,))]
@@ -156,90 +116,14 @@ def _lead(one: Shown, board: Leaderboard) -> Figure:
         drawing = subjects.loop([one.recording], one.input, one.output)
     else:
         timed = len(moving) > 1 and one.recording.sample_time is not None
-        drawing = on_recording(one, "fit" if timed else "loops", models=1)
+        drawing = one.draw("fit" if timed else "loops", models=1)
     return Figure("lead", [interactive.plots(drawing)], "Loop, measured and modelled", caption)
 
 
 def _review(study: Study, points: int) -> Section | None:
     if study.review is None:
         return None
-    figures = [
-        Figure(
-            f"review {one.output}",
-            [interactive.plots(model_subjects.parts(one, points))],
-            f"Reference, measured motion, and parts of the error of {one.output}",
-            "The parts add up to the error: model, pressure (measured less commanded), command.",
-            "stacked",
-        )
-        for one in study.review.outputs
-    ]
-    return Section(
-        "review", "Closed loop", [Text(words.reviewed(study.review), listed=True), *figures]
-    )
-
-
-def _leaderboard(board: Leaderboard) -> Section:
-    columns = [
-        one for one in columns_of_board(board) if one.key in COLUMNS or one.key in board.outputs
-    ]
-    ranked = [row for row in board.ranking if row.reason is None and row.test and row.train]
-    given = [row.to_dict() for row in ranked]
-    names = [
-        row.model + " ≈" * (row.model in board.level) + "*" * bool(row.caution) for row in ranked
-    ]
-    flags = [" ".join(filter(None, (one.flag(each) for one in columns))) for each in given]
-    table = Table(
-        ["Model", *(f"{one.heading} [{one.unit}]" if one.unit else one.heading for one in columns)],
-        [
-            [name, *(one.text(each) for one in columns)]
-            for name, each in zip(names, given, strict=True)
-        ],
-        best=next((k for k, row in enumerate(ranked) if row is board.best), None),
-        titles=[
-            f"{_summary(row.model)} {flag}".strip() for row, flag in zip(ranked, flags, strict=True)
-        ],
-        keys=[[row.model, *(one.sorted_by(each) for one in columns)]
-              for row, each in zip(ranked, given, strict=True)],
-    )  # fmt: skip
-    by = words.CHOICES[board.chosen_by][1]
-    notes = [f"≈ {words.LEVEL}."] * bool(board.level)
-    notes += [f"* {words.CAREFUL}."] * any(row.caution for row in ranked)
-    failed = [f"{', '.join(some)}: failed, {reason}" for reason, some in board.failures.items()]
-    chart = None
-    if ranked:
-        drawing = model_subjects.leaderboard(board)
-        chart = Figure(
-            "leaderboard",
-            [interactive.plots(drawing)],
-            "Errors of all models with intervals",
-            "Test errors with 95 % intervals; strokes: on the data fitted; rings: validation.",
-            height=4 + 1.4 * len(board.rows),
-        )
-    return Section(
-        "leaderboard",
-        "Leaderboard",
-        [
-            Text(
-                [
-                    f"{board.split[0].upper()}{board.split[1:]}. Ordered by {by}; all models run free."
-                ]
-            ),
-            table
-            if ranked
-            else Text(["No model is fitted yet."] if board.pending else ["No model worked."]),
-            Text([*notes, *words.comparison(board), *words.not_validated(board)], "note"),
-            Text(failed, "failed", listed=True) if failed else None,
-            chart,
-        ],
-    )
-
-
-def _summary(model: str) -> str:
-    """Return the full name of a model and what it can; nothing of unknown ones."""
-    from mckibben import registry
-    from mckibben.estimators.catalogue import summary
-
-    return summary(model) if model in registry.names("estimators") else ""
+    return Section("review", "Closed loop", results.review(study.review, points))
 
 
 def _model(study: Study, view: _View) -> Section | None:
@@ -247,10 +131,10 @@ def _model(study: Study, view: _View) -> Section | None:
     if not study.predictions:
         return None
     ranked = [row.model for row in board.rows if row.reason is None][:N_COLOURS]
-    fit = view.each(lambda one: on_recording(one, "fit", view.points))
+    fit = view.each(lambda one: one.draw("fit", view.points))
     items: list[Any] = [Figure("fit", fit, "Measured and modelled output over time", toggled=True)]
     if study.description is not None:
-        items += model_items(study.description)
+        items += results.description(study.description)
     name = "Model" if board.best is None else f"Model: {board.best.model}"
     models = [{"name": one, "colour": series_colour(k)} for k, one in enumerate(ranked)]
     return Section("model", name, items, view.names, models)
@@ -259,17 +143,12 @@ def _model(study: Study, view: _View) -> Section | None:
 def _checks(study: Study, view: _View) -> Section | None:
     board, items = study.leaderboard, list[Any]()
     if study.predictions:
-        residuals = view.each(lambda one: on_recording(one, "residuals", view.points))
+        residuals = view.each(lambda one: one.draw("residuals", view.points))
         label = "Residuals over input and over time"
         items.append(Figure("residuals", residuals, label, "", "", 2, toggled=True))
     if isinstance(study.check, Validation):
-        items.append(Text(words.check_sentences(study.check), listed=True))
         for one in study.check.outputs[:MOST_CHECKED]:
-            panels = [
-                interactive.plots(model_subjects.pattern(one, each))[0] for each in one.patterns
-            ]
-            caption = f"Mean residual of {one.output} on the test, with 95 % intervals."
-            items.append(Figure(f"patterns {one.output}", [panels], caption, caption, "", 2))
+            items += results.checked(one)
     check = study.inverse
     if check is not None and check.reachable is not None:
         low, high = (numeral(end, 3) for end in check.reachable)
@@ -277,13 +156,8 @@ def _checks(study: Study, view: _View) -> Section | None:
         caption = f"The inverse of {check.model} on the model, {low} to {high} {board.unit}."
         items.append(Figure("inverse", [interactive.plots(drawing)], caption, caption, "tall"))
     if study.loops:
-        rows = [
-            [name, *(one.rmse[output] for output in board.outputs), one.clipped]
-            for name, one in study.loops.items()
-        ]
-        headings = [f"{name} RMSE [{board.unit}]" for name in board.outputs]
         items.append(Text([f"A measured motion, followed on the virtual rig {study.plant}."]))
-        items.append(Table(["Controller", *headings, "Samples clipped"], rows))
+        items += results.loops(study.loops)
         for name in board.outputs:
             drawing = model_subjects.tracking(study.loops, name, view.points)
             label = f"Reference and followed {name}"
@@ -291,7 +165,7 @@ def _checks(study: Study, view: _View) -> Section | None:
                 Figure(f"tracking {name}", [interactive.plots(drawing)], label, f"{label}.")
             )
     elif study.not_looped:
-        items.append(Text([f"No loop was closed: {study.not_looped}"]))
+        items.append(Text([words.not_looped(study)]))
     return Section("checks", "Checks", items, view.names) if items else None
 
 
@@ -309,20 +183,9 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
         Table(["Recording", "File", "Length", "Used to"], listed),
         Figure("time", time, "Input and output over time", "", "stacked"),
     ]
-    if study.data_gaps:
-        gaps = [[words.gap_sentence(gap), words.gap_run(gap)] for gap in study.data_gaps]
-        items.append(Table(["Data gap", "Run that closes it"], gaps))
+    items += results.data_gaps(study.data_gaps)
     if study.characterization is not None:
-        rows = [
-            [quantity, value, " to ".join(map(number, limits or ())), unit]
-            for quantity, value, limits, unit, _ in words.characterization_rows(
-                study.characterization
-            )
-            if value is not None
-        ]
-        items.append(
-            Table(["Quantity", "Value", "95 % interval", "Unit"], rows, summary="Characterization")
-        )
+        items += results.characterization(study.characterization)
     if not (len(board.inputs) == len(board.outputs) == 1):
         items += _coupling(board, measured)
     load = study.load
@@ -330,7 +193,7 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
         runs = [one.recording for one in view.pictured]
         held = held_at_levels(runs, load)
         levels = view.each(
-            lambda one: coupling_subjects.loop_by(
+            lambda one: subjects.loop_by(
                 runs if held else [one.recording], one.input, one.output, load, view.points
             )
         )[: 1 if held else None]
@@ -344,14 +207,14 @@ def _recordings(study: Study, every: Sequence[Shown], view: _View) -> Section:
 
 def _coupling(board: Leaderboard, recordings: Sequence[Recording]) -> list[Any]:
     """Return how inputs move outputs, where there are several."""
-    found = coupling_subjects.coupling(list(recordings), board.inputs, board.outputs)
-    fullest = coupling_subjects.fullest(list(recordings), board.inputs)
-    label = f"Every output over every input, of {fullest.name}"
+    found = coupling(list(recordings), board.inputs, board.outputs)
+    one = fullest(list(recordings), board.inputs)
+    label = f"Every output over every input, of {one.name}"
     rows: list[list[Any]] = [
         [f"{output} [{found.units[k]}]", *found.effects[k].tolist(), 100 * found.explained[k]]
         for k, output in enumerate(found.outputs)
     ]
-    plots = interactive.plots(coupling_subjects.matrix(fullest, found))
+    plots = interactive.plots(subjects.matrix(one, found))
     return [
         Figure("coupling", [plots], label, f"{label}.", "matrix", min(len(found.inputs), 6)),
         Table(["Effect of the whole range of", *found.inputs, "explained [%]"], rows),

@@ -206,6 +206,8 @@ def draw_panel(axis: Axes, panel: Panel, bottom: bool) -> None:
         scale = axis.xaxis if letter == "x" else axis.yaxis
         scale.set_major_formatter("{x:g}")  # powers of ten would be set as mathematics
         scale.set_minor_formatter("")
+    if panel.y_range is not None:
+        axis.set_ylim(panel.y_range)
     if bottom:
         axis.set_xlabel(verbatim(panel.x_label))
     axis.set_ylabel(verbatim(panel.y_label))

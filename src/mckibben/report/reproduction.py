@@ -5,20 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.numerals import numeral
 from mckibben.report import builder, interactive
-from mckibben.report.builder import Code, Page, Section, Text
+from mckibben.report.builder import Code, Item, Page, Section, Text
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Mark, Panel, Style
 
 if TYPE_CHECKING:
-    from mckibben.papers.experiment import Cell, Figure, Reproduction, Table
-    from mckibben.papers.paper import Item
+    from mckibben.papers.experiment import Figure, Reproduction, Table
+    from mckibben.papers.paper import Item as Indexed
 
-RECORDED = ("", "virtual", "measured", "sensor", "extracted", "reference", "of every loop")
+RECORDED = ("", "simulated", "measured", "sensor", "extracted", "reference", "of every loop")
 """Names of curves that are drawn in ink, as what a muscle did."""
 
 LONGEST = 40
@@ -44,10 +43,6 @@ def reproduction_page(found: Reproduction) -> str:
         chart(f"beside-{k}", beside(table), heading(table), "tall" * (len(table.rows) > 12))
         for k, table in enumerate(pictured)
     ]
-    tables: list[Any] = []
-    for one in found.tables:
-        tables += [Text([heading(one)], "lead"), builder.Table(one.columns, one.rows)]
-        tables.append(Text([one.text.note], "note") if one.text.note else None)
     figures = [
         chart(f"figure-{k}", drawing(one), heading(one), "square", min(len(one.panels), 3))
         for k, one in enumerate(found.figures)
@@ -65,12 +60,29 @@ def reproduction_page(found: Reproduction) -> str:
             ),
             Section("results", "Results", [Text(found.summary, listed=True)]),
             Section("beside", "Printed beside ours", charts),
-            Section("tables", "Tables", tables),
+            Section("tables", "Tables", tables(found)),
             Section("differences", "What differs from the paper", [Text(found.notes, listed=True)]),
             Section("figures", "Figures", figures),
             Section("method", "How to repeat", [code]),
         ],
     ).html()
+
+
+def items(found: Reproduction) -> list[Item]:
+    """Return the tables of a re-run, and what it shows."""
+    return [*tables(found), Text(["", *found.summary])]
+
+
+def tables(found: Reproduction) -> list[Item]:
+    """Return every table under its heading, with its note."""
+    shown: list[Item] = []
+    for one in found.tables:
+        shown += [
+            Text([heading(one, quick=found.quick)], "lead"),
+            builder.Table(one.columns, one.rows),
+        ]
+        shown.append(Text([one.text.note], "muted") if one.text.note else None)
+    return shown
 
 
 def chart(
@@ -173,21 +185,18 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
     yield "| in the paper | what it is | here | exact, or how it differs | command |"
     yield "|---|---|---|---|---|"
     yield from (_indexed(item, found) for item in paper.items)
-    yield "\n## What came out\n"
-    yield from (f"- {sentence}" for sentence in found.summary)
-    yield "\n## Given, and found\n"
-    yield from (f"- Given: {text}" for text in paper.given)
-    yield from (f"- Found: {text}" for text in paper.found)
-    yield "\n## What differs from the paper\n"
-    yield from (f"- {note}" for note in found.notes)
-    yield "\n## Tables\n"
-    for table in found.tables:
-        yield f"### {heading(table, quick=found.quick)}\n"
-        yield "| " + " | ".join(table.columns) + " |\n|---|" + "---:|" * (len(table.columns) - 1)
-        for row in table.rows:
-            yield "| " + " | ".join(_cell(cell) for cell in row) + " |"
-        yield f"\n{table.text.note}\n" if table.text.note else ""
-    yield "## Figures\n"
+    parts: dict[str, list[Item]] = {
+        "What came out": [Text(found.summary, listed=True)],
+        "Given, and found": [
+            Text([f"Given: {text}" for text in paper.given], listed=True),
+            Text([f"Found: {text}" for text in paper.found], listed=True),
+        ],
+        "What differs from the paper": [Text(found.notes, listed=True)],
+        "Tables": tables(found),
+    }
+    for title, shown in parts.items():
+        yield f"\n## {title}\n\n{builder.markdown(shown)}"
+    yield "\n## Figures\n"
     for figure in found.figures:
         yield f"### {heading(figure, quick=found.quick)}\n"
         yield f"![{figure.text.title}]({pictures}/{figure.key}.png)\n"
@@ -195,7 +204,7 @@ def _lines(found: Reproduction, date: str, pictures: str) -> Iterator[str]:
     yield f"`mckibben reproduce {found.name} --data FOLDER` takes {paper.data}.\n"
 
 
-def _indexed(item: Item, found: Reproduction) -> str:
+def _indexed(item: Indexed, found: Reproduction) -> str:
     """Return the line of an equation, table or figure in the index."""
     kind, _, key = item.here.partition(":")
     shown: tuple[Table | Figure, ...] = found.tables if kind == "table" else found.figures
@@ -210,9 +219,3 @@ def _indexed(item: Item, found: Reproduction) -> str:
 def _anchor(title: str) -> str:
     """Return the anchor that a heading has."""
     return re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", title.lower()))
-
-
-def _cell(cell: Cell) -> str:
-    if cell is None:
-        return ""
-    return cell.replace("|", "\\|") if isinstance(cell, str) else numeral(cell, 4)

@@ -6,8 +6,10 @@ import time
 from typing import TYPE_CHECKING
 
 from mckibben.blocks.saving import to_text
+from mckibben.diagnosis.check import Validation
 from mckibben.diagnosis.refit import Refit
 from mckibben.outputs import Results
+from mckibben.report.check_page import check_json
 from mckibben.report.commands import model_file
 from mckibben.report.page import page
 from mckibben.system.atomic import to_json
@@ -81,9 +83,12 @@ class StudyFolder:
             write("inverse.json", to_text(study.inverse.inverse))
         best = board.best
         if best is not None and not board.pending:
-            told = study.to_dict()
-            kept = {name: told[name] for name in ("check", "description", "data_gaps")}
-            write("validation.json", to_json(kept) + "\n")
+            about = {"not_checked": study.check}
+            if isinstance(study.check, Validation):
+                about = check_json(study.check, model_file(best.model))
+            whole = study.to_dict()
+            about |= {name: whole[name] for name in ("description", "data_gaps")}
+            write("validation.json", to_json(about) + "\n")
             if best.banded is not None:
                 write("banded.json", to_text(best.banded))
         started = time.monotonic()

@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.diagnosis.coupling import coupling
+from mckibben.errors import ModelError
 from mckibben.recording import Recording
-from mckibben.report.coupling_subjects import coupling
+from mckibben.report.drawing import POINTS, Drawing
+from mckibben.report.subjects import against
 
 if TYPE_CHECKING:
     from mckibben.studying.study import Study
@@ -51,6 +54,15 @@ class Shown:
         """What it is called where it is chosen."""
         return f"{self.recording.name}: {self.output}" if self.several else self.recording.name
 
+    def draw(self, kind: str, points: int = POINTS, models: int | None = None) -> Drawing:
+        """Draw it with the outputs of models, perhaps of the first few only; see `subjects.against`."""
+        outputs = dict(list(self.outputs.items())[:models])
+        if not outputs:
+            problem, remedy = "no model of this study worked", "see the reasons in its leaderboard"
+            raise ModelError(problem, remedy=remedy)
+        pair = self.input, self.output
+        return against(kind, self.recording, pair, outputs, self.test_from, points)
+
 
 def shown(study: Study) -> tuple[Shown, ...]:
     """Return all recordings of a study, those tested on first; of several outputs, each once for each.
@@ -64,19 +76,25 @@ def shown(study: Study) -> tuple[Shown, ...]:
     ranked = [row.model for row in study.leaderboard.rows if row.model in study.predictions]
     n_train = len(study.train)
     parts = [_part_of(study, recording) for recording in study.test]
-    found = []
-    for index, (recording, part) in enumerate(zip(study.test, parts, strict=True)):
-        role = "test" if part is None else "first part to fit, rest to test"
-        start = None if part is None else len(study.train[part])
-        for place, pair in enumerate(coupled.pairs([recording])):
-            outputs = {m: study.predictions[m][n_train + index][:, place] for m in ranked}
-            found.append(Shown(recording, *pair, outputs, role, start, several))
-    for index, recording in enumerate(study.train):
-        if index not in parts:
-            for place, pair in enumerate(coupled.pairs([recording])):
-                outputs = {model: study.predictions[model][index][:, place] for model in ranked}
-                found.append(Shown(recording, *pair, outputs, "fit", None, several))
-    return tuple(found)
+    runs = [
+        (n_train + place, run, "test", None)
+        if part is None
+        else (n_train + place, run, "first part to fit, rest to test", len(study.train[part]))
+        for place, (run, part) in enumerate(zip(study.test, parts, strict=True))
+    ]
+    runs += [(k, run, "fit", None) for k, run in enumerate(study.train) if k not in parts]
+    return tuple(
+        Shown(
+            run,
+            *pair,
+            {model: study.predictions[model][place][:, column] for model in ranked},
+            role,
+            start,
+            several,
+        )
+        for place, run, role, start in runs
+        for column, pair in enumerate(coupled.pairs([run]))
+    )
 
 
 def drawn(found: Sequence[Shown]) -> tuple[Shown, ...]:

@@ -1,4 +1,4 @@
-"""Figures of recordings, and of what models make of them."""
+"""Figures of recordings, of what models make of them, and of several muscles and loads."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.diagnosis.coupling import Coupling
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
     FEW,
@@ -32,8 +33,11 @@ from mckibben.report.drawing import (
 HELD_OUT = "held out to test"
 """What stands over the part of a recording that no model was fitted to."""
 
-Outputs = Mapping[str, Array]
-"""Model name to its output on one recording, best first."""
+SMALL = 500
+"""Points of a small picture."""
+
+MOST = 6
+"""Inputs, and outputs, that are pictured."""
 
 
 def time_course(
@@ -49,8 +53,7 @@ def time_course(
             t, y = over_time(recording.time, recording[channel], points)
             name = name if channel == channels[0] else ""
             curves.append(Curve(t, y, name, colour, _measured_style(recording)))
-        label = axis_label(channel, kept[0].units[channel])
-        panels.append(Panel(time_label(kept[0]), label, tuple(curves)))
+        panels.append(Panel(time_label(kept[0]), _label(kept[0], channel), tuple(curves)))
     return Drawing(tuple(panels), stacked=True, note=note)
 
 
@@ -59,7 +62,7 @@ def loop(
 ) -> Drawing:
     """Draw the output over the input: a single recording from early to late, several by colour."""
     kept, note = _first(recordings)
-    x_label, y_label = _plane(kept[0], input_name, output_name)
+    x_label, y_label = _label(kept[0], input_name), _label(kept[0], output_name)
     arrows = directions(kept[0][input_name], kept[0][output_name])
     if len(kept) == 1:
         curves = _by_age(kept[0], input_name, output_name, points)
@@ -76,73 +79,61 @@ def loop(
     return Drawing((Panel(x_label, y_label, curves, arrows=arrows),), note=note)
 
 
-def fit_over_time(
+def against(
+    kind: str,
     recording: Recording,
-    output_name: str,
-    outputs: Outputs,
+    pair: tuple[str, str],
+    outputs: Mapping[str, Array],
     test_from: int | None = None,
     points: int = POINTS,
 ) -> Drawing:
-    """Draw the measured output over time and the models' on top, the best last."""
-    time = recording.time
-    under = _measured_style(recording, under=True)
-    curves = [
-        Curve(*over_time(time, recording[output_name], points), recording.origin, style=under)
-    ]
-    for model, colour, modelled in _worst_to_best(outputs):
-        curves.append(Curve(*over_time(time, modelled, points), model, colour, model=model))
-    label = axis_label(output_name, recording.units[output_name])
-    marks = _test_mark(time, test_from)
-    panel = Panel(time_label(recording), label, tuple(curves), marks=marks)
-    return Drawing((panel,), columns=1)
+    """Draw what models make of a recording.
 
-
-def fit_loops(
-    recording: Recording,
-    input_name: str,
-    output_name: str,
-    outputs: Outputs,
-    points: int = POINTS,
-) -> Drawing:
-    """Draw the measured loop and the models' on top, the best last."""
-    u = recording[input_name]
-    measured = recording[output_name]
-    under = _path_style(u, _measured_style(recording, under=True))
-    over = _path_style(u, "line")
-    curves = [Curve(*along(u, measured, points)[1:], recording.origin, style=under)]
-    for model, colour, modelled in _worst_to_best(outputs):
-        curves.append(Curve(*along(u, modelled, points)[1:], model, colour, over, model))
-    x_label, y_label = _plane(recording, input_name, output_name)
-    return Drawing((Panel(x_label, y_label, tuple(curves), arrows=directions(u, measured)),))
-
-
-def residuals(
-    recording: Recording,
-    input_name: str,
-    output_name: str,
-    outputs: Outputs,
-    test_from: int | None = None,
-    points: int = POINTS,
-) -> Drawing:
-    """Draw measured less modelled output against the input, and against time."""
-    u, measured = recording[input_name], recording[output_name]
-    made = "measured" if recording.origin == "measured" else "simulated"
-    against_input, against_time = [], []
-    for model, colour, modelled in _worst_to_best(outputs):
-        left = measured - modelled
-        path, course = along(u, left, points)[1:], over_time(recording.time, left, points)
-        against_input.append(Curve(*path, model, colour, _path_style(u, "fine"), model))
-        against_time.append(Curve(*course, "", colour, "fine", model))
-    x_label = axis_label(input_name, recording.units[input_name])
-    y_label = axis_label(f"{made} − model", recording.units[output_name])
-    marks = _test_mark(recording.time, test_from)
-    return Drawing(
-        (
-            Panel(x_label, y_label, tuple(against_input), zero=True),
-            Panel(time_label(recording), y_label, tuple(against_time), marks=marks, zero=True),
-        ),
-        columns=2,
-    )
+    Parameters
+    ----------
+    kind : {"fit", "loops", "residuals"}
+        Outputs over time; over the input; or measured less modelled ones over both.
+    recording : Recording
+    pair : (str, str)
+        Input and output.
+    outputs : mapping of str to array, shape (n,)
+        Model name to its output, the best first, which is drawn last.
+    test_from : int, optional
+        First sample that is held out.
+    points : int
+        Of a curve.
+    """
+    u, y = recording[pair[0]], recording[pair[1]]
+    left, dots = kind == "residuals", _jumps(u)
+    drawn: list[tuple[str, str, Array, Style, str | None]] = []
+    if not left:
+        under = _measured_style(recording, under=True)
+        drawn.append((recording.origin, "measured", y, under, None))
+    for place, (model, modelled) in [*enumerate(outputs.items())][:N_COLOURS][::-1]:
+        style: Style = "fine" if left else "line"
+        values = y - modelled if left else modelled
+        drawn.append((model, series_colour(place), values, style, model))
+    label = axis_label(f"{recording.origin} − model" if left else pair[1], recording.units[pair[1]])
+    least, panels = 1e-6 * float(np.ptp(y)), []
+    if kind != "fit":
+        paths = tuple(
+            Curve(*along(u, v, points)[1:], name, colour, "specks" if dots else style, model)
+            for name, colour, v, style, model in drawn
+        )
+        arrows = () if left else directions(u, y)
+        panels.append(
+            Panel(_label(recording, pair[0]), label, paths, arrows=arrows, zero=left, least=least)
+        )
+    if kind != "loops":
+        t = recording.time
+        courses = tuple(
+            Curve(*over_time(t, v, points), "" if left else name, colour, style, model)
+            for name, colour, v, style, model in drawn
+        )
+        marks = () if test_from is None else (Mark(float(t[test_from]), HELD_OUT, float(t[-1])),)
+        x = time_label(recording)
+        panels.append(Panel(x, label, courses, marks=marks, zero=left, least=least))
+    return Drawing(tuple(panels), columns={"fit": 1, "residuals": 2}.get(kind, 3))
 
 
 def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
@@ -221,18 +212,59 @@ def _colours(recordings: Sequence[Recording]) -> list[tuple[str, str]]:
     return [(recording.name, series_colour(i)) for i, recording in enumerate(recordings)]
 
 
-def _plane(recording: Recording, input_name: str, output_name: str) -> tuple[str, str]:
-    return (
-        axis_label(input_name, recording.units[input_name]),
-        axis_label(output_name, recording.units[output_name]),
+def _label(recording: Recording, channel: str) -> str:
+    return axis_label(channel, recording.units[channel])
+
+
+def matrix(recording: Recording, found: Coupling, points: int = SMALL) -> Drawing:
+    """Draw every output (rows) over every input (columns), small; own pairs are in colour."""
+    panels = []
+    for output in found.outputs[:MOST]:
+        for name in found.inputs[:MOST]:
+            x, y = along(recording[name], recording[output], points)[1:]
+            colour = "series-1" if found.own(output, [recording]) == name else "input"
+            panels.append(
+                Panel(
+                    _label(recording, name),
+                    _label(recording, output),
+                    (Curve(x, y, "", colour, "fine"),),
+                )
+            )
+    note = left_out([*found.inputs[MOST:], *found.outputs[MOST:]])
+    return Drawing(tuple(panels), columns=min(len(found.inputs), MOST), note=note)
+
+
+def loop_by(
+    recordings: Sequence[Recording],
+    input_name: str,
+    output_name: str,
+    by: str,
+    points: int = POINTS,
+) -> Drawing:
+    """Draw output over input, coloured by a third channel, a load or a stiffness, from low to high."""
+    paths = [along(r[input_name], r[output_name], points) for r in recordings]
+    x, y = (np.concatenate([path[k] for path in paths]) for k in (1, 2))
+    level = np.concatenate(
+        [r[by][path[0].astype(int)] for r, path in zip(recordings, paths, strict=True)]
     )
+    every = np.concatenate([r[by] for r in recordings])
+    edges = np.linspace(every.min(), every.max(), N_AGES + 1)
+    recording = recordings[0]
+    unit = f" {recording.units[by]}" if recording.units[by] else ""
+    which = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, len(edges) - 2)
+    curves = []
+    for place in range(len(edges) - 1):
+        chosen = which == place
+        if chosen.any():
+            ends = dict.fromkeys(f"{end:.3g}" for end in (level[chosen].min(), level[chosen].max()))
+            name = f"{by} {' to '.join(ends)}{unit}"
+            colour = f"age-{place + 1}"
+            curves.append(Curve(x[chosen], y[chosen], name, colour, "specks"))
+    x_label, y_label = _label(recording, input_name), _label(recording, output_name)
+    return Drawing((Panel(x_label, y_label, tuple(curves)),))
 
 
-def _worst_to_best(outputs: Outputs) -> list[tuple[str, str, Array]]:
-    best = list(outputs.items())[:N_COLOURS]
-    coloured = [(model, series_colour(place), y) for place, (model, y) in enumerate(best)]
-    return coloured[::-1]
-
-
-def _test_mark(time: Array, test_from: int | None) -> tuple[Mark, ...]:
-    return () if test_from is None else (Mark(float(time[test_from]), HELD_OUT, float(time[-1])),)
+def third_channels(recording: Recording, used: Sequence[str]) -> list[str]:
+    """Return the channels that a loop can be coloured by: those that move and are not used already."""
+    free = [name for name in recording.channels if name not in used]
+    return [name for name in free if np.ptp(recording[name]) > 0][:N_COLOURS]

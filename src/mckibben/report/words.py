@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mckibben.numerals import counted, numeral, percent
 from mckibben.recording import standard_unit
@@ -20,12 +20,13 @@ if TYPE_CHECKING:
     from mckibben.comparison.choosing import Against
     from mckibben.comparison.leaderboard import Leaderboard
     from mckibben.diagnosis.bands import Calibration
-    from mckibben.diagnosis.characterization import Characterization, Level
+    from mckibben.diagnosis.characterization import Characterization
     from mckibben.diagnosis.check import Finding, OutputCheck, Validation
     from mckibben.diagnosis.data_gaps import Gap
     from mckibben.diagnosis.review import Review
     from mckibben.planning.planner import Plan
     from mckibben.recording import Recording
+    from mckibben.studying.results import Tracking
     from mckibben.studying.study import Study
 
 # --- Comparison -------------------------------------------------------------------------------------
@@ -40,12 +41,6 @@ CHOICES = {
     "fit": ("fit RMSE", "the error on the data fitted, for want of a validation"),
 }
 """What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
-
-STARTED = (
-    "Memory starts as training left it where the test continues from there; else, with one driving "
-    "input, from the excursion that best explains the first measured output (`initial=measured`)."
-)
-"""How models are run free in a comparison."""
 
 LEVEL = (
     "not distinguished from the chosen model by this test: the interval of the difference holds 0"
@@ -119,6 +114,12 @@ def comparison(board: Leaderboard) -> list[str]:
     return said
 
 
+def marks(board: Leaderboard) -> list[str]:
+    """Return what marks behind names of models mean, of those that there are."""
+    careful = any(row.reason is None and row.caution for row in board.rows)
+    return [f"≈ {LEVEL}."] * bool(board.level) + [f"* {CAREFUL}."] * careful
+
+
 def not_validated(board: Leaderboard) -> list[str]:
     """Return which models' validation failed, and why."""
     return [
@@ -130,226 +131,129 @@ def not_validated(board: Leaderboard) -> list[str]:
 
 # --- What the muscle does ---------------------------------------------------------------------------
 
-LEVELS = 5
-"""Levels of other inputs that sentences name; the table has all."""
 
-Row = tuple[str, float | int | str | None, tuple[float, float] | None, str, str]
-"""Quantity, value, 95 % interval, unit and meaning."""
+class Quantity(NamedTuple):
+    """A figure of a characterization, with its 95 % interval, unit and meaning."""
+
+    name: str
+    value: float | int | str | None
+    limits: tuple[float, float] | None
+    unit: str
+    meaning: str
+
+
+QUANTITIES = (
+    ("recordings", "n_recordings", "", "files or segments looked at"),
+    ("stretches", "n_stretches", "", "of them, those in which all other inputs stand still"),
+    ("samples", "n_samples", "", "in all"),
+    ("duration", "duration", "s", "in all; none without time"),
+    ("sample time", "sample_time", "s", "none where unknown or not the same everywhere"),
+    ("cycles", "n_cycles", "", "whole ones over at least a tenth of the input range"),
+    ("reversals", "n_reversals", "", "where the input turns back by 1 % of its range or more"),
+    ("{input}", "input_range", "{u}", "input range"),
+    ("{output}", "output_range", "{y}", "output range"),
+    ("noise of {input}", "input_noise", "{u}", "standard deviation of a sample"),
+    ("noise of {output}", "output_noise", "{y}", "standard deviation of a sample"),
+    ("variance by input", "position_share", "", "share that a function of the input explains"),
+    ("variance by velocity", "direction_share", "", "share that the input's velocity explains"),
+    ("variance by branch", "loop_share", "", "share that input and direction explain together"),
+    ("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
+    ("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
+    ("branch distance at mid input", "mid_width", "{y}", "the same in the unit of the output"),
+    ("asymmetry", "asymmetry", "%", "from its image turned by half a turn; PI models have 0"),
+    ("centre of width", "width_centroid", "", "-1 at low, 0 at mid, 1 at high input"),
+    ("loop area", "loop_area", "{u} {y}", "enclosed by the largest cycles"),
+    ("loop area share", "loop_area_share", "%", "of the rectangle round it: a relay has 100"),
+    ("mean branch gap", "branch_gap", "{y}", "falling less rising output, free of steady drift"),
+    ("dead zone after upper reversals", "dead_zone_upper", "{u}", "before the output moves back"),
+    ("dead zone after lower reversals", "dead_zone_lower", "{u}", "the same from below"),
+    ("gain", "gain", "{y}/{u}", "slope of the mean of both branches at mid input"),
+    ("onset", "onset", "{u}", "below it the slope is under a fifth of its mean"),
+    ("saturation", "saturation", "{u}", "above it the slope is under a fifth of its mean"),
+    ("creep", "creep", "{y}", "in a hold of all inputs; positive: on as it was going"),
+    ("creep time", "creep_time", "s", "the time over which it crept so far"),
+    ("drift", "drift", "{y}", "from one cycle to the next between the same extremes"),
+    ("rate dependence", "rate_dependence", "%", "growth of e_w at twice the speed"),
+    ("speed compared", "speeds", "{u}/s", "mean speed of the input in cycles alike"),
+    ("closure error", "closure_error", "%", "output after a minor loop against that before"),
+)
+"""Name, field, unit and meaning of every figure; of a field with two ends, both are given."""
+
+
+def quantities(found: Characterization) -> Iterator[Quantity]:
+    """Yield every figure of a characterization."""
+    names = {"input": found.input, "output": found.output}
+    units = {"u": found.input_unit, "y": found.output_unit}
+
+    def unit_of(form: str) -> str:
+        made = form.format(**units).strip().removesuffix("/")
+        return f"1{made}" if made.startswith("/") else made
+
+    for name, field, unit, meaning in QUANTITIES:
+        value, limits = getattr(found, field), found.intervals.get(field)
+        shown = name.format(**names), unit_of(unit)
+        if isinstance(value, tuple):
+            for which, end in zip(("lowest", "highest"), value, strict=True):
+                yield Quantity(f"{which} {shown[0]}", end, limits, shown[1], meaning)
+        else:
+            yield Quantity(shown[0], value, limits, shown[1], meaning)
+    slope = unit_of("{y}/{u}")
+    for one in found.effects:
+        over = _spanning((one.low, one.high), one.unit)
+        name, meaning = f"effect of {one.channel}", f"on the output at equal input, {over}"
+        yield Quantity(name, one.change, one.limits, units["y"], meaning)
+        meaning = f"by one straight line, {over}"
+        yield Quantity(f"{name} on the slope", one.gain_change, one.gain_limits, slope, meaning)
+    for level in found.levels:
+        at = " and ".join(f"{name} at {size(unit, x)}" for name, x, unit in level.held)
+        own = level.found
+        for name, field, unit in (("loop width", "loop_width", "%"), ("gain", "gain", slope)):
+            limits = own.intervals.get(field)
+            yield Quantity(
+                f"{name} with {at}", getattr(own, field), limits, unit, "at mid input there"
+            )
 
 
 def characterization_sentences(found: Characterization) -> list[str]:
-    """Return what a muscle does, most important first: figures with their 95 % intervals."""
+    """Return what a muscle does first of all; the table beside has everything, with intervals."""
     u, y = found.input, found.output
     ends = found.output_range[::-1] if found.falls else found.output_range
+    slope = f"{found.output_unit}/{found.input_unit}".removesuffix("/")
+    gain = "" if found.gain is None else f", slope {size(slope, found.gain)} at mid {u}"
     said = [
         f"{y} covers {_spanning(ends, found.output_unit)} while {u} covers "
-        f"{_spanning(found.input_range, found.input_unit)}{_gain(found)}."
+        f"{_spanning(found.input_range, found.input_unit)}{gain}."
     ]
     if found.follows_direction:
         said.append(
             f"{y} follows the direction of {u}, as friction does, and has no inverse by {u}: velocity "
-            f"explains {_share(found.direction_share)} of its variance, {u} "
-            f"{_share(found.position_share)}."
+            f"explains {percent(found.direction_share)} of its variance, {u} "
+            f"{percent(found.position_share)}."
         )
-    elif found.loop_width is None and not found.adjusted:
+    elif found.loop_width is not None and found.mid_width is not None:
         said.append(
-            f"{u} and its direction explain {_share(found.loop_share)} of the variance of {y}."
+            f"Loop width at mid {u}: {numeral(found.loop_width, 2)} % of the output range of the cycle, "
+            f"{size(found.output_unit, found.mid_width)}."
         )
-    said += [*_loop(found), *_motion(found), *_coupling(found)]
-    return [f"{sentence[0].upper()}{sentence[1:]}" for sentence in said]
-
-
-def _loop(found: Characterization) -> Iterator[str]:
-    y = found.output_unit
-    if found.loop_width is not None:
-        shape = "" if found.asymmetry is None else f"; asymmetry {numeral(found.asymmetry, 2)} %"
-        yield (
-            f"Loop width at mid {found.input}: {_figure(found, 'loop_width', '%')} of the output range "
-            f"of the cycle, {_figure(found, 'mid_width', y)}{shape}."
+    elif found.adjusted:
+        names = listing([effect.channel for effect in found.effects])
+        said.append(
+            f"{u} covers no half of its range while {names} stand still: straight-line effects of these "
+            "are taken away, and loop width is not measured."
         )
-    elif found.branch_gap is not None and found.has_loop is False:
-        yield f"No loop: the mean gap between branches is {_figure(found, 'branch_gap', y)}."
     elif found.branch_gap is not None:
-        shown = "" if found.has_loop else "; a loop is not shown by it"
-        yield f"Mean gap between branches: {_figure(found, 'branch_gap', y)}{shown}."
+        shown = {True: "", False: "No loop: ", None: "A loop is not shown: "}[found.has_loop]
+        gap = f"the mean gap between branches is {size(found.output_unit, found.branch_gap)}."
+        said.append(f"{shown}{gap}")
+    else:
+        said.append(
+            f"{u} and its direction explain {percent(found.loop_share)} of the variance of {y}."
+        )
     if found.branch_gap is not None and found.p_loop is None:
-        yield "No recording has four branches: drift would part rising and falling output as well."
-    if found.rate_dependence is not None and found.speeds is not None:
-        unit = f"{found.input_unit}/s".lstrip("/")
-        speeds = " to ".join(numeral(speed, 2) for speed in found.speeds)
-        yield (
-            f"From {speeds} {unit} loop width grows by {_figure(found, 'rate_dependence', '%')} of the "
-            "output range per doubling of speed, on average."
+        said.append(
+            "No recording has four branches: drift would part rising and falling output as well."
         )
-    if found.closure_error is not None and found.loop_width is not None:
-        yield f"Minor loops close within {_figure(found, 'closure_error', '%')} of the output range."
-
-
-def _motion(found: Characterization) -> Iterator[str]:
-    u, y = found.input_unit, found.output_unit
-    if found.dead_zone_upper and found.dead_zone_lower:
-        yield (
-            f"After a reversal, at these speeds, {found.input} changes by "
-            f"{_figure(found, 'dead_zone_upper', u)} from above and "
-            f"{_figure(found, 'dead_zone_lower', u)} from below before {found.output} moves back."
-        )
-    for name, side in (("onset", "Below"), ("saturation", "Above")):
-        if getattr(found, name) is not None:
-            yield f"{side} {_figure(found, name, u)} the slope is under a fifth of its mean."
-    if _certain(found, "creep") and found.creep_time is not None:
-        time = numeral(found.creep_time, 2)
-        yield f"In holds {found.output} creeps by {_figure(found, 'creep', y)} over {time} s."
-    if _certain(found, "drift"):
-        yield f"From cycle to cycle {found.output} drifts by {_figure(found, 'drift', y)}."
-
-
-def _coupling(found: Characterization) -> Iterator[str]:
-    if found.adjusted:
-        names = " and ".join(effect.channel for effect in found.effects)
-        yield (
-            f"{found.input} covers no half of its range while {names} stand still: straight-line "
-            "effects of these are taken away, and loop width is not measured."
-        )
-    for effect in found.effects:
-        limits = _limits(effect.limits)
-        yield (
-            f"At equal {found.input}, {found.output} changes by {numeral(effect.change, 2)} "
-            f"{found.output_unit} {limits} as {effect.channel} goes "
-            f"{_spanning((effect.low, effect.high), effect.unit)}."
-        )
-    for level in found.levels[:: max(1, -(-len(found.levels) // LEVELS))]:
-        at = _at(level)
-        width, y = level.found.loop_width, level.found.output_unit
-        loop = "" if width is None else f", loop width {_figure(level.found, 'loop_width', '%')}"
-        yield f"With {at}: span {numeral(level.found.output_span, 2)} {y}{_gain(level.found)}{loop}."
-
-
-def characterization_rows(found: Characterization) -> list[Row]:
-    """Return every figure with its 95 % interval, unit and meaning."""
-    u, y = found.input_unit, found.output_unit
-    area, gain = " ".join(part for part in (u, y) if part), f"{y}/{u}" if u else y
-    speed = f"{u}/s".lstrip("/")
-
-    def row(name: str, field: str, unit: str, meaning: str) -> Row:
-        return (name, getattr(found, field), found.intervals.get(field), unit, meaning)
-
-    def ends(name: str, field: str, unit: str, meaning: str) -> list[Row]:
-        low, high = getattr(found, field) or (None, None)
-        return [
-            (f"lowest {name}", low, None, unit, meaning),
-            (f"highest {name}", high, None, unit, meaning),
-        ]
-
-    return [
-        row("recordings", "n_recordings", "", "files or segments looked at"),
-        row("stretches", "n_stretches", "", "of them, those in which all other inputs stand still"),
-        row("samples", "n_samples", "", "in all"),
-        row("duration", "duration", "s", "in all; none without time"),
-        row("sample time", "sample_time", "s", "none where unknown or not the same everywhere"),
-        row("cycles", "n_cycles", "", "whole ones over at least a tenth of the input range"),
-        row(
-            "reversals", "n_reversals", "", "where the input turns back by 1 % of its range or more"
-        ),
-        *ends(found.input, "input_range", u, "input range"),
-        *ends(found.output, "output_range", y, "output range"),
-        row(f"noise of {found.input}", "input_noise", u, "standard deviation of a sample"),
-        row(f"noise of {found.output}", "output_noise", y, "standard deviation of a sample"),
-        row(
-            "variance by input", "position_share", "", "share that a function of the input explains"
-        ),
-        row(
-            "variance by velocity",
-            "direction_share",
-            "",
-            "share that the input's velocity explains",
-        ),
-        row(
-            "variance by branch",
-            "loop_share",
-            "",
-            "share that input and direction explain together",
-        ),
-        row("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
-        row("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
-        row("branch distance at mid input", "mid_width", y, "the same in the unit of the output"),
-        row(
-            "asymmetry", "asymmetry", "%", "from its image turned by half a turn; PI models have 0"
-        ),
-        row("centre of width", "width_centroid", "", "-1 at low, 0 at mid, 1 at high input"),
-        row("loop area", "loop_area", area, "enclosed by the largest cycles"),
-        row(
-            "loop area share", "loop_area_share", "%", "of the rectangle round it: a relay has 100"
-        ),
-        row("mean branch gap", "branch_gap", y, "falling less rising output, free of steady drift"),
-        row(
-            "dead zone after upper reversals", "dead_zone_upper", u, "before the output moves back"
-        ),
-        row("dead zone after lower reversals", "dead_zone_lower", u, "the same from below"),
-        row("gain", "gain", gain, "slope of the mean of both branches at mid input"),
-        row("onset", "onset", u, "below it the slope is under a fifth of its mean"),
-        row("saturation", "saturation", u, "above it the slope is under a fifth of its mean"),
-        row("creep", "creep", y, "in a hold of all inputs; positive: on as it was going"),
-        row("creep time", "creep_time", "s", "the time over which it crept so far"),
-        row("drift", "drift", y, "from one cycle to the next between the same extremes"),
-        row("rate dependence", "rate_dependence", "%", "growth of e_w at twice the speed"),
-        *ends("speed compared", "speeds", speed, "mean speed of the input in cycles alike"),
-        row("closure error", "closure_error", "%", "output after a minor loop against that before"),
-        *(
-            (
-                *(f"effect of {one.channel}", one.change, one.limits, y),
-                f"on the output at equal input, {_spanning((one.low, one.high), one.unit)}",
-            )
-            for one in found.effects
-        ),
-        *(
-            (
-                *(f"effect of {one.channel} on the slope", one.gain_change, one.gain_limits, gain),
-                f"by one straight line, {_spanning((one.low, one.high), one.unit)}",
-            )
-            for one in found.effects
-        ),
-        *(
-            (f"{name} with {_at(level)}", value, level.found.intervals.get(field), unit, meaning)
-            for level in found.levels
-            for name, field, unit, meaning in (
-                ("loop width", "loop_width", "%", "e_w of the largest cycles there"),
-                ("gain", "gain", gain, "slope at mid input there"),
-            )
-            if (value := getattr(level.found, field)) is not None
-        ),
-    ]
-
-
-def _gain(found: Characterization) -> str:
-    unit = f"{found.output_unit}/{found.input_unit}".rstrip("/")
-    return (
-        "" if found.gain is None else f", slope {_figure(found, 'gain', unit)} at mid {found.input}"
-    )
-
-
-def _at(level: Level) -> str:
-    return " and ".join(f"{name} at {numeral(x)} {unit}".rstrip() for name, x, unit in level.held)
-
-
-def _figure(found: Characterization, field: str, unit: str) -> str:
-    """Return a figure with its unit and its interval."""
-    limits = found.intervals.get(field)
-    shown = f"{numeral(getattr(found, field), 2)} {unit}".rstrip()
-    return shown if limits is None else f"{shown} {_limits(limits)}"
-
-
-def _limits(limits: tuple[float, float]) -> str:
-    return f"({numeral(limits[0], 2)} to {numeral(limits[1], 2)})"
-
-
-def _certain(found: Characterization, field: str) -> bool:
-    """Tell whether the interval of a figure leaves zero out."""
-    low, high = found.intervals.get(field, (0.0, 0.0))
-    return low > 0 or high < 0
-
-
-def _share(share: float) -> str:
-    return f"{100 * share:.0f} %"
+    return [f"{sentence[0].upper()}{sentence[1:]}" for sentence in said]
 
 
 def _spanning(limits: tuple[float, float], unit: str) -> str:
@@ -383,8 +287,8 @@ def check_notes(one: OutputCheck) -> list[str]:
     """Return whether a residual is white, and what to do about what it follows first."""
     said = []
     if one.whiteness.p_value is not None:
-        white = one.whiteness.p_value > WHITE
-        said.append(f"It is {'' if white else 'not '}white ({_p(one.whiteness.p_value)}).")
+        white = "white" if one.whiteness.p_value > WHITE else "not white"
+        said.append(f"The residual of {one.output} is {white} ({_p(one.whiteness.p_value)}).")
     if one.missing and not one.exact:
         said.append(_advice(_largest(one)))
     return [*filter(None, said)]
@@ -466,7 +370,12 @@ def _advice(first: Finding) -> str:
 
 
 def _p(value: float) -> str:
-    return "p < 0.000001" if value < 1e-6 else f"p = {numeral(value, 2)}"
+    return f"p = {probability(value)}".replace("= <", "<")
+
+
+def probability(value: float | None) -> str:
+    """Return a p-value as it is shown."""
+    return "–" if value is None else "< 0.000001" if value < 1e-6 else numeral(value, 2)
 
 
 # --- Data gaps and plans ----------------------------------------------------------------------------
@@ -581,19 +490,6 @@ def band_on_test(
     ]
 
 
-def calibrated(found: Calibration) -> list[str]:
-    """Return what a band rests on, and how wide it is."""
-    band, n = found.band, found.band.units
-    said = [f"Calibrated on {n} {band.unit}s, which allow levels up to {percent(n / (n + 1), 3)}."]
-    for channel, width, ratio in zip(band.given, found.widths, found.over_constant, strict=True):
-        said.append(
-            f"{channel.name}: the band for {percent(band.level, 3)} is {numeral(width, 3)} "
-            f"{channel.unit} wide on average in cross-validation, {numeral(ratio, 2)} of a band of "
-            "constant width."
-        )
-    return said
-
-
 def calibrated_on_blocks(found: Calibration) -> str:
     """Return what a band does not include whose units are blocks of runs."""
     return (
@@ -700,24 +596,33 @@ def _record_next(study: Study) -> str:
     return f"{gap_run(first, ranges=False)[:-1]}: {gap_name(first)} cannot be identified{more}."
 
 
-def inverse(study: Study) -> str:
-    """Return which model is inverted and how well it is followed, or that none is."""
-    check, unit = study.inverse, study.leaderboard.unit
-    if check is None:
-        return "" if study.leaderboard.pending else "No inverse: no recommended model has one."
-    error = percent(check.error)
-    if check.reachable is None:
-        motion = "its own output for the test" if check.own else "the motion of the test"
-        text = f"The inverse of {check.model} follows {motion} on the model itself, error {error}"
-    else:
-        low, high = (numeral(end, 3) for end in check.reachable)
-        text = f"The inverse of {check.model} reaches {low} to {high} {unit}, error {error}"
-    if check.uncompensated_error is not None:
-        text += f"; a static map: {percent(check.uncompensated_error)}"
-    own = next(row.test_error for row in study.leaderboard.rows if row.model == check.model)
-    return (
-        f"{text}. On the muscle the error of the model adds, {numeral(own, 2)} {unit} on the test."
-    )
+def not_looped(study: Study) -> str:
+    """Return why no loop was closed; empty where one was."""
+    return f"No loop was closed: {study.not_looped}" if study.not_looped else ""
+
+
+def tracked(found: Tracking) -> list[str]:
+    """Return on what a reference was followed, and what of it is out of reach."""
+    one = found.tracked
+    unit = one.recording.units[next(iter(one.rmse))]
+    kind = "virtual rig" if found.virtual else "model"
+    said = [f"Plant: {found.plant.name} ({kind}), seed {found.seed}."]
+    said += [
+        f"The plant's own scatter of {name}: {size(unit, scatter)} RMS."
+        for name, scatter in one.scatter.items()
+    ]
+    if one.clipped >= len(one.recording):
+        said.append("Commands were at a limit throughout: the reference is out of reach.")
+    elif one.clipped > max((far.samples for far in one.beyond.values()), default=0):
+        cost = f"; RMSE there is {size(unit, one.clipping_cost)} higher" * (one.clipping_cost > 0)
+        said.append(f"Commands were at a limit in {one.clipped} steps{cost}.")
+    said += [
+        f"{far.samples} samples of the reference {name} are out of reach ({numeral(far.low, 4)} to "
+        f"{numeral(far.high, 4)} {unit}); RMSE over the others: {size(unit, far.rmse_elsewhere)}."
+        for name, far in one.beyond.items()
+    ]
+    median, largest = (1e6 * seconds for seconds in one.step_time)
+    return [*said, f"Controller: {median:.0f} µs a step (median), {largest:.0f} µs (99.9 %)."]
 
 
 def duration(recording: Recording) -> str:

@@ -37,7 +37,7 @@ class Fit:
     name: str
     model: Block = field(repr=False)
     estimator: Estimator = field(repr=False)
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = field(default=(), repr=False)
     file: Path | None = None
 
     def to_dict(self) -> dict[str, Any]:
@@ -93,7 +93,7 @@ class Tracking:
     seed: int
     controller: Any = field(repr=False)
     reference: Recording = field(repr=False)
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = field(default=(), repr=False)
     file: Path | None = None
     controller_file: Path | None = None
 

@@ -198,7 +198,7 @@ def study(
         found(so_far)
     try:
         with (
-            telling(progress, "studying") as tell,
+            telling(progress, "studying", lines=True) as tell,
             closing(ranked(plan, jobs=jobs, kept=kept, progress=tell)) as rankings,
         ):
             for ranking in rankings:

@@ -7,10 +7,11 @@ object that has a ``share`` and prints as words.
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from html import escape
 from importlib import import_module
 from typing import Any, TypeVar
@@ -19,11 +20,15 @@ from mckibben.numerals import duration
 
 Tell = Callable[..., None]
 
+Show = Callable[[float, str], None]
+
 Item = TypeVar("Item")
 
 
 @contextmanager
-def telling(progress: bool | Tell | None, what: str) -> Iterator[Tell | None]:
+def telling(
+    progress: bool | Tell | None, what: str, *, lines: bool = False
+) -> Iterator[Tell | None]:
     """Return what is called with the progress of work; None where nobody wants it.
 
     Parameters
@@ -32,14 +37,21 @@ def telling(progress: bool | Tell | None, what: str) -> Iterator[Tell | None]:
         Whether to show a bar, on standard error or in a notebook; or what is called.
     what : str
         The work, in a word or two.
+    lines : bool
+        Whether each step is a line where standard error is no terminal; else nothing is shown there.
     """
     if progress is not True:
         yield progress or None
         return
     started = time.monotonic()
     shell = sys.modules.get("IPython")
-    in_notebook = shell is not None and hasattr(shell.get_ipython(), "kernel")
-    with (_in_notebook if in_notebook else _on_terminal)(what) as show:
+    if shell is not None and hasattr(shell.get_ipython(), "kernel"):
+        place: AbstractContextManager[Show] = _in_notebook(what)
+    elif sys.stderr is not None and sys.stderr.isatty() and "JPY_PARENT_PID" not in os.environ:
+        place = _on_terminal(what)
+    else:  # in a log, or in a notebook's shell, which cannot go back in a line
+        place = _in_lines(what) if lines else nullcontext(lambda *_: None)
+    with place as show:
 
         def tell(first: Any, *rest: Any) -> None:
             share, words = getattr(first, "share", first), str(first)
@@ -83,23 +95,42 @@ def one_by_one(items: Iterable[Item], tell: Tell | None) -> Iterator[Item]:
 
 
 @contextmanager
-def _on_terminal(what: str) -> Iterator[Callable[[float, str], None]]:
+def _on_terminal(what: str) -> Iterator[Show]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     columns = (TextColumn("{task.description}", markup=False), BarColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=1.0)
 
         def show(share: float, words: str) -> None:
-            words = "".join(c if c.isprintable() else " " for c in words)
-            bar.update(task, completed=share, description=f"{what}: {words}" if words else what)
+            bar.update(task, completed=share, description=_line(what, words))
 
         yield show
 
 
 @contextmanager
-def _in_notebook(what: str) -> Iterator[Callable[[float, str], None]]:
+def _in_lines(what: str) -> Iterator[Show]:
+    last = -1.0
+
+    def show(share: float, words: str) -> None:
+        nonlocal last
+        if share > last:
+            with suppress(OSError):
+                print(_line(what, words), file=sys.stderr, flush=True)
+            last = share
+
+    yield show
+
+
+def _line(what: str, words: str) -> str:
+    """Return a line about work: names of recordings may hold anything."""
+    words = "".join(c if c.isprintable() else " " for c in words)
+    return f"{what}: {words}" if words else what
+
+
+@contextmanager
+def _in_notebook(what: str) -> Iterator[Show]:
     shown: Any = import_module("IPython.display")
 
     def html(share: float, words: str) -> Any:

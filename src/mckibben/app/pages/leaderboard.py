@@ -267,9 +267,9 @@ async def _closer(
         for output, pair in enumerate(pairs):
             own = {name: found[:, output] for name, found in outputs.items()}
             drawings += [
-                subjects.fit_over_time(recording, pair[1], own, one.part),
-                subjects.fit_loops(recording, *pair, own),
-                subjects.residuals(recording, *pair, own, one.part),
+                subjects.against("fit", recording, pair, own, one.part),
+                subjects.against("loops", recording, pair, own),
+                subjects.against("residuals", recording, pair, own, one.part),
             ]
         for index, drawing in enumerate(drawings):
             with ui.row().classes("w-full"):

@@ -15,10 +15,11 @@ from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
 from mckibben.app.together import obstacle
 from mckibben.comparison.channels import any_moves
+from mckibben.diagnosis.coupling import Coupling, coupling
 from mckibben.errors import MckibbenError
 from mckibben.numerals import number, typeset_within
 from mckibben.recording import Recording
-from mckibben.report import coupling_subjects, subjects
+from mckibben.report import subjects
 
 SMALL_HEIGHT = 150
 """Of a small picture [px]."""
@@ -95,13 +96,13 @@ def _matrix(desk: Desk, chosen: ui.select, enlarge: Callable[[str, str], None]) 
         try:
             recording = desk.workspace.recording(str(chosen.value))
             used = list(desk.workspace.used().values())
-            found = coupling_subjects.coupling(used, desk.sides.inputs, desk.outputs)
+            found = coupling(used, desk.sides.inputs, desk.outputs)
         except (MckibbenError, KeyError) as error:
             refused(error)
             return
         ui.label("What moves what: every output over every input").classes("text-lg")
-        small = plots.figures(coupling_subjects.matrix(recording, found), height=SMALL_HEIGHT)
-        most = coupling_subjects.MOST
+        small = plots.figures(subjects.matrix(recording, found), height=SMALL_HEIGHT)
+        most = subjects.MOST
         shown = [(o, i) for o in found.outputs[:most] for i in found.inputs[:most]]
         columns = min(len(found.inputs), most)
         grid = ui.element("div").classes("w-full overflow-x-auto grid gap-1")
@@ -128,7 +129,7 @@ def _matrix(desk: Desk, chosen: ui.select, enlarge: Callable[[str, str], None]) 
 def _small(
     desk: Desk,
     figure: plots.Json,
-    found: coupling_subjects.Coupling,
+    found: Coupling,
     given: str,
     wanted: str,
     enlarge: Callable[[str, str], None],
@@ -154,7 +155,7 @@ def _plots(desk: Desk, recording: Recording, given: str, wanted: str) -> None:
 
     found = cycles(recording[given], MAJOR * float(np.ptp(recording[given])))
     used = (*desk.inputs, *desk.outputs, given)
-    others = coupling_subjects.third_channels(recording, used)
+    others = subjects.third_channels(recording, used)
     with ui.row().classes("items-center w-full"):
         colour = named(
             ui.toggle(
@@ -186,7 +187,7 @@ def _plots(desk: Desk, recording: Recording, given: str, wanted: str) -> None:
             drawing = (
                 subjects.loop([part], given, wanted)
                 if by == "time"
-                else coupling_subjects.loop_by([part], given, wanted, by)
+                else subjects.loop_by([part], given, wanted, by)
             )
             figure = plots.figures(drawing, height=440)[0]
         picture(desk, figure, "loop-plot")
@@ -259,7 +260,7 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
                     "unit": unit,
                     "note": note,
                 }
-                for name, value, limits, unit, note in words.characterization_rows(found)
+                for name, value, limits, unit, note in words.quantities(found)
                 if value is not None
             ]
             columns = [

@@ -34,7 +34,7 @@ def calibrate(
     from mckibben.diagnosis.bands import calibration
     from mckibben.outputs import claim
     from mckibben.reading import read_files
-    from mckibben.report import text, words
+    from mckibben.report import results, text, words
 
     claim(out, inputs=[model, *files, *fitted], force=force)
     block, known = load(model), read_files(fitted, None, reading)
@@ -46,4 +46,4 @@ def calibrate(
             "whether the model was fitted to these recordings is checked with --fitted FILE"
         )
     about = {"file": str(out)} | found.to_dict() | {"notes": notes}
-    show(about, lambda: text.calibration(found), as_json, notes, [out])
+    show(about, lambda: text.lines(results.calibration(found)), as_json, notes, [out])

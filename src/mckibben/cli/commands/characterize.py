@@ -23,9 +23,14 @@ def characterize(
     from mckibben.diagnosis.characterization import characterize as find
     from mckibben.reading import read_pair
     from mckibben.recording import notes_by_file, reading_notes
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     recordings, *pair = read_pair(files, input, output, reading, beside)
     found = find(recordings, *pair, beside=beside)
     about = found.to_dict() | {"notes": notes_by_file(recordings)}
-    show(about, lambda: text.characterization(found), as_json, reading_notes(recordings))
+    show(
+        about,
+        lambda: text.lines(results.characterization(found)),
+        as_json,
+        reading_notes(recordings),
+    )

@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Files, Force, Json, ModelFile, command
 from mckibben.options import Option, ReadOptions
 
@@ -25,11 +25,10 @@ def check(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
     from mckibben.report.check_page import check_json
 
-    with progress_bar("check:") as tell:
-        found = workflow.check(model, files, reading=reading, out=out, force=force, progress=tell)
+    found = workflow.check(model, files, reading=reading, out=out, force=force, progress=True)
     about = {"folder": str(out)} | check_json(found, str(model))
     written = [out / "report.html", out / "validation.json"]
-    show(about, lambda: text.check(found), as_json, written=written)
+    show(about, lambda: text.lines(results.check(found)), as_json, written=written)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command
 from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import CompareOptions, Option, ReadOptions
@@ -34,15 +34,15 @@ def compare(
     as_json: Json = False,
 ) -> int:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     chosen = replace(options, models="quick") if quick else options
-    with stoppable(out), progress_bar("compare:", plainly=True) as tell:
+    with stoppable(out):
         board = workflow.compare(
-            files, test, chosen, reading=reading, out=out, force=force, progress=tell
+            files, test, chosen, reading=reading, out=out, force=force, progress=True
         )
         stop_short(board, out)
     written = [out / "leaderboard.json", out / "leaderboard.csv"] if out else []
-    show(board, lambda: text.leaderboard(board), as_json, written=written)
+    show(board, lambda: text.lines(results.leaderboard(board)), as_json, board.notes, written)
     failed = sum(map(len, board.failures.values()))
     return NO_MODEL if board.rows and failed == len(board.rows) else 0

@@ -46,10 +46,10 @@ def _export(
     as_json: bool,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     found = workflow.export(model, out, target, options)
-    show(found, lambda: text.exported(found), as_json, written=[out])
+    show(found, lambda: text.lines(results.exported(found)), as_json, written=[out])
 
 
 export = click.Group(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Argument, Files, Force, Json, command
 from mckibben.options import FitOptions, Option, ReadOptions
 
@@ -25,10 +25,9 @@ def fit(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
-    with progress_bar(f"fitting {model}") as tell:
-        found = workflow.fit(
-            model, files, options, reading=reading, out=out, force=force, progress=tell
-        )
-    show(found, lambda: text.fit(found), as_json, found.notes, [out])
+    found = workflow.fit(
+        model, files, options, reading=reading, out=out, force=force, progress=True
+    )
+    show(found, lambda: text.lines(results.fit(found)), as_json, found.notes, [out])

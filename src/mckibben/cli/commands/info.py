@@ -28,11 +28,11 @@ def info(
     from mckibben.estimators.catalogue import described
     from mckibben.files import has_columns
     from mckibben.reading import look
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     if models:
         every: dict[str, Any] = described()
-        show(every, lambda: text.models(every), as_json)
+        show(every, lambda: text.lines(results.models(every)), as_json)
         return
     if not files:
         raise DataError("there is nothing to show", remedy="give a file, or `models`")
@@ -44,7 +44,7 @@ def info(
         )
     if len(files) == 1 and files[0].suffix.lower() == ".json" and not has_columns(files[0]):
         about = summary(load(files[0]))
-        show(about, lambda: text.model(about), as_json)
+        show(about, lambda: text.lines(results.model(about)), as_json)
         return
     found = look(files, reading, inputs, outputs)
-    show(found, lambda: text.contents(found), as_json)
+    show(found, lambda: text.lines(results.contents(found)), as_json)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Force, Json, ModelFile, command
 from mckibben.options import InvertOptions, Option, ReadOptions
 
@@ -25,10 +25,7 @@ def invert(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
-    with progress_bar("invert:") as tell:
-        found = workflow.invert(
-            model, options, reading=reading, out=out, force=force, progress=tell
-        )
-    show(found, lambda: text.inverse(found), as_json, written=[out])
+    found = workflow.invert(model, options, reading=reading, out=out, force=force, progress=True)
+    show(found, lambda: text.lines(results.inverse(found)), as_json, written=[out])

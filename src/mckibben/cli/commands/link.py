@@ -36,7 +36,7 @@ def link(
     from mckibben.link import Link
     from mckibben.link.driving import drive
     from mckibben.outputs import claim_recording
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     if out is not None:
         if not settings:
@@ -50,4 +50,4 @@ def link(
     if out is not None:
         write(found.recording(), out)
     about = found.to_dict() | {"file": None if out is None else str(out)}
-    show(about, lambda: text.device(found), as_json, written=[out])
+    show(about, lambda: text.lines(results.device(found)), as_json, written=[out])

@@ -9,10 +9,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from mckibben.cli.output import progress_bar, say, show
+from mckibben.cli.output import say, show
 from mckibben.cli.parameters import Argument, Force, Json, Quick, command, repeated
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Jobs, Option, Seed, names
+from mckibben.system.progress import telling
 
 if TYPE_CHECKING:
     from mckibben.measured.running import Outcome
@@ -45,7 +46,7 @@ def measured(
         if not as_json:
             say(f"{one.label}: {one.failed or (words.chosen(one.board) if one.board else '')}")
 
-    with stoppable(out), progress_bar("measured:", plainly=True) as tell:
+    with stoppable(out), telling(True, "measured", lines=True) as tell:
         found = measure(
             folder,
             out,

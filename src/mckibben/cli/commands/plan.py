@@ -25,10 +25,10 @@ def plan(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     found = workflow.plan(files, options, reading=reading, out=out, force=force)
     about = {"file": str(out)} | found.to_dict()
-    show(about, lambda: text.plan(found), as_json, written=[out])
+    show(about, lambda: text.lines(results.plan(found)), as_json, written=[out])
     if options.rig is not None and not as_json:
         say(f"Record it with: mckibben rig run {options.rig} --inputs {out} -o recorded.csv")

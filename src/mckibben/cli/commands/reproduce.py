@@ -8,10 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Argument, Force, Json, command
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Jobs, Option, ReadOptions, Seed
+from mckibben.system.progress import telling
 
 
 @command
@@ -36,20 +37,20 @@ def reproduce(
 ) -> None:
     from mckibben.errors import DataError
     from mckibben.papers.paper import papers
-    from mckibben.report import text
+    from mckibben.report import reproduction, results, text
     from mckibben.report.rerun import rerun
 
     if listed:
         every = papers()
         about = [{"name": key} | one.about() for key, one in every.items()]
-        show(about, lambda: text.papers(every), as_json)
+        show(about, lambda: text.lines(results.papers(every)), as_json)
         return
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give `listed`")
-    with stoppable(out), progress_bar(f"{name}:", plainly=True) as tell:
+    with stoppable(out), telling(True, name, lines=True) as tell:
         found = rerun(
             name, data, reading, rig=rig, out=out, quick=quick, seed=seed, jobs=jobs, force=force,
             progress=tell,
         )  # fmt: skip
     written = [out / "report.html", out / "tables.json"] if out else []
-    show(found, lambda: text.reproduction(found), as_json, found.notes, written)
+    show(found, lambda: text.lines(reproduction.items(found)), as_json, found.notes, written)

@@ -7,10 +7,11 @@ from typing import Annotated, Any, Literal
 
 import click
 
-from mckibben.cli.output import progress_bar, say, show
+from mckibben.cli.output import say, show
 from mckibben.cli.parameters import Argument, Force, Json, command
 from mckibben.cli.stopping import stoppable
 from mckibben.options import Jobs, Option, Seed, setting
+from mckibben.system.progress import telling
 
 Name = Annotated[str, Argument("RIG", "Name of a rig, or its file (.toml).")]
 Changes = Annotated[
@@ -22,11 +23,11 @@ Changes = Annotated[
 @command
 def list_(as_json: Json = False) -> None:
     """List the rigs, the protocols made for them, and the signals that can drive them."""
-    from mckibben.report import text
+    from mckibben.report import results, text
     from mckibben.studying.rig_runs import catalogue
 
     found = catalogue()
-    show(found, lambda: text.rigs(found), as_json)
+    show(found, lambda: text.lines(results.rigs(found)), as_json)
 
 
 @command
@@ -87,7 +88,7 @@ def run(
     from mckibben.errors import DataError
     from mckibben.files import read, write
     from mckibben.outputs import claim_recording
-    from mckibben.report import text
+    from mckibben.report import results, text
     from mckibben.rigs import load_rig
     from mckibben.studying.rig_runs import at_first_commands, commands
 
@@ -109,7 +110,7 @@ def run(
     spans = {k: [float(v.min()), float(v.max())] for k, v in recording.channels.items()}
     about = {"file": str(out), "n_samples": len(recording), "ranges": spans}
     about["saturated"] = dict(recording.meta.get("saturated", {}))
-    show(about, lambda: text.ranges(recording), as_json, written=[out])
+    show(about, lambda: text.lines(results.recording(recording)), as_json, written=[out])
 
 
 @command
@@ -133,7 +134,7 @@ def record(
     """
     from mckibben.studying.rig_runs import record_protocol
 
-    with stoppable(out), progress_bar(f"recording {protocol}:") as tell:
+    with stoppable(out), telling(True, f"recording {protocol}") as tell:
         recorded, earlier = record_protocol(
             protocol, out, rig=rig, changes=changes, file_format=file_format, only=only, seed=seed,
             jobs=jobs, force=force, progress=tell,

@@ -42,7 +42,7 @@ def simulate(
     from mckibben.files import write
     from mckibben.outputs import claim_recording
     from mckibben.reading import read_files
-    from mckibben.report import text
+    from mckibben.report import results, text, words
     from mckibben.studying.simulating import simulated
     from mckibben.workflow import saved
 
@@ -55,6 +55,8 @@ def simulate(
         interval=interval,
     )
     write(found.recording.with_meta(model=str(model)), out)
-    notes = [*found.notes, *text.outside(found)]
+    run = found.recording.name
+    beyond = [words.outside_calibration(run, *each) for each in found.outside]
+    notes = [*found.notes, *beyond]
     about = {"file": str(out)} | found.to_dict() | {"notes": notes}
-    show(about, lambda: text.simulation(found), as_json, notes, [out])
+    show(about, lambda: text.lines(results.simulation(found)), as_json, notes, [out])

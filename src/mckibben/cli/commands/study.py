@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from mckibben.cli.output import progress_bar, say, show
+from mckibben.cli.output import say, show
 from mckibben.cli.parameters import Files, Force, Json, Quick, Test, command, repeated
 from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import Option, ReadOptions, StudyOptions
@@ -40,16 +40,16 @@ def study(
     from mckibben import workflow
     from mckibben.outputs import unfinished
     from mckibben.recording import notes_by_file
-    from mckibben.report import text
+    from mckibben.report import results, text
 
     def begun(so_far: Study) -> None:
         if not so_far.leaderboard.rows and not as_json:
-            for line in text.study_begun(so_far):
+            for line in text.lines(results.study_begun(so_far)):
                 say(line)
             live = unfinished(out) / "report.html"
             say(f"Report so far, updated with every model: {live}\n", flush=True)
 
-    with stoppable(out), progress_bar("study:", plainly=True) as tell:
+    with stoppable(out):
         found = workflow.study(
             files,
             test,
@@ -58,7 +58,7 @@ def study(
             out=out,
             force=force,
             command=repeated(),
-            progress=tell,
+            progress=True,
             found=begun,
         )
         stop_short(found.leaderboard, out)
@@ -66,7 +66,8 @@ def study(
     about["notes"] = notes_by_file([*found.train, *found.test])
     show(
         about if as_json else found,
-        lambda: text.study(found),
+        lambda: text.lines(results.study(found)),
         as_json,
+        found.leaderboard.notes,
         written=[out / "report.html"],
     )

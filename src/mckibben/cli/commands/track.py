@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from mckibben.cli.output import progress_bar, show
+from mckibben.cli.output import show
 from mckibben.cli.parameters import Argument, Force, Json, command
 from mckibben.options import Option, ReadOptions, TrackOptions
 
@@ -27,17 +27,16 @@ def track(
     as_json: Json = False,
 ) -> None:
     from mckibben import workflow
-    from mckibben.report import text
+    from mckibben.report import results, text
 
-    with progress_bar(f"{options.controller}:") as tell:
-        found = workflow.track(
-            compensator,
-            reference,
-            options,
-            reading=reading,
-            out=out,
-            controller_out=controller_out,
-            force=force,
-            progress=tell,
-        )
-    show(found, lambda: text.tracking(found), as_json, written=[out, controller_out])
+    found = workflow.track(
+        compensator,
+        reference,
+        options,
+        reading=reading,
+        out=out,
+        controller_out=controller_out,
+        force=force,
+        progress=True,
+    )
+    show(found, lambda: text.lines(results.tracking(found)), as_json, written=[out, controller_out])

@@ -1,4 +1,4 @@
-"""Figures of several muscles, and of what loads them: every input against every output."""
+"""How far every input moves every output, and which input is an output's own."""
 
 from __future__ import annotations
 
@@ -11,24 +11,7 @@ from mckibben.arrays import Array
 from mckibben.comparison.channels import Channels, any_moves, moved_by
 from mckibben.diagnosis.conditions import FOLLOWS
 from mckibben.recording import Recording
-from mckibben.report.drawing import (
-    N_AGES,
-    N_COLOURS,
-    POINTS,
-    Curve,
-    Drawing,
-    Panel,
-    along,
-    axis_label,
-    left_out,
-)
 from mckibben.statistics import dependence
-
-SMALL = 500
-"""Points of a small picture."""
-
-MOST = 6
-"""Inputs, and outputs, that are pictured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,65 +107,3 @@ def fullest(recordings: Sequence[Recording], inputs: Sequence[str]) -> Recording
     spans = {name: np.concatenate([r[name] for r in recordings]) for name in inputs}
     whole = {name: max(float(np.ptp(x)), np.finfo(float).tiny) for name, x in spans.items()}
     return max(recordings, key=least)
-
-
-def matrix(recording: Recording, found: Coupling, points: int = SMALL) -> Drawing:
-    """Draw every output (rows) over every input (columns), small; own pairs are in colour."""
-    panels = []
-    for output in found.outputs[:MOST]:
-        for name in found.inputs[:MOST]:
-            x, y = along(recording[name], recording[output], points)[1:]
-            colour = "series-1" if found.own(output, [recording]) == name else "input"
-            panels.append(
-                Panel(
-                    axis_label(name, recording.units[name]),
-                    axis_label(output, recording.units[output]),
-                    (Curve(x, y, "", colour, "fine"),),
-                )
-            )
-    note = left_out([*found.inputs[MOST:], *found.outputs[MOST:]])
-    return Drawing(tuple(panels), columns=min(len(found.inputs), MOST), note=note)
-
-
-def loop_by(
-    recordings: Sequence[Recording],
-    input_name: str,
-    output_name: str,
-    by: str,
-    points: int = POINTS,
-) -> Drawing:
-    """Draw output over input, coloured by a third channel, a load or a stiffness, from low to high."""
-    paths = [along(r[input_name], r[output_name], points) for r in recordings]
-    x, y = (np.concatenate([path[k] for path in paths]) for k in (1, 2))
-    level = np.concatenate(
-        [r[by][path[0].astype(int)] for r, path in zip(recordings, paths, strict=True)]
-    )
-    edges = levels(np.concatenate([r[by] for r in recordings]))
-    recording = recordings[0]
-    unit = f" {recording.units[by]}" if recording.units[by] else ""
-    which = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, len(edges) - 2)
-    curves = []
-    for place in range(len(edges) - 1):
-        chosen = which == place
-        if chosen.any():
-            ends = dict.fromkeys(f"{end:.3g}" for end in (level[chosen].min(), level[chosen].max()))
-            name = f"{by} {' to '.join(ends)}{unit}"
-            colour = f"age-{place + 1}"
-            curves.append(Curve(x[chosen], y[chosen], name, colour, "specks"))
-    x_label = axis_label(input_name, recording.units[input_name])
-    y_label = axis_label(output_name, recording.units[output_name])
-    return Drawing((Panel(x_label, y_label, tuple(curves)),))
-
-
-def levels(values: Array) -> Array:
-    """Return the edges of at most `N_AGES` equal steps from lowest to highest."""
-    low, high = float(values.min()), float(values.max())
-    if high <= low:
-        return np.array([low, low])
-    return np.linspace(low, high, N_AGES + 1)
-
-
-def third_channels(recording: Recording, used: Sequence[str]) -> list[str]:
-    """Return the channels that a loop can be coloured by: those that move and are not used already."""
-    free = [name for name in recording.channels if name not in used]
-    return [name for name in free if np.ptp(recording[name]) > 0][:N_COLOURS]

@@ -1,0 +1,570 @@
+"""What is shown of every kind of result: one list of texts, tables and figures, for every face.
+
+A terminal prints texts and tables, pages add the figures, and a card in a notebook has the first table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from mckibben import registry
+from mckibben.numerals import numeral, percent
+from mckibben.recording import reading_notes
+from mckibben.report import interactive, model_subjects, words
+from mckibben.report.builder import Equations, Figure, Item, Table, Text, Tile
+from mckibben.report.columns import columns_of_board
+from mckibben.report.drawing import POINTS
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
+    from mckibben.comparison.leaderboard import Leaderboard, Row
+    from mckibben.control import Tracked
+    from mckibben.diagnosis.bands import Calibration
+    from mckibben.diagnosis.characterization import Characterization
+    from mckibben.diagnosis.check import OutputCheck, Validation
+    from mckibben.diagnosis.data_gaps import Gap
+    from mckibben.diagnosis.description import ModelDescription
+    from mckibben.diagnosis.review import Review
+    from mckibben.link.device import State
+    from mckibben.link.driving import Driven
+    from mckibben.papers.paper import Paper
+    from mckibben.planning.planner import Plan
+    from mckibben.reading import Contents
+    from mckibben.recording import Recording
+    from mckibben.rigs.rig import Rig
+    from mckibben.studying.results import Exported, Fit, Inverse, Tracking
+    from mckibben.studying.simulating import Simulation
+    from mckibben.studying.study import Study
+
+STARTS_MATTER = 0.05
+"""Relative difference of the errors from rest and from fitted starts from which both are given."""
+
+BOARD = ("chosen", "test", "interval", "rank", "gap")
+"""Columns of a leaderboard for a terminal of 80; the files have the rest."""
+
+MOST = 12
+"""Parameters of a plan that are listed."""
+
+UNFOLDED = 30
+"""Parameters that a page shows without being asked for."""
+
+# --- Recordings -------------------------------------------------------------------------------------
+
+
+def recording(found: Recording) -> list[Item]:
+    """Return the ranges of channels, samples at their limits and repeated ones, and notes."""
+    from mckibben.files.condition import condition
+
+    rows = []
+    for name, samples in found.channels.items():
+        about = condition(samples)
+        rows.append([
+            *(name, found.units[name] or "–"),
+            *(f"{float(end) + 0.0:.6g}" for end in (samples.min(), samples.max())),
+            *(percent(about["saturated"]), about["stuck"]),
+        ])  # fmt: skip
+    headings = ["Channel", "Unit", "Lowest", "Highest", "At a limit", "Stuck samples"]
+    notes = reading_notes([found])
+    return [Table(headings, rows), Text(notes, "note", listed=True) if notes else None]
+
+
+def contents(found: Contents) -> list[Item]:
+    """Return the columns of files, the channels of recordings, and what these cannot identify."""
+    items: list[Item] = []
+    for file, columns in found.columns.items():
+        rows = [[c.header, c.unit or "–", ", ".join(c.first), c.channel or "–"] for c in columns]
+        table = Table(["Column", "Unit", "First cells", "Read as"], rows)
+        items += [Text([file], "lead"), table]
+    for one in found.recordings:
+        items += [Text([repr(one)], "lead"), *recording(one)]
+    if isinstance(found.gaps, str):
+        return [*items, Text([f"Data gaps: unknown, {found.gaps}"])]
+    return [*items, *(data_gaps(found.gaps) or [Text(["Data gaps: none"])])]
+
+
+def data_gaps(gaps: Sequence[Gap]) -> list[Item]:
+    """Return what recordings cannot identify, and the runs that would."""
+    rows = [[words.gap_sentence(gap), words.gap_run(gap)] for gap in gaps]
+    return [Table(["Data gap", "Run that closes it"], rows)] if rows else []
+
+
+def characterization(found: Characterization) -> list[Item]:
+    """Return what a muscle does: sentences, then every figure with its 95 % interval."""
+    quantities = [one for one in words.quantities(found) if one.value is not None]
+    rows = [
+        [one.name, one.value, " to ".join(numeral(x, 4) for x in one.limits or ()), one.unit]
+        for one in quantities
+    ]
+    headings, meanings = (
+        ["Quantity", "Value", "95 % interval", "Unit"],
+        [o.meaning for o in quantities],
+    )
+    table = Table(headings, rows, titles=meanings, summary="Characterization")
+    return [Text(words.characterization_sentences(found)), table]
+
+
+def plan(found: Plan) -> list[Item]:
+    """Return the steps of a plan, and the standard errors to expect."""
+    steps = [
+        [f"{one.start:.0f} to {one.stop:.0f}", one.what, ", ".join(one.gaps) or "–"]
+        for one in found.steps
+    ]
+    items: list[Item] = [Table(["Seconds", "What", "Closes"], steps)]
+    shown = sorted(found.parameters, key=lambda one: one.after or 0.0, reverse=True)[:MOST]
+    if shown:
+        rows = [[o.name, f"{o.value:.4g}", *map(_at_most_whole, (o.now, o.after))] for o in shown]
+        items.append(Table(["Parameter", "Value", "Standard error now", "With the plan"], rows))
+    return [*items, Text(words.plan_sentences(found))]
+
+
+def _at_most_whole(share: float | None) -> str:
+    return "over 100 %" if share is not None and share > 1 else percent(share)
+
+
+# --- Models -----------------------------------------------------------------------------------------
+
+
+def fit(found: Fit) -> list[Item]:
+    """Return errors and parameters of a model that was fitted."""
+    about, unit = found.to_dict(), found.estimator.model_.outputs[0].unit
+    said = [
+        f"{found.name}: free-running RMSE {numeral(about['rmse'], 4)} {unit} on "
+        f"{about['n_samples']} samples, {about['n_parameters']} parameters, "
+        f"{about['seconds']:.2f} s{' (interrupted: the best until then)' * about['interrupted']}"
+    ]
+    if len(about["rmse_by_output"]) > 1:
+        errors = [f"{k} {numeral(v, 4)} {unit}" for k, v in about["rmse_by_output"].items()]
+        said.append(f"Mean of {', '.join(errors)}.")
+    if abs(about["rmse_from_rest"] - about["rmse"]) > STARTS_MATTER * about["rmse"]:
+        said.append(
+            "Every recording starts from its fitted state; from rest, as streams and generated code "
+            f"start, the RMSE is {numeral(about['rmse_from_rest'], 4)} {unit}."
+        )
+    if about["undetermined"]:
+        said.append(f"Not determined by these recordings: {'; '.join(about['undetermined'])}.")
+    keys = ("parameter_names", "parameters", "standard_errors", "parameter_units")
+    rows = [
+        [name, value, "–" if math.isnan(error) else numeral(error, 2), measure]
+        for name, value, error, measure in zip(*(about[key] for key in keys), strict=True)
+    ]
+    table = Table(["Parameter", "Value", "Standard error", "Unit"], rows)
+    return [Text(said), table if found.estimator.errors_known else None]
+
+
+def block(found: Block) -> list[Item]:
+    """Return what a model takes, gives and is."""
+    from mckibben.blocks.setting import summary
+
+    rows = list(zip(found.parameter_names, map(float, found.pack()), strict=False))
+    return [*model(summary(found)), Table(["Parameter", "Value"], rows) if rows else None]
+
+
+def model(about: Mapping[str, Any]) -> list[Item]:
+    """Return what a saved model is, from its `summary`."""
+    settable = ", ".join(f"{name}={value}" for name, value in about["settable"].items()) or "–"
+    rows = [
+        [key.replace("_", " "), ", ".join(value) if isinstance(value, list) else str(value)]
+        for key, value in {**about, "settable": settable}.items()
+    ]
+    return [Table(["", "Value"], rows)]
+
+
+def models(every: Mapping[str, Any]) -> list[Item]:
+    """Return what every model is, and its settings."""
+    rows = [[name, one["summary"]] for name, one in every.items()]
+    settings = [
+        [name, ", ".join(f"{key}={value}" for key, value in one["settings"].items())]
+        for name, one in every.items()
+    ]
+    return [
+        Table(["Model", "What it is"], rows),
+        Table(["Model", "Settings (--set NAME=VALUE)"], settings),
+    ]
+
+
+def description(found: ModelDescription) -> list[Item]:
+    """Return what a model is on a page: equations, parameters, and answers to sines."""
+    rows = [
+        [
+            one.name,
+            {"latex": one.symbol},
+            one.value,
+            one.status if one.standard_error is None else f"± {numeral(one.standard_error, 2)}",
+            one.unit or "–",
+        ]
+        for one in found.parameters
+    ]
+    items: list[Item] = [
+        Text([found.written.title], "muted"),
+        Equations(found.written),
+        Table(
+            ["Parameter", "Symbol", "Value", "Standard error", "Unit"],
+            rows,
+            titles=[one.meaning for one in found.parameters],
+            summary=f"{len(rows)} parameters" if len(rows) > UNFOLDED else "",
+        ),
+    ]
+    for one in found.frequency_responses:
+        name = one.output.name
+        label = f"Gain and angle of {name} over the frequency of {one.input.name}"
+        plots = [interactive.plots(model_subjects.frequency_response(one))]
+        items.append(Figure(f"response {name}", plots, label, f"{label}; dots: measured.", "tall"))
+    return items
+
+
+def simulation(found: Simulation) -> list[Item]:
+    """Return the errors of a model over a recording, and what its band holds."""
+    units = found.recording.units
+    rows = [
+        [f"{name} [{units[name]}]", *(one[key] for key in ("rmse", "mae", "max_error", "r2"))]
+        for name, one in found.metrics.items()
+    ]
+    items: list[Item] = []
+    if rows:
+        ahead = "" if found.horizon is None else f"{found.horizon} samples ahead: "
+        items.append(Table([f"{ahead}output", "RMSE", "MAE", "Largest", "R²"], rows))
+    if found.interval is not None:
+        items.append(Text([
+            f"{name}: the band for {percent(found.interval, 3)} holds {percent(one['coverage'], 3)} of "
+            f"the samples; {numeral(one['band_width'], 3)} {units[name]} wide on average"
+            for name, one in found.metrics.items()
+        ]))  # fmt: skip
+    return items
+
+
+def inverse(found: Inverse) -> list[Item]:
+    """Return what an inverse takes, gives and reaches."""
+    made = found.block
+    units = {channel.name: channel.unit for channel in (*made.inputs, *made.outputs)}
+    given, wanted = (
+        ", ".join(f"{channel.name} [{channel.unit}]" for channel in side)
+        for side in (made.inputs, made.outputs)
+    )
+    said = [f"{wanted} from {given}."]
+    said += [
+        f"Reachable whatever happened before: {name} {numeral(low, 5)} to {numeral(high, 5)} "
+        f"{units.get(name, '')}; references beyond are clipped."
+        for name, (low, high) in found.reachable.items()
+    ]
+    if found.kind in ("inverse", "adaptive") and not found.reachable:
+        said.append(
+            "What can be reached depends on load, past or other muscles; track has what was clipped."
+        )
+    said += [
+        f"{name}: RMSE {numeral(error, 4)} {units[name]} on the recordings."
+        for name, error in found.rmse.items()
+    ]
+    if made.samples_ahead:
+        said.append(
+            f"Give it every reference {made.samples_ahead} samples before it is due; track does."
+        )
+    return [Text(said)]
+
+
+def exported(found: Exported) -> list[Item]:
+    """Return what a self-test printed, and how many files were written."""
+    libraries = [name for name in found.files if name.startswith("binaries/")]
+    said = [
+        *filter(None, (found.self_test, found.emulation)),
+        *(f"Library: {x}" for x in libraries),
+    ]
+    return [
+        Text([*said, f"{len(found.files)} files{'' if libraries else '; start with README.md'}"])
+    ]
+
+
+# --- Comparisons and studies ------------------------------------------------------------------------
+
+
+def board_table(board: Leaderboard, rows: Sequence[Row], keys: Sequence[str] = BOARD) -> Table:
+    """Return rows of a leaderboard as a table, those of each output among its columns."""
+    columns = [one for one in columns_of_board(board) if one.key in (*keys, *board.outputs)]
+    given = [row.to_dict() for row in rows]
+    named = [r.model + " ≈" * (r.model in board.level) + "*" * bool(r.caution) for r in rows]
+    return Table(
+        ["Model", *(one.label for one in columns)],
+        [[name, *(one.text(each) for one in columns)] for name, each in zip(named, given, strict=True)],
+        best=next((place for place, row in enumerate(rows) if row is board.best), None),
+        titles=[
+            " ".join(filter(None, (_summary(row.model), *(one.flag(each) for one in columns))))
+            for row, each in zip(rows, given, strict=True)
+        ],
+        keys=[
+            [row.model, *(one.sorted_by(each) for one in columns)]
+            for row, each in zip(rows, given, strict=True)
+        ],
+    )  # fmt: skip
+
+
+def _summary(model: str) -> str:
+    """Return the full name of a model and what it can; nothing of unknown ones."""
+    from mckibben.estimators.catalogue import summary
+
+    return summary(model) if model in registry.names("estimators") else ""
+
+
+def leaderboard(board: Leaderboard, keys: Sequence[str] = BOARD) -> list[Item]:
+    """Return how models are compared, their errors, which is chosen, and what failed."""
+    ranked = [row for row in board.ranking if row.reason is None and row.test and row.train]
+    split = f"{board.split[0].upper()}{board.split[1:]}"
+    by = words.CHOICES[board.chosen_by][1]
+    chosen, marks = words.chosen(board), words.marks(board)
+    if not ranked:
+        chosen = "No model is fitted yet." if board.pending else "No model worked."
+    items: list[Item] = [
+        Text([chosen]) if chosen else None,
+        Text([f"{split}. Ordered by {by}; all models run free."]),
+        board_table(board, ranked, keys) if ranked else None,
+        Text(marks, "muted") if marks else None,
+    ]
+    notes = [*words.comparison(board), *words.not_validated(board)]
+    items.append(Text(notes, "note", listed=True) if notes else None)
+    failed = [f"{', '.join(some)}: failed, {reason}" for reason, some in board.failures.items()]
+    items.append(Text(failed, "failed", listed=True) if failed else None)
+    if ranked:
+        caption = "Test errors with 95 % intervals; strokes: on the data fitted; rings: validation."
+        plots = [interactive.plots(model_subjects.leaderboard(board))]
+        height = 4 + 1.4 * len(board.rows)
+        items.append(
+            Figure(
+                "leaderboard", plots, "Errors of all models with intervals", caption, height=height
+            )
+        )
+    return items
+
+
+def study_begun(found: Study) -> list[Item]:
+    """Return what the muscle and a loop do, before any model is fitted."""
+    known, reviewed = found.characterization, found.review
+    return [
+        Text(words.characterization_sentences(known)) if known is not None else None,
+        Text(words.reviewed(reviewed)) if reviewed is not None else None,
+    ]
+
+
+def study(found: Study) -> list[Item]:
+    """Return the leaderboard, the three answers, what else is on the first screen, and loops."""
+    said = [f"{question} {answer}" for question, answer in words.answers(found)]
+    said += [f"{one.label}: {one.value}, {one.note}".rstrip(", ") for one in tiles(found)]
+    said += filter(None, [words.not_looped(found)])
+    closed = loops(found.loops) if found.loops else []
+    return [*leaderboard(found.leaderboard), Text(said), *closed]
+
+
+def tiles(study: Study) -> tuple[Tile, ...]:
+    """Return the numbers of the first screen: loop, model, inverse, data gaps."""
+    board, found, best = study.leaderboard, study.characterization, study.leaderboard.best
+    loop = Tile("Loop width", "–", "several muscles: see Recordings", "recordings")
+    if found is not None and found.loop_width is not None:
+        width = f"{numeral(found.mid_width, 2)} {found.output_unit} at mid {found.input}"
+        loop = Tile("Loop width", f"{numeral(found.loop_width, 2)} %", width, "recordings")
+    elif found is not None:
+        loop = Tile("Loop width", "–", "no loop is shown", "recordings")
+    model = Tile(
+        "Best model", "–", "fitting" if board.pending else "none recommended", "leaderboard"
+    )
+    if best is not None:
+        error, share = numeral(best.test_error, 2), _share(study)
+        of = f" ({share} of the range)" if share else ""
+        model = Tile(
+            "Best model", best.model, f"{error} {board.unit} RMSE on the test{of}", "leaderboard"
+        )
+    inverse, check = Tile("Inverse", "–", "none", "checks"), study.inverse
+    if check is not None:
+        plain = check.uncompensated_error
+        against = "" if plain is None else f"; static map: {percent(plain)}"
+        note = f"{check.model}, error on the model itself{against}"
+        inverse = Tile("Inverse", percent(check.error), note, "checks")
+    gaps = [words.gap_name(gap) for gap in study.data_gaps]
+    listed = ", ".join(gaps[:3]) + " ..." * (len(gaps) > 3)
+    return loop, model, inverse, Tile("Data gaps", str(len(gaps)), listed, "recordings")
+
+
+def _share(study: Study) -> str:
+    """Return the chosen model's error over the range of what it is tested on."""
+    check = study.check
+    if check is None or isinstance(check, str) or len(check.outputs) > 1:
+        return ""
+    return percent(check.outputs[0].rmse / check.outputs[0].span) if check.outputs[0].span else ""
+
+
+def loops(found: Mapping[str, Tracked]) -> list[Item]:
+    """Return how controllers followed a reference."""
+    rows = [
+        [
+            name,
+            output,
+            one.rmse[output],
+            one.largest[output],
+            one.recording.units.get(output) or "–",
+            one.clipped,
+        ]
+        for output in next(iter(found.values())).rmse
+        for name, one in found.items()
+    ]
+    return [Table(["Controller", "Output", "RMSE", "Largest", "Unit", "Samples clipped"], rows)]
+
+
+def tracked(found: Tracked) -> list[Item]:
+    """Return how a controller followed a reference."""
+    return loops({"achieved": found})
+
+
+def tracking(found: Tracking) -> list[Item]:
+    """Return how a reference was followed, with and without compensation."""
+    ways = {found.law: found.tracked, "no compensation": found.uncompensated.tracked}
+    items: list[Item] = [Text(found.notes, "note", listed=True) if found.notes else None]
+    items += loops({name: one for name, one in ways.items() if one is not None})
+    return [*items, Text(words.tracked(found))]
+
+
+# --- Checks and reviews -----------------------------------------------------------------------------
+
+
+def check(found: Validation) -> list[Item]:
+    """Return whether a model is right, and what it misses."""
+    items: list[Item] = [Text([words.check_verdict(found)])]
+    for one in found.outputs:
+        items += [Text([one.output], "lead")] * (len(found.outputs) > 1) + checked(one)
+    untested = f"Too short to be tested: {', '.join(found.untested)}"
+    return [*items, Text([untested]) if found.untested else None]
+
+
+def checked(one: OutputCheck) -> list[Item]:
+    """Return what a residual follows, with its means over each, and all tests."""
+    share, missing, tests = "Share of the variance [%]", [], []
+    for each in one.missing:
+        p = words.probability(each.p_value)
+        missing.append([words.missed(one, each), 100 * each.share, each.size, p])
+    for each in one.suspects:
+        p = words.probability(each.p_value)
+        tests.append([words.missed(one, each), 100 * each.share, p])
+    panels = [interactive.plots(model_subjects.pattern(one, each))[0] for each in one.patterns]
+    caption = f"Mean residual of {one.output}, with 95 % intervals that allow for autocorrelation."
+    return [
+        Text(words.check_notes(one)),
+        Table(["Missed", share, f"RMS [{one.unit}]", "p"], missing) if missing else None,
+        Figure(f"patterns {one.output}", [panels], caption, caption, columns=2) if panels else None,
+        Table(["Test", share, "p"], tests, summary="All tests") if tests else None,
+    ]
+
+
+def review(found: Review, points: int = POINTS) -> list[Item]:
+    """Return what a log's review found, and the parts of the error over time."""
+    figures = [
+        Figure(
+            f"review {one.output}",
+            [interactive.plots(model_subjects.parts(one, points))],
+            f"Reference, measured motion, and parts of the error of {one.output}",
+            "The parts add up to the error: model, pressure (measured less commanded), command.",
+            "stacked",
+        )
+        for one in found.outputs
+    ]
+    return [Text(words.reviewed(found), listed=True), *figures]
+
+
+def calibration(found: Calibration) -> list[Item]:
+    """Return what bands rest on, and how wide they are on average in cross-validation."""
+    band, n = found.band, found.band.units
+    said = f"Calibrated on {n} {band.unit}s, which allow levels up to {percent(n / (n + 1), 3)}."
+    rows = [
+        [channel.name, percent(band.level, 3), width, channel.unit, percent(ratio)]
+        for channel, width, ratio in zip(band.given, found.widths, found.over_constant, strict=True)
+    ]
+    headings = ["Output", "Level", "Width of its band", "Unit", "Of one of constant width"]
+    return [Text([said]), Table(headings, rows)]
+
+
+# --- Papers, rigs and devices -----------------------------------------------------------------------
+
+
+def papers(found: Mapping[str, Paper]) -> list[Item]:
+    """Return what papers are about."""
+    rows = [[str(one.number), name, f"{one.title}. {one.question}"] for name, one in found.items()]
+    return [Table(["", "Paper", "What it asks"], rows)]
+
+
+def rig(found: Rig) -> list[Item]:
+    """Return what a rig is, and between which limits it is driven."""
+    limits = {name: found.limits(name) for name in found.inputs}
+    rows = [[name, f"{numeral(one.low)} to {numeral(one.high)}"] for name, one in limits.items()]
+    rows += [[name, "output"] for name in found.outputs if name not in limits]
+    said = f"Virtual: a simulation, a sample every {numeral(found.sample_time)} s."
+    return [Text([*filter(None, (said, found.source))]), Table(["Channel", "Limits"], rows)]
+
+
+def rigs(found: Mapping[str, Any]) -> list[Item]:
+    """Return the rigs, protocols and signals."""
+    return [
+        Table(
+            ["Rig", "What it is", "Driven by", "Measures"],
+            [
+                [name, one["title"], ", ".join(one["inputs"]), ", ".join(one["outputs"])]
+                for name, one in found["rigs"].items()
+            ],
+        ),
+        Table(
+            ["Protocol", "Runs", "Rig"],
+            [[name, one["runs"], one["rig"]] for name, one in found["protocols"].items()],
+        ),
+        Table(
+            ["Signal (--signal NAME:SETTING=VALUE,...)", "Settings"],
+            [
+                [name, ", ".join(f"{key} ({kind})" for key, kind in settings.items())]
+                for name, settings in found["signals"].items()
+            ],
+        ),
+    ]
+
+
+def device(found: Driven) -> list[Item]:
+    """Return what a device is, its ports, and what it did."""
+    one = found.device
+
+    def state(when: str, now: State) -> str:
+        return f"{when}: {'safe' if now.is_safe else 'driven'} after {now.steps} steps."
+
+    states = [found.before] if found.after is None else [found.before, found.after]
+    ports = [("input", p) for p in one.inputs] + [("output", p) for p in one.outputs]
+    values = [[*now.inputs.tolist(), *now.outputs.tolist()] for now in states]
+    rows = [
+        [
+            kind,
+            p.name,
+            p.unit,
+            p.low,
+            p.high,
+            p.safe if kind == "output" else "",
+            *(v[k] for v in values),
+        ]
+        for k, (kind, p) in enumerate(ports)
+    ]
+    whens = ["before", "after"][: len(states)]
+    about = (
+        f"Model {one.fingerprint}: a step every {one.period:g} s, safe after "
+        f"{one.period * one.silence:g} s of silence."
+    )
+    return [
+        Text([about, *map(state, ("Before", "After"), states)]),
+        Table(["", "Channel", "Unit", "Lowest", "Highest", "Safe", *whens], rows),
+    ]
+
+
+FACES: Mapping[str, Callable[[Any], list[Item]]] = MappingProxyType(
+    {
+        "block": block,
+        "characterization": characterization,
+        "leaderboard": leaderboard,
+        "recording": recording,
+        "review": review,
+        "rig": rig,
+        "study": study,
+        "tracked": tracked,
+        "validation": check,
+    }
+)
+"""Name of a thing that shows itself -> what is shown of it."""

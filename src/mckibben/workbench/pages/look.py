@@ -283,7 +283,11 @@ def _planned(state: State, inputs: tuple[str, ...]) -> None:
         text = "Plan another" if made else "Plan the next recording"
         mark(widgets.button(text, partial(_ask, state, inputs), "edit_calendar"), "plan")
         if made:
-            download = partial(ui.download.file, made[1], "next-recording.csv")
+            path = made[1]
+
+            def download() -> None:
+                ui.download.content(path.read_bytes(), path.name, "text/csv")
+
             mark(widgets.button("Download its commands (CSV)", download, "download"), "commands")
 
 

@@ -150,13 +150,13 @@ def _coupling(state: State, used: list[Recording], sides: Channels, pair: Pair) 
 
 
 def _figure(state: State, recordings: list[Recording], sides: Channels, pair: Pair) -> None:
-    from mckibben.report.coupling_subjects import loop_by, third_channels
+    from mckibben.report.coupling_subjects import loop_by
     from mckibben.report.figures import draw
 
     given, wanted = pair
-    free = [
-        name for name in third_channels(recordings[0], pair) if all(name in r for r in recordings)
-    ]
+    shared = [n for n in recordings[0].channels if all(n in run for run in recordings)]
+    values = {n: np.concatenate([run[n] for run in recordings]) for n in shared if n not in pair}
+    free = [name for name, all_of_it in values.items() if np.ptp(all_of_it) > 0]
     by = state.chosen.get("look.by", "")
     by = by if by in free else ""
     kind = state.chosen.get("look.view", "loop")

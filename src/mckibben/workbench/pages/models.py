@@ -212,7 +212,9 @@ def _board(state: State, sides: Channels, results: list[Json]) -> None:
             heads = ["Model", *(one.label for one in shown)]
             widgets.table(heads, rows, chosen=chosen, on_choose=lambda at: _pick(state, names[at]))
             if first["current"] and (mean := first.get("constant")):
-                errors = ", ".join(f"{one.label} {typeset(one.text(mean))}" for one in shown)
+                errors = ", ".join(
+                    f"{one.heading} {typeset(one.text(mean))} {one.unit}" for one in shown
+                )
                 ui.label(f"To be beaten: the mean of the output, {errors}.").classes("muted")
             if why := modelling.against(results):
                 mark(_warning(why), "not-recommended")

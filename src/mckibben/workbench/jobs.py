@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import time
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
-from mckibben.errors import MckibbenError, unforeseen
+from mckibben.errors import MckibbenError, MckibbenWarning, unforeseen
 from mckibben.system.threads import cores
 from mckibben.system.workers import context, end_with_parent, prepare
 from mckibben.workbench.steps import Plain, Text
@@ -233,6 +234,7 @@ def _run(folder: str, name: str, title: str, work: Work, given: dict[str, Any], 
             last = now
             pipe.send((now - started, float(share), what))
 
+    warnings.simplefilter("ignore", MckibbenWarning)  # results have notes
     workspace = Workspace(folder)
     job = Job(name, work.__name__, title, given)
     try:

@@ -252,7 +252,7 @@ def fit(
 def calibrate(workspace: Workspace, tell: Tell, *, name: str) -> str:
     """Give a model the band that its errors on the test recordings ask for."""
     from mckibben.diagnosis.bands import calibration
-    from mckibben.report.words import calibrated
+    from mckibben.report import results, text
 
     tests = workspace.with_role("test")
     if not tests:
@@ -263,7 +263,7 @@ def calibrate(workspace: Workspace, tell: Tell, *, name: str) -> str:
     train = workspace.with_role("train")
     banded, found = calibration(workspace.model(name), tests, "auto", train, tell)
     banded.save(workspace.path("banded", f"{name}.json"))
-    said = calibrated(found)
+    said = [*text.lines(results.calibration(found)[:1])]
     _add(workspace, name, calibrated=said)
     return " ".join(said)
 

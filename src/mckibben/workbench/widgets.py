@@ -6,11 +6,12 @@ report's style sheet, light or dark. Pages use these parts, and no colours or si
 
 from __future__ import annotations
 
+import inspect
 import re
 import traceback
 from collections.abc import Awaitable, Callable, Iterator, Sequence
-from contextlib import contextmanager
-from functools import cache, wraps
+from contextlib import contextmanager, nullcontext
+from functools import cache, partial, wraps
 from importlib import resources
 from typing import Any
 
@@ -18,7 +19,10 @@ import numpy as np
 from nicegui import binding, events, ui
 
 from mckibben.errors import MckibbenError, unforeseen
+from mckibben.numerals import typeset, typeset_within
 from mckibben.report import interactive
+from mckibben.report.builder import Figure, Item, Table, Text
+from mckibben.report.builder import cell as as_text
 from mckibben.report.drawing import Drawing
 from mckibben.workbench.steps import LARGEST
 from mckibben.workbench.terms import said
@@ -146,7 +150,7 @@ def guarded(action: Callable[..., Any]) -> Callable[..., Awaitable[None]]:
     async def act(*given: Any) -> None:
         try:
             found = action(*given)
-            if isinstance(found, Awaitable):
+            if inspect.iscoroutine(found):
                 await found
         except MckibbenError as error:
             error_toast(error)
@@ -304,5 +308,29 @@ def _cell(cell: Any) -> None:
         if callable(cell):
             cell()
         else:
-            shown = f"{cell:.3g}" if isinstance(cell, float) else "" if cell is None else str(cell)
-            ui.label(shown)
+            ui.label(typeset(as_text(cell)) if number else as_text(cell))
+
+
+def items(found: Sequence[Item]) -> None:
+    """Show what is shown of a result everywhere (`mckibben.report.results`); tables may be folded."""
+    for item in filter(None, found):
+        if isinstance(item, Text):
+            for sentence in item.sentences:
+                ui.label(typeset_within(said(sentence))).classes("muted" if item.style else "")
+        elif isinstance(item, Table):
+            with details(item.summary) if item.summary else nullcontext():
+                titles = item.titles or [""] * len(item.rows)
+                rows = [
+                    [partial(_titled, as_text(line[0]), title), *line[1:]]
+                    for line, title in zip(item.rows, titles, strict=True)
+                ]
+                table(item.headings, rows)
+        elif isinstance(item, Figure):
+            for figure in item.plots[0]:
+                plot_of(figure)
+
+
+def _titled(text: str, title: str) -> None:
+    label = ui.label(text)
+    if title:
+        label.tooltip(title)

@@ -24,8 +24,8 @@ ICON = "insights"
 DRAWN = 3
 """Recordings that are drawn at first."""
 
-SAID, GAPS = 4, 3
-"""Sentences, and data gaps, that are shown before a fold-out."""
+GAPS = 3
+"""Data gaps that are shown before a fold-out."""
 
 VIEWS = {"loop": "Loop", "time": "Over time"}
 
@@ -85,7 +85,7 @@ def content(state: State) -> None:
 
 def _pairs(recordings: list[Recording], sides: Channels) -> list[Pair]:
     """Return what every output is drawn over, and the output."""
-    from mckibben.report.coupling_subjects import coupling
+    from mckibben.diagnosis.coupling import coupling
 
     return list(coupling(recordings, sides.inputs, sides.outputs).pairs(recordings))
 
@@ -116,7 +116,7 @@ def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> N
 
 def _coupling(state: State, used: list[Recording], sides: Channels, pair: Pair) -> None:
     """Show how far every input moves every output; a click shows their loop."""
-    from mckibben.report.coupling_subjects import coupling
+    from mckibben.diagnosis.coupling import coupling
 
     found = coupling(used, sides.inputs, sides.outputs)
 
@@ -150,8 +150,8 @@ def _coupling(state: State, used: list[Recording], sides: Channels, pair: Pair) 
 
 
 def _figure(state: State, recordings: list[Recording], sides: Channels, pair: Pair) -> None:
-    from mckibben.report.coupling_subjects import loop_by
     from mckibben.report.figures import draw
+    from mckibben.report.subjects import loop_by
 
     given, wanted = pair
     shared = [n for n in recordings[0].channels if all(n in run for run in recordings)]
@@ -200,27 +200,13 @@ def _figure(state: State, recordings: list[Recording], sides: Channels, pair: Pa
 def _words(state: State, sides: Channels, pair: Pair) -> None:
     """Show what the muscle does: a few sentences, and all numbers behind a fold-out."""
     from mckibben.diagnosis.characterization import Characterization, characterize
-    from mckibben.report.words import characterization_rows, characterization_sentences
+    from mckibben.report.results import characterization
 
     used, (given, wanted) = list(state.workspace.used().values()), pair
     beside = [name for name in (*sides.inputs, *(sides.scheduling or ())) if name != given]
 
-    def cells(row: Any) -> list[Any]:
-        name, value, limits, unit, meaning = row
-        shown = number(value) if isinstance(value, float) else str(value)
-        interval = " to ".join(map(number, limits or ()))
-        return [lambda: ui.label(name).tooltip(meaning), shown, interval, unit]
-
     def show(found: Characterization) -> None:
-        sentences = [typeset_within(said(one)) for one in characterization_sentences(found)]
-        for sentence in sentences[:SAID]:
-            ui.label(sentence)
-        with widgets.details("More, and all numbers with intervals") as more:
-            for sentence in sentences[SAID:]:
-                ui.label(sentence)
-            rows = [cells(row) for row in characterization_rows(found) if row[1] is not None]
-            widgets.table(["Quantity", "Value", "95 % interval", "Unit"], rows)
-        mark(more, "numbers")
+        widgets.items(characterization(found))
 
     what = f": {wanted}" if len(sides.outputs) > 1 else ""
     with widgets.card(f"What the muscle does{what}") as card:

@@ -433,7 +433,7 @@ def _drawn(state: State, tab: str, sides: Channels, runs: Mapping[str, Part], ro
             )
             mark(ui.label(typeset_within(text)), "closer-band")
             for sentence in row.get("calibrated", ()):
-                ui.label(typeset_within(sentence)).classes("muted")
+                ui.label(typeset_within(said(sentence))).classes("muted")
             _calibrate_button(state, "Calibrate again")
 
     later(("free", *map(str, key)), free, show, height=HEIGHT)
@@ -441,7 +441,7 @@ def _drawn(state: State, tab: str, sides: Channels, runs: Mapping[str, Part], ro
 
 def _driving(sides: Channels, block: Block, run: Recording, wanted: str) -> str:
     """Return what an output is drawn over."""
-    from mckibben.report.coupling_subjects import coupling
+    from mckibben.diagnosis.coupling import coupling
 
     named = [channel.name for channel in block.inputs]
     inputs = [name for name in sides.inputs if name in named] or named[:1]
@@ -458,12 +458,8 @@ def _figures_of(
 ) -> list[Json]:
     from mckibben.report import interactive, subjects
 
-    if tab == "loop":
-        drawing = subjects.fit_loops(run, given, wanted, modelled)
-    elif tab == "time":
-        drawing = subjects.fit_over_time(run, wanted, modelled, tested)
-    else:
-        drawing = subjects.residuals(run, given, wanted, modelled, tested)
+    kind = {"loop": "loops", "time": "fit"}.get(tab, "residuals")
+    drawing = subjects.against(kind, run, (given, wanted), modelled, tested)
     return interactive.plots(drawing)[-1 if tab == "band" else 0 :]
 
 

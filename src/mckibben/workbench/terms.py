@@ -12,6 +12,8 @@ GAPS = {
 """What can be done about gaps."""
 
 CONTROLS = {
+    "approach": "the field Approach",
+    "controller": "the field Controllers",
     "allow_shared": "“Allow the same data in training and test”",
     "calibration": "gain and offset",
     "columns": "the field Channel",
@@ -26,9 +28,14 @@ CONTROLS = {
     "output": "the field Outputs",
     "outputs": "the field Outputs",
     "rate": "the field Samples per second",
+    "plant": "the field Tried on",
+    "preview": "the field Preview",
     "raw": "“Codes and counters as measured”",
     "resample": "“Resample”",
+    "reference": "the motion",
     "rest_length": "the field Rest length",
+    "sample_time": "the field Sample time",
+    "slew": "the field Slew",
     "test": "a test recording",
     "units": "the field Unit",
     "zero": "“Zero”",

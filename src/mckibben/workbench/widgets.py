@@ -13,10 +13,11 @@ from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import cache, partial, wraps
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from nicegui import binding, events, ui
+from nicegui import binding, context, events, run, ui
 
 from mckibben.errors import MckibbenError, unforeseen
 from mckibben.numerals import typeset, typeset_within
@@ -208,6 +209,13 @@ def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endi
         on_rejected=lambda: error_toast(f"A file has more than {LARGEST // 2**20} MiB"),
     )
     return found.props(f'flat accept="{endings}"').classes("upload")
+
+
+async def download(path: Path) -> None:
+    """Hand a file over to the browser, through the page's own connection."""
+    client = context.client  # what was clicked may be built again meanwhile
+    content = await run.io_bound(path.read_bytes)
+    client.download(content or b"", path.name)
 
 
 # -- what is shown -----------------------------------------------------------------------------------

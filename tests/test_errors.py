@@ -14,7 +14,7 @@ import pytest
 
 import mckibben
 from mckibben import errors
-from mckibben.app.fields import said
+from mckibben.app.terms import said
 from mckibben.cli.main import app
 from mckibben.cli.parameters import COMMANDS, Command, as_command, as_flag
 from mckibben.errors import KernelError, MckibbenError, ModelError, rendered

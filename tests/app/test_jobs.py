@@ -1,4 +1,4 @@
-"""Jobs run in processes of their own, can be cancelled, and lose nothing that was finished."""
+"""Jobs: a process each; what is finished is in the folder, whatever happens to the server."""
 
 from __future__ import annotations
 
@@ -7,111 +7,116 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from mckibben.app.jobs import Jobs
+from mckibben import example
+from mckibben.app.jobs import CANCELLED, DONE, FAILED, INTERRUPTED, RUNNING, WAITING, Jobs
 from mckibben.app.workspace import Workspace
-from tests.app.simulated import asked, filled
-
-pytestmark = pytest.mark.long
-
-PATIENCE = 120.0
+from tests.app import work
 
 
-def wait(jobs: Jobs) -> None:
-    until = time.monotonic() + PATIENCE
-    while jobs.active():
-        assert time.monotonic() < until, "the jobs do not end"
-        jobs.poll()
+def holds(true: Callable[[], object], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it is never so"
         time.sleep(0.05)
 
 
-def test_cancelled_at_once_and_restarted(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
+def finished(jobs: Jobs) -> bool:
+    jobs.poll()
+    return not jobs.active()
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return Workspace(tmp_path)
+
+
+def test_a_job_reports_and_leaves_its_result(workspace: Workspace) -> None:
+    jobs = Jobs(workspace)
+    job = jobs.submit(work.count, "counting", to=3)
+    assert jobs.submit(work.count, "counting", to=3) is job  # the same is not done twice
+    holds(lambda: finished(jobs))
+    assert (job.state, job.message, job.kind) == (DONE, "counted to 3", "count")
+    assert job.progress[0][1] == 0.0
+    assert workspace.read("runs", "count-3") == {"to": 3}
+    kept = Jobs(Workspace(workspace.folder)).jobs[job.name]
+    assert (kept.state, kept.message, kept.title) == (DONE, "counted to 3", "counting")
+
+
+def test_errors_are_in_terms_of_controls_and_deaths_are_noticed(workspace: Workspace) -> None:
+    jobs = Jobs(workspace)
+    refused, died = jobs.submit(work.refuse, "refused"), jobs.submit(work.die, "died")
+    holds(lambda: finished(jobs))
+    assert (refused.state, died.state) == (FAILED, FAILED)
+    assert "“Split there”" in refused.message
+    assert died.message
+
+
+def test_jobs_wait_for_their_turn_and_can_be_cancelled(workspace: Workspace) -> None:
     jobs = Jobs(workspace, at_once=1)
-    slow = jobs.submit("fit", asked("gpi", "slow", n_starts=5000))
-    waiting = jobs.submit("fit", asked("pi", "quick"))
-    while slow.state != "running":
-        jobs.poll()
-    started = time.monotonic()
-    jobs.cancel(slow.name)
-    assert time.monotonic() - started < 3.0
-    assert slow.state == "cancelled"
-    wait(jobs)
-    assert waiting.state == "done"
-    assert workspace.models() == ["quick"]
-    jobs.forget(slow.name)
-    assert slow.name not in Jobs(workspace).jobs
+    first, second = (jobs.submit(work.sleep, word, mark=word) for word in ("one", "two"))
+    holds(lambda: workspace.read("runs", "one"))
+    assert (first.state, second.state) == (RUNNING, WAITING)
+    jobs.cancel(first.name)
+    assert (first.state, second.state) == (CANCELLED, RUNNING)
+    jobs.cancel(second.name)
+    jobs.forget(second.name)
+    assert list(Jobs(workspace).jobs) == [first.name]
 
 
-SCRIPT = """
+SERVER = """
 import sys, time
 from mckibben.app.jobs import Jobs
 from mckibben.app.workspace import Workspace
-from tests.app.simulated import asked
-workspace = Workspace(sys.argv[1])
-jobs = Jobs(workspace, at_once=2)
-if __name__ == "__main__":
-    for number in range(6):
-        jobs.submit("fit", asked("pi", f"m{number}", n_operators=5 + number))
-    print("ready", flush=True)
-    while jobs.active():
-        jobs.poll()
-        time.sleep(0.02)
-    time.sleep(60)
+from tests.app import work
+jobs = Jobs(Workspace(sys.argv[1]))
+jobs.submit(work.count, "count", to=1)
+while jobs.active():
+    jobs.poll(); time.sleep(0.05)
+jobs.submit(work.sleep, "sleep", mark="asleep")
+time.sleep(600)
 """
 
 
-def killed(folder: Path, after: float, finished: int = 0) -> None:
-    """Start a batch of fits, and kill the workbench a time after so many have ended."""
-    script = folder.parent / "batch.py"
-    script.write_text(SCRIPT)
-    process = subprocess.Popen(
-        [sys.executable, str(script), str(folder)],
-        stdout=subprocess.PIPE,
-        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
-    )
-    assert process.stdout is not None
-    process.stdout.readline()
-    until = time.monotonic() + PATIENCE
-    while len(list((folder / "results").glob("*.json"))) < finished and time.monotonic() < until:
-        time.sleep(0.02)
-    time.sleep(after)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    process.stdout.close()
+def test_a_killed_server_loses_nothing_finished_and_leaves_no_process(workspace: Workspace) -> None:
+    server = subprocess.Popen([sys.executable, "-c", SERVER, str(workspace.folder)])
+    try:
+        holds(lambda: workspace.read("runs", "asleep"))
+    finally:
+        os.kill(server.pid, signal.SIGKILL)
+        server.wait()
+    found = {job.kind: job.state for job in Jobs(workspace).jobs.values()}
+    assert found == {"count": DONE, "sleep": INTERRUPTED}
+    assert workspace.read("runs", "count-1") == {"to": 1}
+    pid = (workspace.read("runs", "asleep") or {})["pid"]
+    holds(lambda: not Path(f"/proc/{pid}/cmdline").exists() or not _alive(pid))
 
 
-def check_after_kill(folder: Path) -> int:
-    """Demand that everything finished is there and whole; return how many fits were finished."""
-    workspace = Workspace(folder)
-    jobs = [workspace.read_json("jobs", name) for name in workspace.names("jobs")]
-    done = [job["given"]["name"] for job in jobs if job and job["state"] == "done"]
-    assert None not in jobs
-    for name in {*done, *workspace.names("models")}:
-        assert workspace.model(name).kind == "pi"
-    for name in {*done, *workspace.names("results")}:
-        assert (workspace.read_json("results", name) or {})["test"]["rmse"] > 0
-    assert len(workspace.with_role("train")) == 1
-    reopened = Jobs(workspace)
-    assert {job.state for job in reopened.jobs.values()} <= {"done", "interrupted"}
-    return len(done)
+def _alive(pid: int) -> bool:
+    try:
+        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
 
 
-def test_killed_while_it_fits_it_keeps_what_was_finished(tmp_path: Path) -> None:
-    filled(tmp_path / "ws")
-    killed(tmp_path / "ws", 0.2, finished=3)
-    # of those with a result, one may have been killed before it said so
-    assert check_after_kill(tmp_path / "ws") >= 1
-
-
-def test_jobs_end_with_the_workbench(tmp_path: Path) -> None:
-    folder = tmp_path / "ws"
-    filled(folder)
-    killed(folder, 1.0)
-    time.sleep(2.5)
-    before = sorted(path.name for path in (folder / "results").iterdir())
-    time.sleep(2.0)
-    assert sorted(path.name for path in (folder / "results").iterdir()) == before
+@pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
+def test_a_fit_is_in_the_results(workspace: Workspace) -> None:
+    for path, role in ((example.TRAIN, "train"), (example.TEST, "test")):
+        with workspace.receiving(path.name, path.stat().st_size) as (part, kept):
+            part.write_bytes(path.read_bytes())
+        (name,) = workspace.add(kept.name)
+        workspace.change(name, role=role)
+    jobs = Jobs(workspace)
+    job = jobs.submit(work.fit, "p1", name="poly", model="p1")
+    holds(lambda: finished(jobs), 300.0)
+    assert job.state == DONE, job.message
+    (row,) = workspace.results()
+    assert (row["name"], row["current"]) == ("poly", True)
+    assert workspace.models() == ["poly"]
+    assert workspace.model("poly").outputs[0].name == "displacement"
+    workspace.change(name, role="unused")
+    assert [one["current"] for one in workspace.results()] == [False]

@@ -1,349 +1,187 @@
-"""The workspace keeps whole files, under safe names, inside its folder."""
+"""The folder: recordings as raw files with steps, and what earlier versions wrote."""
 
 from __future__ import annotations
 
 import json
-import os
-import unicodedata
-from collections.abc import Callable
-from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben import DataError, Recording, write
-from mckibben.app import undoing
-from mckibben.app.door import door
-from mckibben.app.kept import Step
+from mckibben.app.steps import LARGEST, Reading, Step
 from mckibben.app.workspace import Workspace
-from mckibben.registry import load
+from mckibben.errors import DataError
+from mckibben.files import write
+from mckibben.recording import Recording
 
-HOSTILE = [
-    "../../etc/passwd",
-    "..",
-    "/etc/passwd",
-    "a/b",
-    "a\\b",
-    "..\\..\\x",
-    ".hidden",
-    "",
-    "nul\0byte",
-    "a\nb",
-    "<script>alert(1)</script>",
-    "x" * 500,
-    "con.json/..",
-]
+N = 200
 
 
-def recording(n: int = 50) -> Recording:
-    t = np.arange(n) * 0.1
-    return Recording({"pressure": 2 + np.sin(t), "displacement": 10 + np.cos(t)}, 0.1)
+def table(n: int = N, *, header: str = "time,pressure,displacement") -> bytes:
+    rows = (f"{k * 0.02:.2f},{1 + k % 50 * 0.1:.3f},{k % 50 * 0.2:.3f}" for k in range(n))
+    return "\n".join([header, *rows, ""]).encode()
 
 
-def inside(workspace: Workspace, path: Path) -> bool:
-    return workspace.folder in path.resolve().parents
+def received(workspace: Workspace, name: str, content: bytes) -> str:
+    with workspace.receiving(name, len(content)) as (part, path):
+        part.write_bytes(content)
+    return path.name
 
 
-@pytest.mark.parametrize("name", HOSTILE)
-def test_no_name_leaves_the_folder(name: str, tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path / "ws")
-    before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(DataError):
-        workspace.path("models", name)
-    chosen = workspace.new_name("models", name)
-    assert inside(workspace, workspace.path("models", f"{chosen}.json"))
-    workspace.give_back("models", chosen)
-    kept = workspace.keep_upload(f"{name}.csv", b"a,b\n1,2\n")
-    assert inside(workspace, kept)
-    assert kept.parent.name == "uploads"
-    assert [path for path in sorted(tmp_path.rglob("*")) if path not in before] == [kept]
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return Workspace(tmp_path / "bench")
 
 
-def test_recordings_come_back_as_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    workspace = Workspace(tmp_path / "ws")
-    given = recording()
-    entry = workspace.add(given, origin="a test", call="read(...)", role="test", name="run 1")
-    assert (entry.name, entry.role) == ("run-1", "test")
-    assert [workspace.add(given, origin="", call="", name="run 1").name for _ in range(2)] == [
-        "run-1-2",
-        "run-1-3",
-    ]
-    again = Workspace(tmp_path / "ws").recording("run-1")
-    for channel in given.channels:
-        np.testing.assert_array_equal(again[channel], given[channel])
-    monkeypatch.setattr("mckibben.app.recordings.LONG", 20)
-    assert workspace.add(given, origin="", call="").path.suffix == ".parquet"
+@pytest.fixture
+def name(workspace: Workspace) -> str:
+    (found,) = workspace.add(received(workspace, "run.csv", table()))
+    return found
 
 
-def test_roles_and_removal(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    workspace.add(recording(), origin="", call="", name="run")
-    assert len(workspace.with_role("train")) == 1
-    workspace.set_role("run", "unused")
-    assert workspace.with_role("train") == []
-    assert workspace.channels() == []
-    workspace.remove("run")
-    assert workspace.entries() == []
-    assert workspace.undo() == "remove run"
-    assert [entry.role for entry in workspace.entries()] == ["unused"]
+@pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
+class TestRecordings:
+    def test_steps_are_undone_one_by_one(self, workspace: Workspace, name: str) -> None:
+        whole = workspace.recording(name)
+        workspace.do(name, Step(do="slice", start=10, stop=110))
+        cut = workspace.recording(name)
+        workspace.do(name, Step(do="resample", sample_time=0.04))
+        assert (len(whole), len(cut)) == (N, 100)
+        assert workspace.recording(name).sample_time == 0.04
+        undone = workspace.undo(name)
+        assert undone is not None
+        assert undone.do == "resample"
+        assert workspace.recording(name) == cut
+        workspace.undo(name)
+        assert workspace.recording(name) == whole
+        assert workspace.undo(name) is None
 
+    def test_its_file_says_all_and_its_code_repeats_it(
+        self, workspace: Workspace, name: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        import mckibben
 
-def test_damaged_files_are_passed_over(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    workspace.add(recording(), origin="", call="", name="good")
-    load("blocks", "pi").example().save(workspace.path("models", "pi.json"))
-    for text in ("", "{", "[]", '{"role": "admin"}', '{"role": "train", "file": "../../x"}'):
-        (tmp_path / "recordings" / "bad.json").write_text(text)
-        (tmp_path / "models" / "bad.json").write_text(text)
-        (tmp_path / "results" / "bad.json").write_text(text)
-        assert [entry.name for entry in workspace.entries()] == ["good"]
-        assert workspace.models() == ["pi"]
-        assert workspace.results() == []
-    workspace.log("first", "call()")
-    with (tmp_path / "log.jsonl").open("a") as file:
-        file.write('{"time": "2026')
-    assert workspace.logged()[-1]["did"] == "first"
+        workspace.change(name, reading=Reading(units={"pressure": "kPa"}))
+        workspace.do(name, Step(do="slice", start=10, stop=110))
+        workspace.do(name, Step(do="low_pass", cutoff=5.0, channels=["pressure"]))
+        again = Workspace(workspace.folder).recording(name)
+        assert again == workspace.recording(name)
+        assert again["pressure"].max() < 0.1
+        monkeypatch.chdir(workspace.folder)
+        repeated = eval(workspace.entry(name).code(), {"mckibben": mckibben})
+        assert all(np.array_equal(repeated[one], again[one]) for one in again.channels)
 
-
-def test_uploads_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    workspace = Workspace(tmp_path)
-    monkeypatch.setattr("mckibben.app.recordings.LARGEST_UPLOAD", 100)
-    for content in (b"x" * 101, b""):
+    def test_a_change_that_cannot_be_leaves_all_as_it_was(
+        self, workspace: Workspace, name: str
+    ) -> None:
+        before = workspace.entry(name)
         with pytest.raises(DataError):
-            workspace.keep_upload("some.csv", content)
-    assert not list((tmp_path / "uploads").iterdir())
+            workspace.do(name, Step(do="low_pass", cutoff=1e9))
+        with pytest.raises(DataError):
+            workspace.change(name, reading=Reading(columns={"pressure": "no such"}))
+        assert workspace.entry(name) == before
+
+    def test_lines_header_encoding_sign_gaps(self, workspace: Workspace) -> None:
+        head = "Prüfstand\na,b,c\nzeit,druck,weg\ns,bar,mm\nx,y,z\n".encode("cp1252")
+        body = table().split(b"\n", 1)[1]
+        rows = body.split(b"\n")
+        upload = received(workspace, "a.csv", head + b"\n".join(rows[:100] + rows[110:]))
+        reading = Reading(header=3, skip=2, encoding="cp1252", gaps="split")
+        reading = reading.model_copy(update={"calibration": {"displacement": (-1.0, 0.0)}})
+        reading = reading.model_copy(update={"units": {"displacement": "mm"}})
+        with pytest.raises(DataError) as refused:
+            workspace.add(upload, reading=reading.model_copy(update={"gaps": "error"}))
+        assert refused.value.row == 106  # of the file as it is
+        names = workspace.add(upload, reading=reading)
+        assert [len(workspace.recording(one)) for one in names] == [100, 90]
+        assert workspace.recording(names[0])["displacement"].min() < -9
+
+    def test_split_rename_remove_restore(self, workspace: Workspace, name: str) -> None:
+        second = workspace.split(name, 120)
+        assert [len(workspace.recording(one)) for one in (name, second)] == [120, 80]
+        assert [workspace.entry(one).role for one in (name, second)] == ["train", "test"]
+        other = workspace.rename(second, "../two words")
+        assert other == "two-words"
+        assert len(workspace.recording(other)) == 80
+        workspace.remove(other)
+        assert [one.name for one in workspace.entries()] == [name]
+        workspace.restore(other)
+        assert len(workspace.recording(other)) == 80
+
+    def test_what_is_damaged_costs_itself_alone(self, workspace: Workspace, name: str) -> None:
+        folder = workspace.folder / "recordings"
+        (folder / "bad.json").write_text('{"role": "train", "steps": [{"do": "exec"}]}')
+        (folder / "worse.json").write_bytes(b"\xff[[[")
+        (folder / "lost.json").write_text('{"role": "train", "upload": "none.csv"}')
+        (folder / "out.json").write_text('{"role": "train", "upload": "../../secret.csv"}')
+        assert list(workspace.used()) == [name]
+        assert workspace.channels() == ["pressure", "displacement"]
+
+    def test_a_folder_of_an_earlier_version_opens(self, workspace: Workspace) -> None:
+        samples = {"pressure": np.linspace(1, 3, N), "displacement": np.linspace(0, 20, N)}
+        read = Recording(samples, 0.02, {"pressure": "bar", "displacement": "mm"})
+        folder = workspace.folder
+        write(read, folder / "recordings" / "old.csv")
+        write(read.slice(10, 60), folder / "recordings" / "old.2.csv")
+        described = {
+            "role": "test",
+            "origin": "file old.csv",
+            "call": "mckibben.read('/elsewhere/uploads/old.csv')",
+            "file": "old.2.csv",
+            "base": "old.csv",
+            "notes": ["an earlier note"],
+            "upload": "old.csv",
+            "part": 0,
+            "reading": {"calibration": {"pressure": [2.0, 0.5]}},
+            "steps": [{"do": "slice", "start": 10, "stop": 60}],
+        }
+        (folder / "recordings" / "old.json").write_text(json.dumps(described))
+        plain = described | {"file": "old.csv", "base": "", "upload": "", "steps": []}
+        (folder / "recordings" / "plain.json").write_text(json.dumps(plain))
+        (folder / "history" / "recordings.json").write_text('{"done": [], "undone": []}')
+        found = workspace.recording("old")
+        part = read.slice(10, 60)
+        assert all(np.array_equal(found[one], part[one]) for one in part.channels)
+        assert (found.start_time, found.units) == (part.start_time, part.units)
+        assert workspace.entry("old").role == "test"
+        assert len(workspace.recording("plain")) == N
+        workspace.undo("old")
+        assert len(workspace.recording("old")) == N
 
 
-def test_a_place_that_cannot_be_a_workspace_is_named(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(DataError, match="file"):
-        Workspace(tmp_path / "file")
+class TestFiles:
+    @pytest.mark.parametrize(
+        ("given", "kept"),
+        [
+            ("../../etc/pass wd.csv", "pass-wd.csv"),
+            ("C:\\data\\con.CSV", "upload-con.csv"),
+            ("..csv", "upload.csv"),
+            ("<script>.csv", "script.csv"),
+        ],
+    )
+    def test_names_are_made_safe(self, workspace: Workspace, given: str, kept: str) -> None:
+        assert received(workspace, given, b"x") == kept
+        assert received(workspace, given, b"x") != kept  # nothing is written over
 
-
-def test_results_are_in_the_order_of_the_choice_and_damaged_ones_are_none(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    for name, status, content in (
-        ("a", "ok", {"test": {"rmse": 2.0}, "validation_rmse": 0.2}),
-        ("b", "ok", {"test": {"rmse": 1.0}, "validation_rmse": 0.3}),
-        ("c", "failed", {}),
-        ("d", "ok", {"test": {"rmse": 0.1}}),
-        ("e", "ok", {"validation_rmse": -5.0}),
-        ("f", "ok", {"test": {"rmse": -5.0}}),
-        ("g", "ok", {"train": {"max_error": -1.0}}),
-    ):
-        workspace.write_json("results", name, {"status": status} | content)
-    assert [row["name"] for row in workspace.results()] == ["a", "b", "d"]
-    assert json.loads((tmp_path / "results" / "a.json").read_text())["test"]["rmse"] == 2.0
-
-
-def test_models_of_recordings_changed_since_are_not_ranked_with_the_others(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    for name in ("one", "two"):
-        workspace.add(recording(), origin="", call="", name=name)
-    before = workspace.data()
-    for name, validated in (("a", 0.2), ("b", 0.3)):
-        content = {"status": "ok", "validation_rmse": validated, "data": before}
-        workspace.write_json("results", name, content)
-    workspace.rename("two", "three")
-    assert workspace.data() == before
-    assert all(row["current"] for row in workspace.results())
-    for change in (
-        lambda: workspace.set_role("one", "test"),
-        lambda: workspace.edit("three", "cut", [Step(do="slice", start=0, stop=20)]),
-        lambda: workspace.remove("one"),
-    ):
-        change()
-        assert workspace.data() != before
-        content = {"status": "ok", "validation_rmse": 0.9, "data": workspace.data()}
-        workspace.write_json("results", "c", content)
-        found = [(row["name"], row["current"]) for row in workspace.results()]
-        assert found == [("c", True), ("a", False), ("b", False)]
-        workspace.undo()
-        assert workspace.data() == before
-
-
-@pytest.mark.parametrize(
-    ("wish", "name"),
-    [
-        ("ünïcode", "ünïcode"),
-        (unicodedata.normalize("NFD", "ü漢字 1"), "ü漢字-1"),
-        ("con", "recording-con"),
-        ("Lpt1", "recording-Lpt1"),
-        ("console", "console"),
-    ],
-)
-def test_names_keep_letters_of_any_script(wish: str, name: str, tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    assert workspace.add(recording(), origin="", call="", name=wish).name == name
-    assert [entry.name for entry in workspace.entries()] == [name]
-    assert len(workspace.recording(name)) == 50
-    assert workspace.keep_upload("a%22quote's%0A.csv", b"1").name == "a-quote-s.csv"
-
-
-def test_files_of_a_person_stay_as_they_are(tmp_path: Path) -> None:
-    (tmp_path / "models" / "sub").mkdir(parents=True)
-    places = ("models/__init__.py", "models/weights.bin.part", "models/sub/a.json")
-    own = [tmp_path / place for place in places]
-    ours = [tmp_path / "models" / ".mckibben-0123.part", tmp_path / "models" / "taken.json"]
-    for path in (*own, *ours):
-        path.write_text("")
-    ours[0].write_text("half")
-    assert Workspace(tmp_path).claim()
-    assert all(path.exists() for path in own)
-    assert not any(path.exists() for path in ours)
-
-
-# -- changes as a whole ----------------------------------------------------------------------
-
-CHANGES: list[Callable[[Workspace], Any]] = [
-    lambda workspace: workspace.rename("a", "b"),
-    lambda workspace: workspace.remove("a"),
-    lambda workspace: workspace.set_role(["a", "keep"], "test"),
-    lambda workspace: workspace.edit(
-        "a", "split", *([Step(do="slice", start=k, stop=k + 25)] for k in (0, 25))
-    ),
-    lambda workspace: workspace.undo(),
-]
-
-
-def filled(folder: Path) -> Workspace:
-    workspace = Workspace(folder)
-    for name in ("a", "c", "keep"):
-        workspace.add(recording(), origin="", call="", name=name)
-    workspace.rename("c", "d")
-    return workspace
-
-
-def standing(folder: Path) -> list[Any]:
-    workspace = Workspace(folder)
-    return [entry.content() | {"name": entry.name} for entry in workspace.entries()]
-
-
-class Killed(BaseException):
-    """The end of a process."""
-
-
-def kill(patch: pytest.MonkeyPatch, after: int) -> None:
-    """End the process after it has renamed and removed so many files."""
-    left = [after]
-
-    def counted(of: Callable[..., Any]) -> Callable[..., Any]:
-        def act(*given: Any, **more: Any) -> Any:
-            left[0] -= 1
-            if left[0] < 0:
-                raise Killed
-            return of(*given, **more)
-
-        return act
-
-    for way in ("replace", "unlink"):
-        patch.setattr(Path, way, counted(getattr(Path, way)))
-
-
-@pytest.mark.parametrize("change", CHANGES)
-def test_a_process_killed_at_any_moment_of_a_change_loses_nothing(
-    change: Callable[[Workspace], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    before = standing(filled(tmp_path / "whole").folder)
-    change(Workspace(tmp_path / "whole"))
-    after = standing(tmp_path / "whole")
-    for moment in count():
-        folder = tmp_path / str(moment)
-        workspace = filled(folder)
-        with monkeypatch.context() as patch:
-            kill(patch, moment)
-            try:
-                change(workspace)
-            except Killed:
-                pass
-            else:
-                break
-        names = {each["name"] for each in standing(folder)}
-        kept = {each["name"] for each in before} & {each["name"] for each in after}
-        assert kept <= names
-        assert names & {"a", "b"} or workspace.history()[0] == "remove a"
-        again = Workspace(folder)
-        assert again.claim()
-        assert standing(folder) in (before, after)
-        while again.undo():
+    @pytest.mark.parametrize(("name", "size"), [("a.exe", 1), ("a.csv", 0), ("a.csv", LARGEST + 1)])
+    def test_no_other_files_are_taken(self, workspace: Workspace, name: str, size: int) -> None:
+        with pytest.raises(DataError), workspace.receiving(name, size):
             pass
-        assert {e.name: len(again.recording(e.name)) for e in again.entries()} == dict.fromkeys(
-            ("a", "c", "keep"), 50
-        )
-    assert moment > 3
+        assert not list((workspace.folder / "uploads").iterdir())
 
+    @pytest.mark.parametrize("name", ["../x", "a/b", ".hidden", "a..b", "", "x" * 90])
+    def test_no_path_leads_out(self, workspace: Workspace, name: str) -> None:
+        with pytest.raises(DataError):
+            workspace.path("models", name)
 
-@pytest.mark.parametrize("change", CHANGES)
-def test_on_a_full_disk_a_change_is_not_begun(
-    change: Callable[[Workspace], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    workspace = filled(tmp_path)
-    before, history = standing(tmp_path), workspace.history()
-    files = sorted((tmp_path / "recordings").iterdir())
-    writing, room = Path.write_text, undoing._text(workspace._history())
+    def test_links_are_refused(self, workspace: Workspace, tmp_path: Path) -> None:
+        (workspace.folder / "models" / "m.json").symlink_to(tmp_path / "elsewhere.json")
+        with pytest.raises(DataError):
+            workspace.path("models", "m.json")
+        assert workspace.names("models") == []
 
-    def full(path: Path, text: str, *given: Any, **more: Any) -> int:
-        if text.startswith(room[:8]):  # the history is what has no room
-            raise OSError(28, "No space left on device")
-        return writing(path, text, *given, **more)
-
-    monkeypatch.setattr(Path, "write_text", full)
-    with pytest.raises(DataError):
-        change(workspace)
-    monkeypatch.undo()
-    assert standing(tmp_path) == before
-    assert workspace.history() == history
-    assert sorted((tmp_path / "recordings").iterdir()) == files
-
-
-def test_undoing_overwrites_no_recording_that_came_meanwhile(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    new = workspace.add(recording(30), origin="a rig", call="", name="c")
-    assert new.name == "c"
-    with pytest.raises(DataError):
-        workspace.undo()
-    assert (len(workspace.recording("c")), len(workspace.recording("d"))) == (30, 50)
-
-
-# -- what is on the disk ---------------------------------------------------------------------
-
-
-def test_results_know_when_samples_change_on_the_disk(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    before = workspace.data()
-    path = workspace.entry("a").path
-    os.utime(path, (0, 0))  # as a copy of the folder
-    assert workspace.data() == Workspace(tmp_path).data() == before
-    other = recording()
-    write(other.with_channels({}, pressure=other["pressure"] + 0.01), path)
-    assert workspace.data() != before
-
-
-def test_a_recording_without_samples_is_listed(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    before = workspace.data()
-    workspace.entry("a").path.unlink()
-    assert "a" in [entry.name for entry in workspace.entries()]
-    assert workspace.data() != before
-    assert list(workspace.used()) == ["d", "keep"]
-    with pytest.raises(DataError, match=r"a\.csv"):
-        workspace.with_role("train")
-    workspace.remove("a")
-    assert len(workspace.with_role("train")) == 2
-
-
-def test_the_page_that_leads_in_goes_with_the_workbench(tmp_path: Path) -> None:
-    folder = tmp_path / "<script>alert(1)<"
-    folder.mkdir()
-    address = "http://127.0.0.1:8750/a-token/"
-    with door(folder, 8750, address) as page:
-        assert page is not None
-        text = page.read_text()
-        assert address in text
-        assert "<script>alert" not in text
-    assert not page.exists()
-    (folder / ".open-8750.html").write_text("of a workbench that was killed")
-    assert Workspace(folder).claim()
-    assert not list(folder.glob(".open-*"))
+    def test_one_server_owns_a_folder(self, workspace: Workspace) -> None:
+        workspace.claim()
+        assert workspace.folder.stat().st_mode & 0o077 == 0
+        with pytest.raises(DataError):
+            Workspace(workspace.folder).claim()

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, PI, Recording
+from mckibben.app import following
 from mckibben.app.workspace import Workspace
 from mckibben.report import page as report
-from tests.app.browsing import SLOW, seen, workbench
+from tests.app.browsing import seen, workbench
 from tests.attacks.browser import HOSTILE, SCRIPTS, watched
 from tests.report.studies_by_hand import measured, renamed, study
 from tests.tools import needs
@@ -80,31 +81,32 @@ def received(folder: Path) -> None:
     workspace = Workspace(folder)
     t = np.arange(200) * 0.1
     given = Recording({"pressure": 2 + np.sin(t), "displacement": 10 + np.cos(t - 0.3)}, 0.1)
-    workspace.add(given, origin=SCRIPTS[0], call=SCRIPTS[3], name="run", notes=SCRIPTS)
+    workspace.add_recording(given.with_meta(notes=SCRIPTS), name="run")
+    (entry,) = workspace.entries()
+    workspace.put(entry.model_copy(update={"origin": SCRIPTS[0], "notes": [*SCRIPTS]}))
     PI.example().save(workspace.path("models", "mine.json"))
+    reference = following.stored(workspace, given.select(["displacement"]))
     for number, text in enumerate(SCRIPTS):
-        workspace.log(text, text)
-        asked = {"title": text, "model": text, "name": text, "call": text, ":x": text}
+        asked = {"title": text, "model": text, "name": text, ":x": text}
         job = {"kind": "fit", "state": "failed", "message": text, "given": asked}
-        workspace.write_json("jobs", f"job-{number}", job)
+        workspace.write("jobs", f"job-{number}", job)
         result = {"status": "ok", "model": text, "settings": {text: text, ":x": text}, ":x": text}
-        workspace.write_json("results", f"result-{number}", result)
+        workspace.write("results", f"result-{number}", result)
         run = {"model": "mine", "rig": text, "controller": text, "rmse": {text: 1.0}}
-        workspace.write_json("runs", f"run-{number}", run)
+        run |= {"reference": f"{reference}.csv", "notes": [text]}
+        workspace.write("runs", f"run-{number}", run)
     for kind in ("jobs", "results", "runs", "recordings", "models"):
         (folder / kind / "<img src=x onerror=alert(1)>.json").write_text("{}")
         (folder / kind / "deep.json").write_text("[" * 100_000)
         (folder / kind / "null.json").write_text("null")
-    with (folder / "log.jsonl").open("ab") as file:
-        file.write(b'null\n3\n\xff\xfe\n{"did": {"a": 1}, "call": []}\n')
 
 
 SHOWN = {
-    "data": "recording-run",
-    "look": "loop-plot",
-    "models": "leaderboard",
+    "data": "recordings",
+    "look": "words",
+    "models": "fits",
     "compensate": "runs",
-    "take": "script",
+    "take": "things",
 }
 """What each tab shows."""
 
@@ -119,13 +121,12 @@ def test_nothing_of_a_received_folder_runs(tmp_path: Path) -> None:
         dialogs.append(dialog.message)
         dialog.dismiss()
 
-    with workbench(tmp_path / "ws") as address, watched(address) as browser:
+    with workbench(tmp_path / "ws") as bench, watched(bench.link) as browser:
         page = browser.page
         page.on("dialog", answer)
         for tab, shown in SHOWN.items():
             seen(page, f"tab-{tab}").click()
             seen(page, shown)
             browser.click_everything(".modebar-btn, [class*=dialog] *")
-            page.get_by_text(SCRIPTS[2]).first.wait_for(state="attached", timeout=SLOW)
         browser.unharmed()
     assert dialogs == []

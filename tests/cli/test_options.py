@@ -42,7 +42,7 @@ HARMLESS = {
 }
 """Strange, and no error."""
 
-OTHERS = {("app", "--port"), ("app", "--host")}
+OTHERS = {("app", "--port")}
 """Of the workbench, which has tests of its own."""
 
 

@@ -32,7 +32,7 @@ LAYERS = (
     {"report"},
     {"measured"},
     {"workflow"},
-    {"app", "workbench"},
+    {"app"},
     {"cli"},
     {"__main__"},
 )

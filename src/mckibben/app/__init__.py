@@ -1,5 +1,1 @@
-"""The workbench: a local web page over a folder of plain files.
-
-It has no logic of its own: whatever it does is a call that the library and the command line offer
-too, and it shows that call.
-"""
+"""The workbench in the browser: data, loops, models, compensation and code over one folder."""

@@ -1,175 +1,109 @@
-"""What a fitted model is used as: itself, a compensator of one kind or another, an estimate of force."""
+"""Controls made from the options of operations, whose dataclasses say what each field is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from mckibben.errors import MckibbenError, ModelError
+from nicegui import ui
 
-if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
-    from mckibben.app.workspace import Workspace
-    from mckibben.blocks.base import Block
-
-FORMS = {
-    "model": "the model itself, as fitted",
-    "inverse": "its compensator: the inverse, exact for this model",
-    "adaptive": "a compensator that learns while it runs",
-    "predictive": "a compensator that looks ahead, for slow valves and limits",
-    "force": "its estimate of force, from motion and pressure",
-    "band": "the model with its band of uncertainty",
-}
-"""What a model is used as, in words."""
-
-COMPENSATORS = ("inverse", "adaptive", "predictive")
-
-SETTINGS = {
-    "adaptive": {"time": "How long it takes to learn [s]"},
-    "predictive": {
-        "rate_limit": "Fastest change of a pressure [bar/s]",
-        "horizon": "Samples it looks ahead",
-    },
-}
-"""Settings of what a model is used as, with what they mean."""
-
-STEP = 0.02
-"""Time between steps, where the model has none of its own [s]."""
-
-DEFAULTS: dict[str, float | None] = {"time": 60.0, "rate_limit": None, "horizon": 20.0}
+from mckibben.app.widgets import mark
+from mckibben.errors import DataError
+from mckibben.options import Option, parsed
 
 
-def inverse_of(block: Block) -> Block:
-    """Return the compensator of a model: its inverse, or of a force in closed form.
-
-    Raises
-    ------
-    ModelError
-        If it has none, or is one already.
-    """
-    from mckibben.blocks.force.feedforward import compensator
-    from mckibben.blocks.inverse import drives
-
-    if drives(block.outputs[0]) or (block.undoing and not drives(block.inputs[0])):
-        raise ModelError("it is a compensator already", remedy="choose the model that it undoes")
-    return compensator(block)
-
-
-def force_of(block: Block) -> Block:
-    """Return what tells a force from what is measured: the model itself where it gives one.
-
-    Raises
-    ------
-    ModelError
-        If the model tells none.
-    """
-    from mckibben.blocks.coupled.load_estimate import load_of
-
-    if all(channel.name.startswith("force") for channel in block.outputs):
-        return block
-    return load_of(block)
-
-
-def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]) -> Block:
-    """Return a model of the workspace as what it is to be used as.
+def fields(
+    kind: type,
+    names: Iterable[str],
+    values: dict[str, Any],
+    changed: Callable[[], Any] | None = None,
+) -> None:
+    """Make a control for each of some options, bound to a value of its name.
 
     Parameters
     ----------
-    workspace : Workspace
-    name : str
-        Of the model.
-    form : str
-        One of `FORMS`.
-    settings : mapping
-        Those of `SETTINGS`; what is None is at its default.
+    kind : type
+        Dataclass of `mckibben.options`.
+    names : iterable of str
+    values : dict
+        Values by name, which the controls read and set; see `given`.
+    changed : callable, optional
+        Called after every change.
+    """
+    hints = get_type_hints(kind, include_extras=True)
+    defaults = kind()
+    for name in names:
+        of, option = _option(hints[name])
+        default = getattr(defaults, name)
+        plain = default is None or isinstance(default, bool | int | float | str)
+        values.setdefault(name, default if plain else "")
+        label = _label(name, of, option)
+        if of is bool:
+            made: Any = ui.switch(label).bind_value(values, name)
+        elif get_origin(of) is Literal:
+            made = ui.select([*get_args(of)], label=label).bind_value(values, name)
+        elif (
+            {int, float} & {of, *get_args(of)} and get_origin(of) is not tuple and not option.parse
+        ):
+            made = ui.number(label).bind_value(values, name)
+        else:
+            made = ui.input(label, placeholder=option.metavar or None).bind_value(values, name)
+        if of is not bool:
+            made.props("dense outlined").classes("option")
+        if changed is not None:
+            made.on_value_change(lambda _: changed())
+        mark(made, f"option-{name}").tooltip(option.help)
+
+
+def given(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what was filled in, as JSON, without what is empty or as it is by default.
 
     Raises
     ------
-    MckibbenError
-        If the model cannot be that, or there is no such model.
+    DataError
+        On a text that is not of the form of its option.
     """
-    if form == "band":
-        return workspace.model(name, "banded")
-    block = workspace.model(name)
-    given = _options(form, settings)
-    match form:
-        case "model":
-            return block
-        case "inverse":
-            return inverse_of(block)
-        case "force":
-            return force_of(block)
-        case "adaptive" | "predictive":
-            from mckibben.workflow import invert
-
-            if form == "predictive" and "horizon" in given:
-                given["horizon"] = int(given["horizon"])
-            return invert(
-                block, adaptive=form == "adaptive", predictive=form == "predictive", **given
-            ).block
-    raise ModelError(
-        f"{form!r:.40} is no use of a model", remedy=f"choose one of {', '.join(FORMS)}"
-    )
-
-
-def _options(form: str, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a use; what is None is at its default."""
-    given = DEFAULTS | {key: value for key, value in settings.items() if value is not None}
-    return {key: v for key in SETTINGS.get(form, ()) if (v := given[key]) is not None}
-
-
-def possible(workspace: Workspace, name: str) -> list[str]:
-    """Return what a model can be used as, of `FORMS`; trying takes a moment."""
-    found = []
-    for form in FORMS:
-        if form == "band" and not workspace.path("banded", f"{name}.json").exists():
-            continue
-        try:
-            block = made(workspace, name, form, {})
-        except MckibbenError:
-            continue
-        if form != "force" or block is not workspace.model(name):
-            found.append(form)
+    hints, defaults = get_type_hints(kind, include_extras=True), kind()
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        of, option = _option(hints[name])
+        default = getattr(defaults, name)
+        if isinstance(value, str) and not isinstance(default, str):
+            value = _parsed(of, option, name, value.strip())
+        elif isinstance(value, float) and int in {of, *get_args(of)}:
+            value = int(value)
+        if value not in (None, "", {}, ()) and value != default:
+            found[name] = value
     return found
 
 
-def written(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]) -> str:
-    """Return the call that gives a model as what it is used as; what makes its file stands before."""
-    from mckibben.blocks.force.feedforward import ForceFeedforward
-
-    options = _options(form, settings)
-    flags = "".join(f" --{key.replace('_', '-')} {value:g}" for key, value in options.items())
-    asked = {
-        "inverse": "",
-        "adaptive": " --adaptive",
-        "predictive": " --predictive",
-        "force": " --for force",
-    }
-    if form == "band":
-        return f"mckibben.load('banded/{name}.json')"
-    if form not in asked:
-        return f"mckibben.load('models/{name}.json')"
-    if form == "inverse" and ForceFeedforward.of(workspace.model(name)) is None:
-        return f"mckibben.load('models/{name}.json').inverse()"
-    made = f"{name}-{form}.json"
-    invert = in_a_shell(f"mckibben invert models/{name}.json{asked[form]}{flags} -o {made}")
-    return f"{invert}\nmckibben.load({made!r})"
+def _option(hint: Any) -> tuple[Any, Option]:
+    of, *more = get_args(hint)
+    return of, next(one for one in more if isinstance(one, Option))
 
 
-def in_python(block: Block, form: str, settings: Mapping[str, Any]) -> list[str]:
-    """Return the lines that make of ``model`` its compensator, ``inverse``."""
-    from mckibben.blocks.force.feedforward import ForceFeedforward
-
-    given = "".join(f", {key}={value:g}" for key, value in _options(form, settings).items())
-    if form == "inverse" and ForceFeedforward.of(block) is None:
-        return ["inverse = model.inverse()"]
-    where, name, asked = {
-        "adaptive": ("adaptive", "adaptive", "(model"),
-        "predictive": ("predictive", "Predictive", "(model.inverse()"),
-        "inverse": ("force.feedforward", "ForceFeedforward", ".of(model"),
-    }[form]
-    return [f"from mckibben.blocks.{where} import {name}", "", f"inverse = {name}{asked}{given})"]
+def _label(name: str, of: Any, option: Option) -> str:
+    """Return the name in words with its unit, or of a switch its help."""
+    if of is bool:
+        return option.help.rstrip(".")
+    unit = re.search(r"\[(s|bar|bar/s|mm or N)\]", option.help)
+    known = unit[0] if unit else "[s]" * (option.metavar in ("S", "SECONDS"))
+    return f"{name.replace('_', ' ').capitalize()} {known}".rstrip()
 
 
-def in_a_shell(command: str) -> str:
-    """Return a command as a comment among calls."""
-    return f"# in a shell: {command}"
+def _parsed(of: Any, option: Option, name: str, text: str) -> Any:
+    if not text:
+        return None
+    kind = next((one for one in (of, *get_args(of)) if get_origin(one) in (tuple, Mapping)), None)
+    if get_origin(kind) is tuple and option.parse is None:
+        try:
+            low, high = (float(word) for word in re.split(r"[\s:,]+", text))
+        except ValueError:
+            problem = f"{text!r:.40} is not two numbers"
+            raise DataError(problem, parameter=name, remedy="write two, such as 0 6") from None
+        return low, high
+    pieces = [parsed(option, piece, name) for piece in re.split(r"[\s,;]+", text)]
+    if all(isinstance(piece, tuple) for piece in pieces) and option.metavar.count("=") == 1:
+        return dict(pieces)
+    return parsed(option, text, name)

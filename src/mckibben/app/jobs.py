@@ -1,342 +1,247 @@
-"""Jobs in the background, each a process of its own, so that any can be cancelled at any time.
+"""Jobs: a queue of functions, each in a process of its own, so that any can be cancelled at any time.
 
-What a job is, and how it went, is a file in the workspace; results are written by the job itself,
-whole or not at all. Killing the workbench ends its jobs, and loses nothing that was finished. Where
-another workbench has the folder, its jobs are shown as they stand, and none is started.
+A job is a function at the top of a module, ``work(workspace, tell, **given) -> str``. It calls an
+operation of `mckibben.workflow`, writes the result into the folder, and returns what to say. As it
+writes by itself, a workbench that is killed loses nothing that was finished. ``given`` is JSON.
 """
 
 from __future__ import annotations
 
 import os
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
-from multiprocessing.process import BaseProcess
-from pathlib import Path
 from typing import Any
 
-from mckibben.app import kept
-from mckibben.app.fields import said
+from pydantic import Field, ValidationError
+
+from mckibben.app.steps import Plain, Text
+from mckibben.app.terms import said
 from mckibben.app.workspace import Workspace
-from mckibben.errors import DataError
-from mckibben.system.ordinary import DESCRIPTION, read_bytes
+from mckibben.errors import MckibbenError, MckibbenWarning, unforeseen
 from mckibben.system.threads import cores
 from mckibben.system.workers import context, end_with_parent, prepare
 
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
 CANCELLED, INTERRUPTED = "cancelled", "interrupted"
-ENDED = (DONE, FAILED, CANCELLED, INTERRUPTED)
 
 KINDNESS = 5
 """Niceness of jobs, so that the page stays quick."""
 
-PLACES = {"fit": "models", "force": "forces", "loop": "runs", "review": "reviews"}
-"""Kinds of jobs whose results have a name, and where."""
+SPACING = 0.2
+"""Least time between two reports of progress [s]."""
 
-UNWRITTEN = 74
-"""What a job leaves with that could not write down how it went; by custom for input and output."""
+Tell = Callable[..., None]
+"""Called with the share done, and words or the least cost so far."""
 
-TELLING = 0.2
-"""Least time between two lines of progress [s]."""
+Work = Callable[..., str]
+
+
+class Note(Plain):
+    """What a folder keeps of a job."""
+
+    kind: Text
+    state: Text
+    message: Text = ""
+    given: dict[str, Any] = Field(default_factory=dict)
 
 
 @dataclass
 class Job:
-    """One job.
+    """A job: what it does, how far it is, how it went.
 
     Parameters
     ----------
     name : str
-        Its name in the workspace.
+        Of its file.
     kind : str
-        What it does; see `mckibben.app.work`.
+        Name of the work, such as ``"fit"``.
+    title : str
+        What a person calls it.
     given : dict
-        Arguments.
-    state : str
-        waiting, running, done, failed, cancelled or interrupted.
+        Arguments of the work.
+    state : {"waiting", "running", "done", "failed", "cancelled", "interrupted"}
     message : str
         How it went.
+    progress : list of (seconds, share, words or cost)
     """
 
     name: str
     kind: str
-    given: dict[str, Any]
+    title: str
+    given: dict[str, Any] = field(default_factory=dict)
     state: str = WAITING
     message: str = ""
-    process: BaseProcess | None = field(default=None, repr=False)
+    progress: list[tuple[float, float, Any]] = field(default_factory=list)
+    work: Work | None = field(default=None, repr=False)
+    process: Any = field(default=None, repr=False)
+    pipe: Any = field(default=None, repr=False)
 
     @property
-    def title(self) -> str:
-        """What it is, in a word or two."""
-        given = self.given
-        return str(given.get("title") or given.get("name") or given.get("model") or self.kind)
+    def active(self) -> bool:
+        """Whether it waits or runs."""
+        return self.state in (WAITING, RUNNING)
 
     @property
-    def said(self) -> str:
-        """How it ended, each word once."""
-        return self.state if self.message in ("", self.state) else f"{self.state}: {self.message}"
-
-
-def _nothing() -> None:
-    """Do nothing, in a process that shows that processes can be started."""
+    def share(self) -> float:
+        """Share done, from 0 to 1."""
+        return self.progress[-1][1] if self.progress else 0.0
 
 
 class Jobs:
-    """The jobs of a workspace.
+    """The jobs of a folder; unfinished ones of an earlier server are interrupted.
 
     Parameters
     ----------
     workspace : Workspace
-        Where they read and write.
     at_once : int, optional
         How many run at the same time; default as many as cores.
     """
 
     def __init__(self, workspace: Workspace, at_once: int | None = None) -> None:
-        self.workspace = workspace
-        self.at_once = at_once or cores()
-        self.untold: list[str] = []
-        """What could not be written down, for the page to tell."""
-        self._seen, self._warmed = -1, False
-        self._asked: list[tuple[str, Job]] = []
-        self.jobs = self._kept()
+        self.workspace, self.at_once = workspace, at_once or cores()
+        self.jobs: dict[str, Job] = {}
+        for name in workspace.names("jobs"):
+            with suppress(ValidationError):
+                note = Note.model_validate(workspace.read("jobs", name))
+                title = str(note.given.get("title") or note.given.get("name") or note.kind)
+                job = Job(name, note.kind, title, note.given, note.state, note.message)
+                if job.active:
+                    job.state, job.message = (
+                        INTERRUPTED,
+                        "the workbench was closed before it was done",
+                    )
+                    _write(workspace, job)
+                self.jobs[name] = job
 
-    def _kept(self) -> dict[str, Job]:
-        found = {}
-        for name in self.workspace.names("jobs"):
-            noted = kept.checked(kept.Noted, self.workspace.read_json("jobs", name))
-            if noted is None:
-                continue
-            given = noted.given.model_dump(exclude_unset=True)
-            job = Job(name, noted.kind, given, noted.state, noted.message)
-            if job.state not in ENDED and not self.workspace.read_only:
-                job.state = INTERRUPTED
-                job.message = "the workbench was closed before it was done"
-                self._note(job)
-            found[name] = job
-        return found
-
-    def submit(self, kind: str, given: dict[str, Any]) -> Job:
-        """Queue a job; where its result has a name, it gets one like that wished for, its own.
-
-        One that is asked for again, on the same recordings, while it waits or runs is not begun
-        twice: it is returned as it is.
+    def submit(self, work: Work, title: str, **given: Any) -> Job:
+        """Queue a job; one that is the same as one that waits or runs is returned instead.
 
         Raises
         ------
         DataError
-            If it cannot be written down.
+            If the folder cannot be written to.
         """
-        asked = self._asked_for(kind, given)
-        for known, job in self._asked:
-            if known == asked and job.state not in ENDED:
+        kind = work.__name__
+        for job in self.active():
+            if (job.kind, job.title, job.given) == (kind, title, given):
                 return job
-        name = self.workspace.new_name("jobs", f"{kind}-{given.get('model', '')}")
-        place = PLACES.get(kind)
-        if place is not None:
-            given = given | {"name": self.workspace.new_name(place, str(given["name"]))}
-        job = Job(name, kind, given)
-        try:
-            self._write(job)
-        except DataError:
-            self._give_back(job)
-            raise
-        self.jobs[name] = job
-        self._asked = [(known, one) for known, one in self._asked if one.state not in ENDED]
-        self._asked.append((asked, job))
+        job = Job(self.workspace.new_name("jobs", f"{kind}-{title}"), kind, title, given, work=work)
+        _write(self.workspace, job)
+        self.jobs[job.name] = job
         self.poll()
         return job
 
-    def _asked_for(self, kind: str, given: dict[str, Any]) -> str:
-        """Return what a job is, the same for the same: what it does, and the recordings there are."""
-        changed = (self.workspace.folder / "recordings").stat().st_mtime_ns
-        return f"{kind} {changed} {sorted(given.items())}"
+    def active(self) -> list[Job]:
+        """Return the jobs that wait or run."""
+        return [job for job in self.jobs.values() if job.active]
 
     def poll(self) -> bool:
-        """Start what can be started and see what has ended; tell whether anything changed."""
+        """Hear what jobs report, and start what can be started; return whether any began or ended."""
         changed = False
-        if self.workspace.read_only:
-            return self._look()
-        for job in list(self.jobs.values()):
-            if job.state == RUNNING and job.process is not None and not job.process.is_alive():
-                self._finish(job)
+        for job in self.active():
+            if job.state == RUNNING and self._hear(job):
                 changed = True
-        running = sum(job.state == RUNNING for job in self.jobs.values())
-        for job in list(self.jobs.values()):
-            if job.state == WAITING and running < self.at_once:
-                self._start(job)
-                running += 1
-                changed = True
+        free = self.at_once - sum(job.state == RUNNING for job in self.active())
+        for job in [job for job in self.active() if job.state == WAITING][: max(free, 0)]:
+            self._start(job)
+            changed = True
         return changed
 
-    def _look(self) -> bool:
-        """See how the jobs of another workbench do."""
-        seen = (self.workspace.folder / "jobs").stat().st_mtime_ns
-        changed, self._seen = seen != self._seen, seen
-        if changed:
-            self.jobs = self._kept()
-        return changed
+    def _hear(self, job: Job) -> bool:
+        ended = (
+            not job.process.is_alive()
+        )  # before the last words are heard, so that none is missed
+        with suppress(EOFError, OSError):
+            while job.pipe.poll():
+                job.progress.append(job.pipe.recv())
+        if ended:
+            note = self.workspace.read("jobs", job.name) or {}
+            job.state, job.message = str(note.get("state")), str(note.get("message", ""))
+            if job.state not in (DONE, FAILED):
+                job.state, job.message = FAILED, "its process ended early; is memory or disk full?"
+                _write(self.workspace, job)
+            job.pipe.close()
+            job.process = job.pipe = None
+        return ended
+
+    def _start(self, job: Job) -> None:
+        prepare()
+        job.pipe, there = context().Pipe(duplex=False)
+        arguments = (str(self.workspace.folder), job.name, job.title, job.work, job.given, there)
+        job.process = context().Process(target=_run, args=arguments, daemon=True)
+        job.process.start()
+        there.close()
+        job.state = RUNNING
 
     def cancel(self, name: str) -> None:
-        """End a job; what it had finished before stays.
-
-        Raises
-        ------
-        DataError
-            If it is another workbench's.
-        """
-        self.workspace.demand()
-        job = self.jobs.get(name)
-        if job is None or job.state in ENDED:
+        """End a job; what it wrote before stays."""
+        job = self.jobs[name]
+        if not job.active:
             return
         if job.process is not None:
             job.process.terminate()
             job.process.join(2.0)
             if job.process.is_alive():
                 job.process.kill()
-        job.state, job.message, job.process = CANCELLED, "", None
-        self._note(job)
-        self._give_back(job)
+            job.pipe.close()
+        job.process = job.pipe = None
+        job.state = CANCELLED
+        _write(self.workspace, job)
         self.poll()
 
     def forget(self, name: str) -> None:
         """Take an ended job off the list."""
-        self.workspace.demand()
-        if name in self.jobs and self.jobs[name].state in ENDED:
+        if not self.jobs[name].active:
             del self.jobs[name]
-            self.workspace.path("jobs", f"{name}.json").unlink(missing_ok=True)
-            self._progress(name).unlink(missing_ok=True)
+            self.workspace.delete("jobs", name)
 
     def close(self) -> None:
         """End all jobs."""
-        for job in self.active() if not self.workspace.read_only else []:
-            self.cancel(job.name)
-
-    def active(self) -> list[Job]:
-        """Return the jobs that wait or run."""
-        return [job for job in self.jobs.values() if job.state not in ENDED]
-
-    def progress(self, name: str) -> list[tuple[float, float, float]]:
-        """Return what a job told: seconds, share done, least cost so far."""
-        try:
-            return kept.progress(read_bytes(self._progress(name), most=DESCRIPTION))
-        except DataError:
-            return []
-
-    def _progress(self, name: str) -> Path:
-        return self.workspace.path("jobs", f"{name}.progress")
-
-    def warm(self) -> None:
-        """Load what processes will need, so that the first job starts at once; it takes seconds."""
-        if not self._warmed and not self.workspace.read_only:
-            self._warmed = True
-            prepare()
-            first = context().Process(target=_nothing, daemon=True)
-            first.start()
-            first.join()
-
-    def _start(self, job: Job) -> None:
-        prepare()
-        job.process = context().Process(
-            target=run,
-            args=(str(self.workspace.folder), job.name, job.kind, job.given),
-            daemon=True,
-        )
-        job.process.start()
-        job.state = RUNNING
-        self._note(job)
-
-    def _finish(self, job: Job) -> None:
-        noted = kept.checked(kept.Noted, self.workspace.read_json("jobs", job.name))
-        code = None if job.process is None else job.process.exitcode
-        job.process = None
-        if noted is not None and noted.state in (DONE, FAILED):
-            job.state, job.message = noted.state, noted.message
-        else:
-            job.state, job.message = FAILED, "the process ended without a word; is memory short?"
-            if code == UNWRITTEN:
-                job.message = "how it went could not be written down; is the disk full?"
-            self._note(job)
-        self._give_back(job)
-        with self._told():
-            self.workspace.log(
-                f"{job.kind} {job.title}: {job.state}. {job.message}",
-                str(job.given.get("call", "")),
-            )
-
-    def _give_back(self, job: Job) -> None:
-        """Free the names of a job that came to nothing."""
-        self.workspace.give_back("jobs", job.name)
-        if job.kind in PLACES:
-            self.workspace.give_back(PLACES[job.kind], str(job.given.get("name")))
-
-    def _note(self, job: Job) -> None:
-        with self._told():
-            self._write(job)
-
-    def _write(self, job: Job) -> None:
-        note(self.workspace, job.name, job.kind, job.given, job.state, job.message)
-
-    @contextmanager
-    def _told(self) -> Iterator[None]:
-        """Keep what could not be written for the page to tell: jobs go on and end without it."""
-        try:
-            yield
-        except DataError as error:
-            self.untold.append(str(error))
+        for job in self.active():
+            if job.process is not None:
+                job.process.terminate()
 
 
-def note(
-    workspace: Workspace, name: str, kind: str, given: dict[str, Any], state: str, message: str
-) -> None:
-    """Write down what a job is and how it went."""
-    content = {"kind": kind, "state": state, "message": message, "given": given}
-    workspace.write_json("jobs", name, content)
+def warm() -> None:
+    """Load what jobs will need, so that the first one starts at once; it takes seconds."""
+    prepare()
+    first = context().Process(target=int, daemon=True)
+    first.start()
+    first.join()
 
 
-def by_name(workspace: Workspace, text: str) -> str:
-    """Return a text in the words of the workbench: recordings by their names, not by their files."""
-    for entry in workspace.entries():
-        for file in (str(entry.path), f"{entry.path.parent.name}/{entry.path.name}"):
-            text = text.replace(file, entry.name)
-    return said(text)
+def _write(workspace: Workspace, job: Job) -> None:
+    given = job.given | {"title": job.title}
+    note = Note(kind=job.kind, state=job.state, message=job.message[:5000], given=given)
+    workspace.write("jobs", job.name, note.model_dump(mode="json"))
 
 
-def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
-    """Do a job; this is what its process runs."""
-    from mckibben.app.work import WORK
-    from mckibben.errors import MckibbenError, unforeseen
-
+def _run(folder: str, name: str, title: str, work: Work, given: dict[str, Any], pipe: Any) -> None:
+    """Do the work; this runs in the job's process."""
     end_with_parent()
     if hasattr(os, "nice"):
         os.nice(KINDNESS)
-    os.umask(0o077)  # what is written is its user's alone
-    workspace = Workspace(folder)
-    held = ExitStack()
-    held.enter_context(workspace.work())
-    path = workspace.path("jobs", f"{name}.progress")
-    started, last = time.monotonic(), -TELLING
+    os.umask(0o077)
+    started, last = time.monotonic(), -SPACING
 
-    def tell(share: float, cost: float) -> None:
+    def tell(share: float, what: str | float = "", *_: Any) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - last >= TELLING or share >= 1.0:
+        if now - last >= SPACING or share >= 1:
             last = now
-            # how far it is can be done without, on a disk that is full
-            with suppress(OSError), path.open("a", encoding="utf-8") as file:
-                file.write(f"{now - started:.2f} {share:.4f} {cost:.6g}\n")
+            pipe.send((now - started, float(share), what))
 
+    warnings.simplefilter("ignore", MckibbenWarning)  # results have notes
+    workspace = Workspace(folder)
+    job = Job(name, work.__name__, title, given)
     try:
-        tell(0.0, float("nan"))
-        message, state = WORK[kind](workspace, given, tell), DONE
+        tell(0.0)
+        job.message, job.state = work(workspace, tell, **given), DONE
     except MckibbenError as error:
-        message, state = str(error), FAILED
-    except Exception as error:  # a job that fails must say so, whatever it did
-        message, state = str(unforeseen(error)), FAILED
-    try:
-        note(workspace, name, kind, given, state, by_name(workspace, message)[: kept.LONGEST])
-    except DataError:
-        sys.exit(UNWRITTEN)
-    held.close()
+        job.message, job.state = said(error), FAILED
+    except Exception as error:
+        job.message, job.state = str(unforeseen(error)), FAILED
+    _write(workspace, job)

@@ -1,254 +1,508 @@
-"""The folder that holds all that was done: recordings, models, and what came of them."""
+"""The folder of a workbench: plain files that any editor opens, and nothing else.
+
+======================= =======================================================================
+``uploads/``            raw files, as they came
+``recordings/N.json``   a recording: raw file, how it is read, role, and the list of steps
+``models/N.json``       a model; ``banded/N.json`` is the same with its band
+``results/N.json``      what came of its fit
+``runs``, ``reviews``,  closed loops, reviews of logs, estimates of force
+``forces``
+``jobs/N.json``         a job and how it went; ``takeaway/`` has what jobs write for the user
+``history/``            recordings that were removed
+======================= =======================================================================
+
+Files are written whole or not at all, names from a browser are made safe, and no path leaves the folder.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+import hashlib
+import json
+import os
+import re
+import threading
+import unicodedata
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from mckibben.app import kept
-from mckibben.app.caching import Cache
-from mckibben.app.changing import Changing
-from mckibben.app.forms import inverse_of
-from mckibben.app.recordings import demand_text
-from mckibben.comparison.choosing import order
-from mckibben.errors import MckibbenError
-from mckibben.numerals import numeral
+from pydantic import Field, ValidationError
 
-if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
-    from mckibben.blocks.bands import Band
+from mckibben.app.steps import (
+    LARGEST,
+    MOST_CELLS,
+    Count,
+    Plain,
+    Reading,
+    Step,
+    Text,
+    applied,
+    read_again,
+    read_file,
+)
+from mckibben.errors import DataError, MckibbenError
+from mckibben.system.atomic import PART, replacing, write_json, written
+from mckibben.system.ordinary import DESCRIPTION, read_bytes
+
+if TYPE_CHECKING:  # loaded when first used, so that the page is there at once
     from mckibben.blocks.base import Block
-    from mckibben.control import Twin
+    from mckibben.recording import Recording
 
-MOST_MODELS = 500
-"""Models held in memory."""
+Role = Literal["train", "test", "unused"]
 
-WEAKER = 1.2
-"""Times the validation RMSE of the model inverted, above which a plant predicts worse."""
+KINDS = (
+    *("uploads", "recordings", "history", "models", "banded", "results", "jobs", "runs"),
+    *("takeaway", "reviews", "forces"),
+)
+
+NAME = re.compile(r"[^\W_][\w.-]{0,79}")
+"""Letters and digits of any script, dots, dashes and underscores."""
+
+DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]", re.IGNORECASE)
+"""Names that no file may have on Windows."""
 
 
-class Workspace(Changing):
-    """Recordings, models, and what came of fits and closed loops, as plain files in a folder.
+class Entry(Plain):
+    """A recording of the folder.
 
-    Parameters, and errors, are those of `mckibben.app.folder.Folder`.
+    Parameters
+    ----------
+    role : {"train", "test", "unused"}
+    origin : str
+        Where it came from, in words.
+    upload : str
+        Raw file among the uploads.
+    part : int
+        Which recording of that file it is.
+    base : str
+        In folders of earlier versions, the file of what was read, among the recordings. It goes before
+        ``upload``, until the recording is read in another way.
+    reading : Reading
+    steps : list of Step
+    """
+
+    name: Text = ""
+    role: Role = "train"
+    origin: Text = ""
+    upload: Text = ""
+    part: Count = 0
+    base: Text = ""
+    file: Text = ""
+    notes: list[Text] = Field(default_factory=list)
+    reading: Reading | None = None
+    steps: list[Step] = Field(default_factory=list)
+
+    @property
+    def way(self) -> Reading:
+        """How it is read."""
+        return self.reading or Reading()
+
+    def code(self) -> str:
+        """Return the Python that reads it and repeats its steps, in the folder.
+
+        Of a text with another header or encoding, with ``steps`` of this package imported.
+        """
+        if self.base:
+            found = f"mckibben.read({f'recordings/{self.base}'!r}, informative=False)[0]"
+        elif self.way.amends:
+            way = self.way.model_dump(exclude_defaults=True)
+            path = f"Path({f'uploads/{self.upload}'!r})"
+            found = f"steps.read_file({path}, steps.Reading(**{way!r}))[{self.part}]"
+        else:
+            words = [f"{name}={value!r}" for name, value in self.way.options().items()]
+            given = ", ".join([repr(f"uploads/{self.upload}"), "informative=False", *words])
+            found = f"mckibben.read({given})[{self.part}]"
+        for step in self.steps:
+            found = step.code(found)
+        return found
+
+
+class Workspace:
+    """Recordings, models and results of a folder.
+
+    Parameters
+    ----------
+    folder : path
+        Made where it is missing.
+
+    Raises
+    ------
+    DataError
+        If it cannot be made or written to, or a folder in it is a link.
     """
 
     def __init__(self, folder: str | Path) -> None:
-        super().__init__(folder)
-        self._models: Cache[Block] = Cache(MOST_MODELS)
-        self._inverses: Cache[bool] = Cache(MOST_MODELS)
-        self._rigs: Cache[list[str]] = Cache(MOST_MODELS)
-        self.ticked: list[str] | None = None  # models to fit, kept for pages that are loaded again
+        self.folder = Path(folder).expanduser().resolve()
+        with written(self.folder):
+            for path in (self.folder, *(self.folder / kind for kind in KINDS)):
+                if path != self.folder and path.is_symlink():
+                    raise DataError("this is a link", file=path, remedy="remove it")
+                path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self._cache: dict[Any, tuple[Any, int]] = {}
+        self._lock = threading.RLock()
 
-    def models(self) -> list[str]:
-        """Return the names of the models that can be loaded."""
-        return [name for name in self.names("models") if self._is_model(name)]
-
-    def _is_model(self, name: str) -> bool:
-        with suppress(MckibbenError):
-            self.model(name)
-            return True
-        return False
-
-    def model(self, name: str, folder: str = "models") -> Block:
-        """Return a model, or one with its band from ``banded``; it is loaded once.
+    def claim(self) -> None:
+        """Become the one server of this folder until this process ends.
 
         Raises
         ------
-        ModelError
-            If it is missing or damaged.
+        DataError
+            If there is another one, or the folder is another user's.
         """
-        from mckibben.blocks.saving import load
+        from filelock import FileLock, Timeout
 
-        path = self.path(folder, f"{name}.json")
+        if os.name == "posix" and self.folder.stat().st_uid != os.getuid():
+            problem = "this folder is another user's"
+            raise DataError(problem, file=self.folder, remedy="give one of your own")
+        self._owner = FileLock(self.folder / ".owner", timeout=0, mode=0o600)
+        with written(self.folder):
+            try:
+                self._owner.acquire()
+            except Timeout:
+                problem = "another workbench has this folder open"
+                raise DataError(problem, file=self.folder, remedy="use or close that") from None
+            self.folder.chmod(0o700)
+        for path in self.folder.glob(f"*/{PART}*.part"):  # of a process that was killed
+            path.unlink(missing_ok=True)
 
-        def make() -> tuple[Block, int]:
-            block = load(path)
-            demand_text(*(c.name + c.unit for c in (*block.inputs, *block.outputs)))
-            return block, 1
+    # -- names and files ---------------------------------------------------------------------
 
-        return self._models.get(path, make)
+    def path(self, kind: str, name: str) -> Path:
+        """Return where a file of a kind is; `DataError` on a name that could lead elsewhere."""
+        if kind not in KINDS or not NAME.fullmatch(name) or ".." in name:
+            remedy = "use letters, digits, dots, dashes and underscores"
+            raise DataError(f"{name!r:.80} cannot be a name here", remedy=remedy)
+        path = self.folder / kind / name
+        if path.is_symlink():
+            raise DataError("this is a link", file=path, remedy="put the file itself there")
+        return path
 
-    def invertible(self, name: str) -> bool:
-        """Tell whether a model has a compensator, and is none itself."""
+    def new_name(self, kind: str, wish: str, ending: str = ".json") -> str:
+        """Return a free name like the one wished for, and reserve it with an empty file."""
+        plain = unicodedata.normalize("NFC", wish)
+        plain = re.sub(r"[^\w-]+", "-", plain).strip("-_")[:40] or kind.rstrip("s")
+        plain = f"{kind.rstrip('s')}-{plain}" if DEVICES.fullmatch(plain) else plain
+        for number in range(1, 100_000):
+            name = plain if number == 1 else f"{plain}-{number}"
+            path = self.folder / kind / f"{name}{ending}"
+            with written(path), suppress(FileExistsError):
+                os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode=0o600))
+                return name
+        raise DataError("there are too many of that name", remedy="give another")
 
-        def make() -> tuple[bool, int]:
-            inverse_of(self.model(name))
-            return True, 1
+    def write(self, kind: str, name: str, content: Mapping[str, Any]) -> None:
+        """Write a JSON file."""
+        write_json(self.path(kind, f"{name}.json"), content)
 
-        with suppress(MckibbenError):
-            return self._inverses.get(self.path("models", f"{name}.json"), make)
-        return False
+    def read(self, kind: str, name: str) -> dict[str, Any] | None:
+        """Return the content of a JSON file; None if it is missing or damaged."""
+        try:
+            found = json.loads(read_bytes(self.path(kind, f"{name}.json"), most=DESCRIPTION))
+        except (DataError, ValueError, RecursionError):
+            return None
+        return found if isinstance(found, dict) else None
 
-    def ranked(self) -> list[str]:
-        """Return the models in the order of the choice.
+    def names(self, kind: str) -> list[str]:
+        """Return the names of the JSON files of a kind; empty files only reserve one."""
+        found = [path for path in (self.folder / kind).glob("*.json") if not path.is_symlink()]
+        plain = [p.stem for p in found if NAME.fullmatch(p.stem) and p.stat().st_size]
+        return sorted(name for name in plain if not name.endswith("-metadata"))
 
-        Those not fitted here come after the rest, and those that are not recommended last.
-        """
-        known = self.models()
-        refused = {row["name"]: bool(row["not_recommended"]) for row in self.results()}
-        names = [
-            *(name for name in refused if name in known),
-            *(n for n in known if n not in refused),
-        ]
-        return sorted(names, key=lambda name: refused.get(name, False))
+    def delete(self, kind: str, name: str) -> None:
+        """Delete a JSON file."""
+        self.path(kind, f"{name}.json").unlink(missing_ok=True)
 
-    def to_invert(self) -> list[str]:
-        """Return the models that have a compensator, in the order of `ranked`."""
-        return [name for name in self.ranked() if self.invertible(name)]
-
-    def band(self, name: str) -> Band | None:
-        """Return the band of a model, or None where it has none."""
-        from mckibben.blocks.bands import Banded
-
-        if self.path("banded", f"{name}.json").exists():
-            with suppress(MckibbenError):
-                block = self.model(name, "banded")
-                return block.band if isinstance(block, Banded) else None
-        return None
-
-    def twin(self, name: str) -> Twin:
-        """Return a model as a plant, with its band where it has one.
-
-        Where it does not know its limits, they are those recorded.
+    @contextmanager
+    def receiving(self, name: str, size: int) -> Iterator[tuple[Path, Path]]:
+        """Give where to write an uploaded file to, and where it then is, under a safe name.
 
         Raises
         ------
-        MckibbenError
-            If it cannot be one.
+        DataError
+            If it is empty, too large, or no file that is read.
         """
-        from mckibben.control import Twin
+        from mckibben.files.formats import READERS
 
-        folder, limits = self.twin_of(name)
-        return Twin(self.model(name, folder), limits=limits, name=name)
+        given = Path(name.replace("\\", "/")).name
+        ending = Path(given).suffix.casefold()
+        if ending not in READERS:
+            raise DataError(
+                f"{given!r:.80} is no file with recordings", remedy=f"give {', '.join(READERS)}"
+            )
+        if not 0 < size <= LARGEST:
+            problem = f"{given!r:.80} is empty, or has more than {LARGEST // 2**20} MiB"
+            raise DataError(problem, remedy="give another file, or use the command line")
+        path = self.path("uploads", self.new_name("uploads", Path(given).stem, ending) + ending)
+        try:
+            with replacing(path) as new:
+                yield new, path
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
 
-    def twin_of(self, name: str) -> tuple[str, dict[str, tuple[float, float]]]:
-        """Return the folder of the model that is a plant, and limits that it does not know itself."""
-        from mckibben.control.identified import known_ranges
+    # -- recordings --------------------------------------------------------------------------
 
-        folder = "banded" if self.path("banded", f"{name}.json").exists() else "models"
-        model, limits = self.model(name, folder), {}
-        for channel in model.inputs:
-            runs = [run[channel.name] for run in self.readable() if channel.name in run]
-            if runs and channel.name not in known_ranges(model):
-                ends = min(float(u.min()) for u in runs), max(float(u.max()) for u in runs)
-                if ends[0] < ends[1]:
-                    limits[channel.name] = ends
-        return folder, limits
+    def entry(self, name: str) -> Entry:
+        """Return a recording's description; `DataError` if it is missing or damaged."""
+        try:
+            found = Entry.model_validate(self.read("recordings", name) or {"role": None})
+        except ValidationError:
+            problem = "its description is missing or damaged"
+            file = self.folder / "recordings" / f"{name}.json"
+            raise DataError(problem, file=file, remedy="import it again") from None
+        return found.model_copy(update={"name": name, "base": found.base or found.file})
 
-    def plants(self, inverted: str) -> list[str]:
-        """Return the models that a model's compensator can be tried on, in the order of the choice.
-
-        Others first, for on its own model a compensator proves nothing; of these, those that predict at
-        all, then as well; then models that know time, for on those that do not, feedback is better than
-        it will be.
-        """
-        idle, weak = self.idle(), self.weaker(inverted)
-        undone = self.model(inverted)
-        inputs, outputs = ({c.name for c in ends} for ends in (undone.inputs, undone.outputs))
+    def entries(self) -> list[Entry]:
+        """Return all recordings whose descriptions can be read, by name."""
         found = []
-        for place, name in enumerate(self.ranked()):
-            with suppress(MckibbenError):
-                twin = self.twin(name)
-                if set(twin.inputs) == inputs and set(twin.outputs) == outputs:
-                    for each in inputs.difference(undone.scheduling):
-                        twin.limits(each)
-                    itself, timed = twin.forward == undone, twin.forward.rate_dependent
-                    doubts = itself, name in idle, name in weak, not timed
-                    found.append((*doubts, place, name))
-        return [name for *_, name in sorted(found)]
-
-    def weaker(self, inverted: str) -> dict[str, str]:
-        """Return the models that predict worse than one that is inverted, and by how much, in words."""
-        rows = {row["name"]: row for row in self.results() if row["validation_rmse"]}
-        ours = rows.get(inverted)
-        return {
-            name: f"{name} predicts worse than {inverted}: its validation RMSE is {_rmse(row)}, not "
-            f"{_rmse(ours)}. Loops on it say little of your muscle."
-            for name, row in rows.items()
-            if ours
-            and (row["unit"], row["data"]) == (ours["unit"], ours["data"])
-            and row["validation_rmse"] > WEAKER * ours["validation_rmse"]
-        }
-
-    def idle(self) -> set[str]:
-        """Return the models that predict no better than a mean where nothing was fitted."""
-        found = set()
-        for row in self.results():
-            least = ((row["constant"] or {}).get("test") or {}).get("rmse")
-            tested = (row["test"] or {}).get("rmse")
-            worse = tested is not None and least is not None and not tested < least
-            if worse or (row["skill_least"] is not None and not row["skill_least"] > 0):
-                found.add(row["name"])
+        for name in self.names("recordings"):
+            with suppress(DataError):
+                found.append(self.entry(name))
         return found
 
-    def test_errors(self) -> dict[str, str]:
-        """Return the test error of every model that has been tested, in words."""
-        tested = [row for row in self.results() if (row["test"] or {}).get("rmse") is not None]
-        return {row["name"]: f"test RMSE {_rmse(row, test=True)}" for row in tested}
+    def put(self, entry: Entry) -> None:
+        """Write a recording's description."""
+        content = entry.model_dump(mode="json", exclude={"name", "file"}, exclude_defaults=True)
+        self.write("recordings", entry.name, {"role": entry.role, **content})
 
-    def same(self, inverted: str, plant: str) -> bool:
-        """Tell whether a plant is the very model that a compensator undoes."""
-        from mckibben.control.suiting import of_itself
+    def raw_path(self, entry: Entry) -> Path:
+        """Return the raw file of a recording."""
+        if entry.base:
+            return self.path("recordings", entry.base)
+        return self.path("uploads", entry.upload)
 
-        return of_itself(self.model(inverted), self.twin(plant))
+    def raw(self, entry: Entry) -> Recording:
+        """Return a recording as it was read, before its steps."""
+        path = self.raw_path(entry)
+        if entry.base:
+            return self.cached(path, "", lambda: read_again(path))
+        key = entry.way.model_dump_json()
+        parts: list[Recording] = self.cached(path, key, lambda: read_file(path, entry.way))
+        if entry.part >= len(parts):
+            problem = f"the file has {len(parts)} recording(s), and this is number {entry.part + 1}"
+            raise DataError(problem, file=path, remedy="remove this recording")
+        return parts[entry.part]
 
-    def cached_rigs(self, model: str, look: Callable[[], list[str]]) -> list[str]:
-        """Return the virtual rigs of a model's size; they are looked for once, as that takes seconds."""
-        return self._rigs.get(self.path("models", f"{model}.json"), lambda: (look(), 1))
+    def recording(self, name: str) -> Recording:
+        """Return a recording after its steps; it is read once. Errors are those of reading."""
+        entry = self.entry(name)
 
-    def warm(self) -> None:
-        """Read what has changed; what is read is then at hand, for pages that must not wait."""
+        def make() -> Recording:
+            return applied(self.raw(entry), entry.steps).with_meta(name=name)
+
+        return self.cached(self.raw_path(entry), self._key(entry), make)
+
+    def _key(self, entry: Entry) -> str:
+        return entry.model_dump_json(include={"name", "reading", "part", "steps"})
+
+    def add(
+        self, upload: str, *, name: str = "", role: Role = "train", reading: Reading | None = None
+    ) -> list[str]:
+        """Add the recordings of an uploaded file, and return their names."""
+        way = reading or Reading()
+        path = self.path("uploads", upload)
+        found = self.cached(path, way.model_dump_json(), lambda: read_file(path, way))
+        names = []
+        for part, one in enumerate(found):
+            chosen = self.new_name("recordings", name or one.name or path.stem)
+            origin = f"file {upload}" + (f", part {part + 1}" if len(found) > 1 else "")
+            self.put(
+                Entry(name=chosen, role=role, origin=origin, upload=upload, part=part, reading=way)
+            )
+            names.append(chosen)
+        return names
+
+    def add_recording(self, recording: Recording, *, name: str, role: Role = "train") -> str:
+        """Add a recording that is in no file, such as of a virtual rig; it becomes a raw file."""
+        from mckibben.files import write
+
+        upload = f"{self.new_name('uploads', name, '.csv')}.csv"
+        write(recording.with_meta(name=name), self.path("uploads", upload))
+        return self.add(upload, name=name, role=role)[0]
+
+    def change(self, name: str, **fields: Any) -> None:
+        """Change fields of a recording, once it is known that it can be read so.
+
+        Raises
+        ------
+        DataError
+            If it cannot; all stays as it was.
+        """
+        with self._lock:
+            before = self.entry(name)
+            fresh = {"base": ""} if "reading" in fields and before.upload else {}
+            after = before.model_copy(update=fresh | fields)
+            if {"reading", "steps", "part"} & fields.keys():
+                applied(self.raw(after), after.steps)
+            self.put(after)
+
+    def read_again(self, name: str, reading: Reading) -> None:
+        """Read a recording's raw file in another way, and do its steps anew; or all stays as it was."""
+        entry = self.entry(name)
+        if entry.upload:
+            self.change(name, reading=reading)
+            return
+        raw = self.raw_path(entry)  # of an earlier version, which had no raw file
+        with self.receiving(raw.name, raw.stat().st_size) as (part, path):
+            part.write_bytes(raw.read_bytes())
+        self.change(name, upload=path.name, base="", part=0, reading=reading)
+
+    def do(self, name: str, step: Step) -> None:
+        """Do one more step to a recording; errors are those of the step."""
+        self.change(name, steps=[*self.entry(name).steps, step])
+
+    def undo(self, name: str) -> Step | None:
+        """Take a recording's last step back, and return it."""
+        *rest, last = [None, *self.entry(name).steps]
+        if last is not None:
+            self.change(name, steps=rest[1:])
+        return last
+
+    def split(self, name: str, at: int) -> str:
+        """Split a recording before a sample, and return the name of the new second part, for testing."""
+        whole, entry = self.recording(name), self.entry(name)
+        parts = [Step(do="slice", start=0, stop=at), Step(do="slice", start=at, stop=len(whole))]
+        applied(whole, parts[1:])
+        self.do(name, parts[0])
+        chosen = self.new_name("recordings", name)
+        steps = [*entry.steps, parts[1]]
+        self.put(entry.model_copy(update={"name": chosen, "role": "test", "steps": steps}))
+        return chosen
+
+    def rename(self, name: str, wish: str) -> str:
+        """Give a recording a name like the one wished for, and return that."""
+        entry = self.entry(name)
+        chosen = self.new_name("recordings", wish)
+        self.put(entry.model_copy(update={"name": chosen}))
+        self.delete("recordings", name)
+        return chosen
+
+    def remove(self, name: str) -> None:
+        """Take a recording out; its raw file stays, and so does its description, in the history."""
+        where = self.path("history", f"recording-{name}.json")
+        self.path("recordings", f"{name}.json").replace(where)
+
+    def restore(self, name: str) -> None:
+        """Bring a removed recording back."""
+        where = self.path("history", f"recording-{name}.json")
+        where.replace(self.path("recordings", f"{self.new_name('recordings', name)}.json"))
+
+    def with_role(self, role: Role) -> list[Recording]:
+        """Return the recordings of a role."""
+        return [self.recording(one.name) for one in self.entries() if one.role == role]
+
+    def used(self) -> dict[str, Recording]:
+        """Return the recordings in use that can be read, by name."""
+        found = {}
         for entry in self.entries():
             with suppress(MckibbenError):
-                self.recording(entry.name)
-        self.data()
-        for name in self.names("models"):
-            self.invertible(name)
+                if entry.role != "unused":
+                    found[entry.name] = self.recording(entry.name)
+        return found
+
+    def channels(self) -> list[str]:
+        """Return the channels that all recordings in use have."""
+        used = list(self.used().values())
+        return (
+            [name for name in used[0].channels if all(name in one for one in used)] if used else []
+        )
+
+    def digest(self) -> str:
+        """Return what changes whenever what is trained or tested on does; see `results`."""
+        told = []
+        for entry in self.entries():
+            if entry.role != "unused":
+                with suppress(MckibbenError):
+                    key = f"digest {self._key(entry)}"
+                    made = partial(_digest, self.recording(entry.name))
+                    told.append(f"{entry.role} {self.cached(self.raw_path(entry), key, made)}")
+        return hashlib.sha256("\n".join(sorted(told)).encode()).hexdigest()[:16]
+
+    # -- models and what came of them ------------------------------------------------------------
+
+    def model(self, name: str, kind: str = "models") -> Block:
+        """Return a model; or with its band, from ``"banded"``. `ModelError` if it is damaged."""
+        from mckibben.blocks.saving import load
+
+        path = self.path(kind, f"{name}.json")
+        return self.cached(path, "", lambda: load(path))
+
+    def models(self) -> list[str]:
+        """Return the models in the order of the leaderboard, then those that were not fitted here."""
+        ranked = [row["name"] for row in self.results()]
+        return [*ranked, *(name for name in self.names("models") if name not in ranked)]
+
+    def save_model(
+        self, name: str, model: Block, result: Mapping[str, Any], banded: Block | None = None
+    ) -> None:
+        """Write a model with what came of its fit, such as a row of a leaderboard as a dict.
+
+        ``result`` also has ``input``, ``output``, ``unit`` and ``data``, the `digest` at its start.
+        """
+        model.save(self.path("models", f"{name}.json"))
+        if banded is not None:
+            banded.save(self.path("banded", f"{name}.json"))
+        self.write("results", name, result)
 
     def results(self) -> list[dict[str, Any]]:
-        """Return what is known of every model fitted, in the order of the choice: not by the test.
+        """Return what came of every fit, best validation first; those on other data come last.
 
-        Those fitted and tested on recordings as they are now come first, and are ``"current"``.
+        Each has ``name``, and ``current``: whether the recordings are still those of the fit.
         """
-        found, data = [], self.data()
+        from mckibben.comparison.choosing import order
+
+        now, found = self.digest(), []
         for name in self.names("results"):
-            result = kept.checked(kept.Fitted, self.read_json("results", name))
-            if result is not None:
-                current = result.data in ("", data)
-                found.append(result.model_dump() | {"name": name, "current": current})
-        return sorted(found, key=_as_in_a_leaderboard)
+            row = self.read("results", name) or {}
+            if row.get("status") == "ok" and (self.folder / "models" / f"{name}.json").is_file():
+                found.append(row | {"name": name, "current": row.get("data", "") in ("", now)})
 
-    def runs(self, model: str) -> dict[str, kept.Followed]:
-        """Return what is known of the closed loops with a model, by their names."""
-        found = {
-            name: kept.checked(kept.Followed, self.read_json("runs", name))
-            for name in self.names("runs")
-        }
-        return {name: run for name, run in found.items() if run is not None and run.model == model}
+        def place(row: dict[str, Any]) -> tuple[Any, ...]:
+            fitted = (row.get("train") or {}).get("rmse")
+            ranks = order(
+                row.get("model", ""), row.get("validation_rmse"), fitted, row.get("skill_least")
+            )
+            return (not row["current"], *ranks)
 
-    def reviews(self) -> dict[str, kept.Reviewed]:
-        """Return what logs of the real rig said, by their names, newest last."""
-        return self._all("reviews", kept.Reviewed)
+        return sorted(found, key=place)
 
-    def estimates(self) -> dict[str, kept.Estimated]:
-        """Return estimates of force, by their names, newest last."""
-        return self._all("forces", kept.Estimated)
+    def cached(self, path: Path, key: str, make: Callable[[], Any]) -> Any:
+        """Return what is made of a file, made again only when that has changed.
 
-    def _all(self, kind: str, of: type[kept.Any_]) -> dict[str, kept.Any_]:
-        paths = {name: self.path(kind, f"{name}.json") for name in self.names(kind)}
-        order = sorted(paths, key=lambda name: paths[name].stat().st_mtime_ns)
-        found = {name: kept.checked(of, self.read_json(kind, name)) for name in order}
-        return {name: one for name, one in found.items() if one is not None}
+        Raises
+        ------
+        DataError
+            If the file is missing; or what ``make`` raises.
+        """
+        try:
+            stat = path.stat()
+        except OSError as error:
+            problem = f"it cannot be read ({error.strerror})"
+            raise DataError(problem, file=path, remedy="import it again") from None
+        at = path, key, stat.st_mtime_ns, stat.st_size
+        known = self._cache.get(at)
+        if known is None:  # without the lock, as it may take seconds
+            made = make()
+            known = made, _size(made)
+        with self._lock:
+            self._cache.pop(at, None)
+            self._cache[at] = known  # the last used goes last
+            while sum(size for _, size in self._cache.values()) > MOST_CELLS and self._cache:
+                del self._cache[next(iter(self._cache))]
+        return known[0]
 
 
-def _rmse(result: dict[str, Any], test: bool = False) -> str:
-    value = result["test"]["rmse"] if test else result["validation_rmse"]
-    return f"{numeral(value, 3)} {result['unit']}"
+def _size(made: Any) -> int:
+    if isinstance(made, tuple | list):
+        return sum(map(_size, made)) + 1
+    return len(made) * len(made.channels) if hasattr(made, "channels") else 1000
 
 
-def _as_in_a_leaderboard(result: dict[str, Any]) -> tuple[Any, ...]:
-    fitted = (result["train"] or {}).get("rmse")
-    ranked = order(result["model"], result["validation_rmse"], fitted, result["skill_least"])
-    return not result["current"], *ranked
+def _digest(recording: Recording) -> str:
+    grid = [recording.sample_time, recording.start_time, *sorted(recording.units.items())]
+    digest = hashlib.sha256(json.dumps(grid).encode())
+    for name in sorted(recording.channels):
+        digest.update(recording[name].data)
+    return digest.hexdigest()

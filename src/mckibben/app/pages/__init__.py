@@ -1,1 +1,1 @@
-"""The five pages of the workbench, one file each."""
+"""The pages of the workbench, one module each: ``TITLE``, ``ICON`` and ``build(state)``."""

@@ -1,19 +1,24 @@
-"""Models by what they are for: what each can, needs and costs, and why the others have no place."""
+"""The drawer that models are chosen in: by what they are for, with reasons, and with their settings."""
 
 from __future__ import annotations
 
-import asyncio
-import re
+import math
+from functools import partial
+from itertools import groupby
 from typing import Any
 
-from nicegui import binding, ui
+from nicegui import run, ui
 
-from mckibben.app.desk import Desk, guarded, hinted, labelled, named
-from mckibben.app.fields import said
-from mckibben.app.offering import Offer, Offered, offered
-from mckibben.app.pages import apart
-from mckibben.app.pages.settings import ask
-from mckibben.estimators.catalogue import Need
+from mckibben.app import modelling, widgets
+from mckibben.app.modelling import Offer, Offered
+from mckibben.app.state import State
+from mckibben.app.terms import said
+from mckibben.app.widgets import mark
+from mckibben.comparison.channels import Channels
+from mckibben.errors import MckibbenError
+
+OWN = ("input", "output", "scheduling")
+"""Settings that are chosen as channels."""
 
 INVERSES = {
     "exact": "exact inverse",
@@ -22,138 +27,236 @@ INVERSES = {
     "none": "no inverse",
 }
 
+Json = dict[str, Any]
 
-class Choice:
-    """The models that are to be fitted, and their settings.
 
-    Parameters
-    ----------
-    desk : Desk
-    """
+async def choose(state: State) -> None:
+    """Open the drawer."""
+    sides = modelling.sides_of(state.workspace, state.inputs, state.outputs, state.load)
+    with (
+        ui.dialog(value=True).props("position=right full-height") as drawer,
+        ui.element("div").classes("card drawer") as place,
+    ):
+        mark(place, "drawer")
+        ui.spinner()
+    drawer.on("hide", drawer.delete)
+    offered: Offered | MckibbenError | None
+    try:
+        offered = await run.io_bound(modelling.offered, state.workspace, sides)
+    except MckibbenError as error:
+        offered = error
+    if place.is_deleted or offered is None:
+        return
+    place.clear()
+    with place:
+        with widgets.row(classes="spread"):
+            ui.label("Fit models").classes("subtitle").props('role=heading aria-level="2"')
+            button = ui.button(icon="close", on_click=drawer.close)
+            mark(button.props('flat round dense aria-label="Close"'), "close-drawer")
+        if isinstance(offered, MckibbenError):
+            widgets.error_box(offered)
+            ui.link("Change recordings and channels →", "/")
+        else:
+            _Choice(state, sides, offered, drawer).build()
 
-    possible = binding.BindableProperty()
-    """Whether there is anything to fit."""
 
-    def __init__(self, desk: Desk) -> None:
-        self.possible = False
-        self.desk = desk
-        self.settings: dict[str, dict[str, str]] = {}
-        self.ticked: list[str] = []
-        self.shown: Offered | None = None
-        self._looks = 0
-        self.boxes: dict[str, ui.checkbox] = {}
-        self.heads: list[tuple[Any, str, list[Offer]]] = []
-        self.said = named(ui.label("Looking at the data …"), "recognised").classes("text-sm w-full")
-        self.actions = ui.row().classes("w-full items-center gap-3")
-        self.actions.set_visibility(False)
-        self.place = ui.element("div").classes("w-full grid gap-x-4 lg:grid-cols-2 items-start")
-        for topic in ("recordings", "channels"):
-            desk.when(topic, guarded(self._offer))
-        ui.timer(0.02, guarded(self._offer, "Looking for models"), once=True)
+class _Choice:
+    """What is ticked, and the controls that show it."""
 
-    async def _offer(self) -> None:
-        self._looks = look = self._looks + 1
-        found = await asyncio.to_thread(offered, self.desk)
-        if look != self._looks or found == self.shown:  # a later look knows better
-            return
-        names = [offer.model for _, offers in found.groups for offer in offers]
-        chosen = self.desk.workspace.ticked
-        kept = [model for model in chosen or () if model in names]
-        self.shown, self.ticked = found, kept if kept or chosen == [] else found.start
-        self.said.set_text(said(found.recognised))
-        self.possible = bool(found.groups)
-        self.actions.set_visibility(True)
-        self.place.clear()
-        self.boxes, self.heads = {}, []
-        with self.place:
-            if not found.groups:
-                apart.hindering(self.desk)
-            for need, offers in found.groups:
-                self._group(need, offers)
-            self._others(found.against)
-        self._count()
+    def __init__(self, state: State, sides: Channels, offered: Offered, drawer: Any) -> None:
+        self.state, self.sides, self.offered, self.drawer = state, sides, offered, drawer
+        known = [offer.model for offer in offered.offers]
+        before = state.chosen.get("models.ticked", offered.quick)
+        self.ticked = [name for name in before if name in known] or offered.quick
+        self.settings: dict[str, Json] = state.chosen.setdefault("models.settings", {})
+        self.boxes: dict[str, Any] = {}
+        self.shared = bool(state.chosen.get("models.shared", False))
+
+    def build(self) -> None:
+        """Build the drawer's content; the button stays in sight."""
+        with ui.element("div").classes("stack scroll"):
+            self._data()
+            with widgets.row():
+                mark(widgets.button("Quick choice", lambda: self.only(self.offered.quick)), "quick")
+                everything = [offer.model for offer in self.offered.offers]
+                mark(widgets.button("All", lambda: self.only(everything)), "tick-all")
+                mark(widgets.button("None", lambda: self.only([])), "tick-none")
+            for need, offers in groupby(
+                self.offered.offers, lambda offer: (offer.need, offer.about)
+            ):
+                self._group(*need, list(offers))
+            if self.offered.others:
+                with widgets.details(
+                    f"{len(self.offered.others)} do not apply to these recordings"
+                ):
+                    for title, why in self.offered.others.items():
+                        with ui.element("div"):
+                            ui.label(title)
+                            ui.label(said(why)).classes("muted")
+        with widgets.row(classes="spread foot"):
+            self.count = ui.label().classes("muted")
+            self.button = mark(widgets.primary("Fit", self.fit), "fit")
+        self._counted()
+
+    def _data(self) -> None:
+        sides = self.sides
+        given = ", ".join(sides.inputs)
+        told = f", given {', '.join(sides.scheduling)}" if sides.scheduling else ""
+        with ui.element("div"):
+            ui.label(f"{', '.join(sides.outputs)} of {given}{told}")
+            split = self.offered.split
+            ui.label(f"{split[:1].upper()}{split[1:]}.").classes("muted")
+        with widgets.details("Which recordings to fit to, and to test on") as roles:
+            mark(roles, "roles")
+            for entry in self.state.workspace.entries():
+                with widgets.row(classes="spread"):
+                    ui.label(entry.name)
+                    ui.toggle(
+                        {"train": "Train", "test": "Test", "unused": "Unused"},
+                        value=entry.role,
+                        on_change=partial(self._role, entry.name),
+                    ).props("dense no-caps unelevated")
+            ui.checkbox("Allow the same data in training and test").bind_value(self, "shared")
+            ui.link("Change inputs, outputs or load →", "/")
+
+    async def _role(self, name: str, event: Any) -> None:
+        """Give a recording a role; what applies to the recordings may be something else then."""
+        await run.io_bound(self.state.workspace.change, name, role=event.value)
+        self.drawer.close()
+        self.state.changed()
+        await choose(self.state)
+
+    def _group(self, need: str, about: str, offers: list[Offer]) -> None:
+        with ui.element("div"):
+            ui.label(need).classes("subtitle").props('role=heading aria-level="3"')
+            ui.label(about).classes("muted")
+        first = [one for one in offers if one.usual or one.model in self.ticked]
+        for offer in first:
+            self._model(offer)
+        if rest := [one for one in offers if one not in first]:
+            with widgets.details(f"{len(rest)} more") as more:
+                mark(more, f"more-{need.split()[0].strip(':,').lower()}")
+                for offer in rest:
+                    self._model(offer)
+
+    def _model(self, offer: Offer) -> None:
+        with ui.element("div").classes("model"):
+            box = ui.checkbox(
+                value=offer.model in self.ticked,
+                on_change=lambda e: self._tick(offer.model, e.value),
+            ).props(f'dense aria-label="{offer.title}"')
+            self.boxes[offer.model] = mark(box, f"model-{offer.model}")
+            with (
+                ui.element("div")
+                .classes("grow")
+                .on("click", lambda: box.set_value(not box.value), [])
+            ):
+                ui.label(f"{offer.title} · {offer.model}")
+                ui.label(f"{offer.can} {_about(offer)}").classes("muted")
+            button = widgets.icon_button(
+                "tune", f"Settings of {offer.model}", lambda: self._fold(offer, place)
+            )
+            mark(button, f"settings-{offer.model}")
+            place = ui.element("div").classes("columns-even settings")
+            place.set_visibility(False)
+
+    def _fold(self, offer: Offer, place: Any) -> None:
+        """Show the settings of a model, or hide them again."""
+        from mckibben import registry
+        from mckibben.estimators.core.settings import settings_with_defaults
+
+        place.set_visibility(not place.visible)
+        if place.visible and not place.default_slot.children:
+            given = self.settings.setdefault(offer.model, {})
+            with place:
+                for one in settings_with_defaults(registry.load("estimators", offer.model)):
+                    if one.name not in OWN:
+                        mark(_field(one, given), f"set-{one.name}")
 
     def only(self, models: list[str]) -> None:
         """Tick some models and no others."""
         for model, box in self.boxes.items():
             box.set_value(model in models)
 
-    def start(self) -> None:
-        """Tick those to begin with."""
-        self.only([] if self.shown is None else self.shown.start)
-
-    def _group(self, need: Need, offers: list[Offer]) -> None:
-        """Show the usual models, and those that are ticked; the others are one click away."""
-        first = [one for one in offers if one.usual or one.model in self.ticked]
-        ticked = any(one.model in self.ticked for one in offers)
-        head = ui.expansion(need.title, value=ticked).classes("w-full min-w-0").props("dense")
-        word = re.split(r"\W", need.title)[0].lower()
-        self.heads.append((named(head, f"need-{word}"), need.title, offers))
-        with head:
-            ui.label(need.about).classes("text-xs opacity-70")
-            for offer in first:
-                self._model(offer)
-            rest = [one for one in offers if one not in first]
-            if not rest:
-                return
-            title = f"{len(rest)} more" if first else f"All {len(rest)}"
-            with named(ui.expansion(title).classes("w-full").props("dense"), f"more-{word}"):
-                for offer in rest:
-                    self._model(offer)
-
-    def _model(self, offer: Offer) -> None:
-        with ui.row().classes("w-full items-center gap-x-2 gap-y-0 no-wrap"):
-            box = ui.checkbox(
-                value=offer.model in self.ticked,
-                on_change=lambda event: self._tick(offer.model, event.value),
-            )
-            labelled(named(box.props("dense"), f"model-{offer.model}"), "aria-label", offer.title)
-            self.boxes[offer.model] = box
-            words = named(ui.column().classes("gap-0 flex-1 min-w-0"), f"about-{offer.model}")
-            words.classes("cursor-pointer").on("click", lambda: box.set_value(not box.value))
-            with words:
-                ui.label(f"{offer.title} · {offer.model}").classes("text-sm break-words")
-                ui.label(f"{offer.can} {_about(offer)}".strip()).classes(
-                    "text-xs opacity-70 break-words"
-                )
-            button = ui.button(icon="tune", on_click=lambda: ask(offer.model, self.settings))
-            hinted(button.props("flat dense"), "Settings")
-            labelled(
-                named(button, f"settings-{offer.model}"), "aria-label", f"Settings of {offer.model}"
-            )
-
-    def _others(self, against: dict[str, str]) -> None:
-        if not against:
-            return
-        with ui.expansion(f"{len(against)} models have no place on these data").classes(
-            "w-full min-w-0"
-        ):
-            for title, reason in against.items():
-                ui.label(said(f"{title}: {reason}")).classes("text-xs opacity-70 break-words")
-
     def _tick(self, model: str, on: bool) -> None:
         self.ticked = [name for name in self.ticked if name != model] + [model] * on
-        self.desk.workspace.ticked = self.ticked
-        self._count()
+        self.state.chosen["models.ticked"] = self.ticked
+        self._counted()
 
-    def _count(self) -> None:
-        for head, title, offers in self.heads:
-            n = sum(offer.model in self.ticked for offer in offers)
-            head.props["label"] = f"{title} ({n} of {len(offers)} chosen)"
-            head.update()
+    def _counted(self) -> None:
+        n = len(self.ticked)
+        seconds = sum(one.seconds for one in self.offered.offers if one.model in self.ticked)
+        self.count.set_text(f"Takes {_time(seconds / self.state.jobs.at_once)}" if n else "")
+        self.button.set_text(f"Fit {n} model{'s' * (n != 1)}")
+        self.button.set_enabled(bool(n))
+
+    def fit(self) -> None:
+        """Start the fits, quick ones first."""
+        from mckibben.estimators.catalogue import settings_of
+
+        costs = {offer.model: offer.seconds for offer in self.offered.offers}
+        sides, self.state.chosen["models.shared"] = self.sides, self.shared
+        given = {
+            "inputs": list(sides.inputs),
+            "outputs": list(sides.outputs),
+            "load": (sides.scheduling or ("",))[0],
+            "allow_shared": self.shared,
+        }
+        chosen = sorted(self.ticked, key=costs.__getitem__)
+        settings = {model: settings_of(model, self.settings.get(model, {})) for model in chosen}
+        for job in [j for j in self.state.jobs.jobs.values() if j.kind == "fit" and not j.active]:
+            self.state.jobs.forget(job.name)
+        for model in chosen:
+            more = given | {"model": model, "settings": settings[model]}
+            self.state.jobs.submit(modelling.fit, model, **more)
+        self.drawer.close()
+        self.state.chosen.pop("models.picked", None)
+        self.state.changed()
 
 
 def _about(offer: Offer) -> str:
-    words = [INVERSES[offer.inverse], _time(offer.seconds)]
-    if offer.needs_time:
-        words.append("needs time")
+    words = [INVERSES.get(offer.inverse, ""), _time(offer.seconds)]
     if offer.caution:
         words.append(f"good only near its training: {offer.caution}")
-    return f"{'; '.join(words)[0].upper()}{'; '.join(words)[1:]}."
+    text = "; ".join(filter(None, words))
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _time(seconds: float) -> str:
     """Return about how long a fit takes: how busy the machine is, nobody knows."""
     if seconds < 15:
         return "seconds"
-    return "about a minute" if seconds < 90 else "minutes" if seconds < 1800 else "an hour or more"
+    return "a minute" if seconds < 90 else "minutes" if seconds < 1800 else "an hour or more"
+
+
+def _field(one: Any, given: Json) -> Any:
+    """Make the control of a setting, of which what differs from the default is taken."""
+    from mckibben.estimators.core.settings import setting_value
+
+    def taken(event: Any) -> None:
+        value = event.value
+        if isinstance(value, str):
+            value = setting_value(value) if value and one.kind == "text" else (value or None)
+        if value is None or value == one.default:
+            given.pop(one.name, None)
+        else:
+            given[one.name] = int(value) if one.kind == "whole" else value
+
+    label, now = one.name.replace("_", " "), given.get(one.name, one.default)
+    hint = one.meaning.replace("``", "")
+    if one.kind == "flag" and not one.optional:
+        return ui.checkbox(label, value=bool(now), on_change=taken).props("dense").tooltip(hint)
+    if one.kind in ("choice", "flag"):
+        options = {choice: str(choice) for choice in one.choices or (True, False)}
+        options |= {None: "its own choice"} if one.optional else {}
+        found: Any = ui.select(options, value=now, label=label, on_change=taken)
+    elif one.kind in ("whole", "number"):
+        ends = {"min": one.low, "max": one.high}
+        limits = {key: end for key, end in ends.items() if math.isfinite(end)}
+        found = ui.number(label, value=now, on_change=taken, placeholder="its own choice", **limits)
+    else:
+        text = "" if one.name not in given else str(given[one.name])
+        found = ui.input(label, value=text, on_change=taken, placeholder=str(one.default))
+    return found.props(
+        "dense outlined stack-label hide-bottom-space" + f' hint="{hint}"'.replace("\n", " ")
+    )

@@ -1,321 +1,307 @@
-"""Look: what the muscle does, over time, as loops, in numbers and in words."""
+"""Look: what the muscle does, as loops, over time and in numbers; and what to record next."""
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
-from nicegui import ui
+from nicegui import events, ui
 
-from mckibben.app import plots
-from mckibben.app.desk import Desk, guarded, named, refused
-from mckibben.app.drawn import picture
-from mckibben.app.fields import said
-from mckibben.app.pages.cutting import time_plot
-from mckibben.app.together import obstacle
-from mckibben.comparison.channels import any_moves
-from mckibben.diagnosis.coupling import Coupling, coupling
-from mckibben.errors import MckibbenError
+from mckibben.app import widgets
+from mckibben.app.later import later
+from mckibben.app.modelling import last_plan, plan, sides_of
+from mckibben.app.state import State, view
+from mckibben.app.terms import said
+from mckibben.app.widgets import mark
+from mckibben.comparison.channels import Channels
 from mckibben.numerals import number, typeset_within
 from mckibben.recording import Recording
-from mckibben.report import subjects
 
-SMALL_HEIGHT = 150
-"""Of a small picture [px]."""
+TITLE = "Look"
+ICON = "insights"
 
-EXPLAINED = '<q-td :props="props" :title="props.row.note">{{ props.value }}</q-td>'
-"""A quantity, with what it is where a pointer rests on it."""
+DRAWN = 3
+"""Recordings that are drawn at first."""
+
+GAPS = 3
+"""Data gaps that are shown before a fold-out."""
+
+VIEWS = {"loop": "Loop", "time": "Over time"}
+
+Pair = tuple[str, str]
 
 
-def build(desk: Desk) -> None:
+def build(state: State) -> None:
     """Build the page."""
-
-    @ui.refreshable
-    def shown() -> None:
-        entries = [entry.name for entry in desk.workspace.entries() if entry.role != "unused"]
-        known = desk.workspace.channels()
-        if not entries or not {*desk.inputs, *desk.outputs} <= set(known):
-            first = "Add recordings with an input and an output first, under Data."
-            ui.label(obstacle(desk) or first)
-            return
-        chosen = named(
-            ui.select(entries, value=entries[0], label="Recording").classes("w-80"),
-            "look-recording",
-        )
-        with ui.row().classes("w-full items-start gap-4"):
-            with ui.column().classes("min-w-80 flex-[3]"):
-                _pictures(desk, chosen)
-            pairs = desk.looked_at()
-            with ui.column().classes("min-w-72 flex-[2]"):
-                for given, wanted in pairs:
-                    _words(desk, given, wanted)
-                _gaps(desk, pairs[0][0])
-
-    desk.when("recordings", shown.refresh)
-    desk.when("channels", shown.refresh)
-    shown()
+    with mark(ui.element("div").classes("page"), "page-look"):
+        with widgets.row(classes="spread"):
+            widgets.heading(
+                "Look", "What the muscle does, and what the recordings do not show yet."
+            )
+            action = widgets.primary(
+                "Choose models", lambda: ui.navigate.to("/models"), "leaderboard"
+            )
+            mark(action, "choose-models")
+        content(state)
 
 
-def _pictures(desk: Desk, chosen: ui.select) -> None:
-    """Show the loop of the recording chosen; of several channels one, below what moves what."""
-    several = len(desk.sides.inputs) > 1 or len(desk.outputs) > 1
-    clicked: list[str] = []
+@view
+def content(state: State) -> None:
+    """Show the recordings that are chosen, and what all of them tell."""
+    used = state.workspace.used()
+    known = [name for name in (*state.inputs, *state.outputs) if name in state.workspace.channels()]
+    if not used or not known:
+        with (
+            widgets.card(),
+            widgets.empty(
+                "insights",
+                "Nothing to look at yet",
+                "Add recordings with an input, such as pressure, and an output, such as displacement. "
+                "You then see how wide the loop is, whether speed matters, and what is missing.",
+            ),
+        ):
+            ui.link("Add recordings →", "/")
+        return
+    sides = sides_of(state.workspace, state.inputs, state.outputs, state.load)
+    pairs = _pairs(list(used.values()), sides)
+    pair = state.chosen.get("look.pair")
+    if pair is None or pair[1] not in sides.outputs or pair[0] not in (*sides.inputs, *dict(pairs)):
+        pair = pairs[0]
+    several = len(sides.inputs) > 1 or len(sides.outputs) > 1
+    shown = [name for name in state.chosen.get("look.shown", []) if name in used]
+    shown = shown or list(used)[:DRAWN]
+    with ui.element("div").classes("columns"):
+        with ui.element("div").classes("stack"):
+            _recordings(state, used, shown)
+            _words(state, sides, pair)
+        with ui.element("div").classes("stack"):
+            if several:
+                _coupling(state, list(used.values()), sides, pair)
+            _figure(state, [used[name] for name in shown], sides, pair)
+            _gaps(state, sides, pair)
+    widgets.next_step("Seen enough? Fit models to it, and compare them.", "Models", "/models")
 
-    @ui.refreshable
-    def enlarged() -> None:
-        try:
-            recording = desk.workspace.recording(str(chosen.value))
-            pairs = desk.looked_at([recording])
-        except (MckibbenError, KeyError) as error:
-            refused(error)
-            return
-        given, wanted = clicked or pairs[0]
-        if clicked and not any_moves([recording], (given,)):  # over what is held, there is no loop
-            given = pairs[desk.outputs.index(wanted)][0]
-        if several:
-            ui.label(f"{wanted} over {given}").classes("text-lg")
-        _plots(desk, recording, given, wanted)
 
-    def enlarge(given: str, wanted: str) -> None:
-        clicked[:] = given, wanted
-        enlarged.refresh()
+def _pairs(recordings: list[Recording], sides: Channels) -> list[Pair]:
+    """Return what every output is drawn over, and the output."""
+    from mckibben.diagnosis.coupling import coupling
 
-    if several:
-        _matrix(desk, chosen, enlarge)
-    chosen.on_value_change(enlarged.refresh)
-    enlarged()
+    return list(coupling(recordings, sides.inputs, sides.outputs).pairs(recordings))
 
 
-def _matrix(desk: Desk, chosen: ui.select, enlarge: Callable[[str, str], None]) -> None:
-    """Show every output over every input, small, with how far each moves each; a click enlarges."""
-    at = named(ui.column().classes("w-full"), "coupling")
+def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> None:
+    roles = {entry.name: entry.role for entry in state.workspace.entries()}
 
-    @ui.refreshable
-    def pictured() -> None:
-        try:
-            recording = desk.workspace.recording(str(chosen.value))
-            used = list(desk.workspace.used().values())
-            found = coupling(used, desk.sides.inputs, desk.outputs)
-        except (MckibbenError, KeyError) as error:
-            refused(error)
-            return
-        ui.label("What moves what: every output over every input").classes("text-lg")
-        small = plots.figures(subjects.matrix(recording, found), height=SMALL_HEIGHT)
-        most = subjects.MOST
-        shown = [(o, i) for o in found.outputs[:most] for i in found.inputs[:most]]
-        columns = min(len(found.inputs), most)
-        grid = ui.element("div").classes("w-full overflow-x-auto grid gap-1")
-        grid.style(f"grid-template-columns: repeat({columns}, minmax(7rem, 1fr))")
-        with grid:
-            for figure, (wanted, given) in zip(small, shown, strict=True):
-                _small(desk, figure, found, given, wanted, enlarge)
+    def tick(name: str, on: bool) -> None:
+        state.chosen["look.shown"] = [
+            n for n in used if (n in shown and n != name) or (n == name and on)
+        ]
+        state.changed()
+
+    def box(name: str) -> None:
+        found = ui.checkbox(name, value=name in shown, on_change=lambda e: tick(name, e.value))
+        mark(found.props("dense"), f"show-{name}")
+
+    def chip(role: str) -> None:
+        ui.label(role).classes(f"chip {role}")
+
+    def row(name: str, run: Recording) -> list[Any]:
+        long = f"{run.duration:.4g} s" if run.sample_time else f"{len(run)} samples"
+        return [partial(box, name), partial(chip, roles[name]), long]
+
+    with widgets.card("Recordings"):
+        widgets.table(["Shown", "Role", "Length"], [row(*one) for one in used.items()])
+
+
+def _coupling(state: State, used: list[Recording], sides: Channels, pair: Pair) -> None:
+    """Show how far every input moves every output; a click shows their loop."""
+    from mckibben.diagnosis.coupling import coupling
+
+    found = coupling(used, sides.inputs, sides.outputs)
+
+    def choose(given: str, wanted: str) -> None:
+        state.chosen["look.pair"] = (given, wanted)
+        state.changed()
+
+    def cell(given: str, wanted: str, effect: float, unit: str) -> None:
+        text = f"{number(effect, 2)}\xa0{unit}" if np.isfinite(effect) else "loop"
+        button = widgets.button(text, partial(choose, given, wanted))
+        chosen = "unelevated" if (given, wanted) == pair else "flat"
+        widgets.labelled(button, f"{wanted} over {given}").props(chosen, remove="flat")
+        mark(button, f"pair-{given}-{wanted}")
+
+    with widgets.card("What moves what"):
+        rows: list[list[Any]] = [
+            [wanted]
+            + [
+                partial(cell, given, wanted, float(found.effects[place, at]), found.units[place])
+                for at, given in enumerate(found.inputs)
+            ]
+            + [f"{100 * max(found.explained[place], 0):.0f} %"]
+            for place, wanted in enumerate(found.outputs)
+        ]
+        mark(widgets.table(["", *found.inputs, "Explained"], rows), "coupling")
         ui.label(
-            "In colour: the input that "
-            + (
-                "belongs to the output."
-                if found.paired
-                else "moves the output most, of those that move here."
-            )
-            + " Numbers: what the input over its whole range does to the output, by one straight line "
-            "through all inputs of all recordings. Click on a picture's name to enlarge it."
-        ).classes("text-xs opacity-70")
-
-    chosen.on_value_change(pictured.refresh)
-    with at:
-        pictured()
+            "What each input over its whole range does to an output, by one straight line through all "
+            "inputs. The rest, up to 100 %, is bent, remembers, or takes time. Choose a number to see "
+            "its loop."
+        ).classes("muted")
 
 
-def _small(
-    desk: Desk,
-    figure: plots.Json,
-    found: Coupling,
-    given: str,
-    wanted: str,
-    enlarge: Callable[[str, str], None],
-) -> None:
-    figure["config"] = figure["config"] | {"staticPlot": True}
-    figure["layout"] |= {"margin": {"l": 30, "r": 6, "t": 4, "b": 20}}
-    figure["layout"]["font"] = figure["layout"]["font"] | {"size": 10}
-    for axis in ("xaxis", "yaxis"):  # its name stands above
-        few = {"title": "", "nticks": 3, "tickangle": 0}
-        figure["layout"][axis] = figure["layout"][axis] | few
-    row, column = found.outputs.index(wanted), found.inputs.index(given)
-    effect = found.effects[row, column]
-    told = f": {number(effect)}\xa0{found.units[row]}" if np.isfinite(effect) else ""
-    with ui.column().classes("gap-0 min-w-0"):
-        button = ui.button(f"{given} → {wanted}{told}", on_click=lambda: enlarge(given, wanted))
-        named(button.props("flat dense no-caps").classes("text-xs"), f"pair-{given}-{wanted}")
-        picture(desk, figure)
+def _figure(state: State, recordings: list[Recording], sides: Channels, pair: Pair) -> None:
+    from mckibben.report.figures import draw
+    from mckibben.report.subjects import loop_by
 
+    given, wanted = pair
+    shared = [n for n in recordings[0].channels if all(n in run for run in recordings)]
+    values = {n: np.concatenate([run[n] for run in recordings]) for n in shared if n not in pair}
+    free = [name for name, all_of_it in values.items() if np.ptp(all_of_it) > 0]
+    by = state.chosen.get("look.by", "")
+    by = by if by in free else ""
+    kind = state.chosen.get("look.view", "loop")
 
-def _plots(desk: Desk, recording: Recording, given: str, wanted: str) -> None:
-    from mckibben.diagnosis.tracks import MAJOR
-    from mckibben.signals import cycles
+    def choose(key: str, event: events.ValueChangeEventArguments[Any]) -> None:
+        state.chosen[key] = event.value
+        state.changed()
 
-    found = cycles(recording[given], MAJOR * float(np.ptp(recording[given])))
-    used = (*desk.inputs, *desk.outputs, given)
-    others = subjects.third_channels(recording, used)
-    with ui.row().classes("items-center w-full"):
-        colour = named(
-            ui.toggle(
-                {"time": "Colour by time"}
-                | ({"rate": "Colour by rate"} if recording.sample_time is not None else {})
-                | {f"by {name}": f"Colour by {name}" for name in others},
-                value="time",
-            ).props("no-caps"),
-            "loop-colour",
-        )
-        cycle = named(
-            ui.number(
-                f"Cycle, of {len(found)}; 0 for all", value=0, min=0, max=len(found), step=1
-            ).classes("w-52"),
-            "cycle",
-        )
-        cycle.set_visibility(bool(found))
-
-    @ui.refreshable
-    def loop() -> None:
-        number = int(cycle.value or 0)
-        part = recording
-        if 1 <= number <= len(found):
-            part = recording.slice(found[number - 1].start, found[number - 1].stop)
-        if colour.value == "rate":
-            figure = _by_rate(part, given, wanted)
+    with widgets.card():
+        with widgets.row(classes="spread"):
+            ui.label(
+                f"{wanted} over {given}" if kind == "loop" else f"{wanted} and {given}"
+            ).classes("subtitle")
+            with widgets.row():
+                if kind == "loop" and free:
+                    options = {"": "Colour by recording or time"} | {
+                        n: f"Colour by {n}" for n in free
+                    }
+                    colour = ui.select(options, value=by, on_change=partial(choose, "look.by"))
+                    mark(colour.props('dense outlined aria-label="Colour"'), "colour")
+                toggle = ui.toggle(VIEWS, value=kind, on_change=partial(choose, "look.view"))
+                mark(toggle.props("no-caps unelevated dense"), "look-view")
+        channels = [given, wanted, *([by] if by else [])]
+        if kind == "loop" and by:
+            drawing = loop_by(recordings, given, wanted, by)
+        elif kind == "loop":
+            drawing = draw(recordings, "loop", input=given, output=wanted)
         else:
-            by = str(colour.value).removeprefix("by ")
-            drawing = (
-                subjects.loop([part], given, wanted)
-                if by == "time"
-                else subjects.loop_by([part], given, wanted, by)
-            )
-            figure = plots.figures(drawing, height=440)[0]
-        picture(desk, figure, "loop-plot")
-
-    colour.on_value_change(loop.refresh)
-    cycle.on_value_change(loop.refresh)
-    loop()
-    time_plot(desk, recording, [given, wanted], "time-plot")
+            several = [*sides.inputs, *sides.outputs, *(sides.scheduling or ())]
+            named = [name for name in several if all(name in each for each in recordings)]
+            channels = named if len(several) <= 6 else channels
+            drawing = draw(recordings, "time", channels=list(dict.fromkeys([*channels, given])))
+        for plot in widgets.plot(
+            drawing, height=360 if kind == "loop" else 130 + 90 * len(channels)
+        ):
+            mark(plot, f"look-{kind}")
+        if drawing.note:
+            ui.label(said(drawing.note)).classes("muted")
 
 
-def _by_rate(recording: Recording, given: str, wanted: str) -> plots.Json:
-    """Return the loop with its points coloured by how fast the input moves."""
-    from mckibben.report.drawing import along
+def _words(state: State, sides: Channels, pair: Pair) -> None:
+    """Show what the muscle does: a few sentences, and all numbers behind a fold-out."""
+    from mckibben.diagnosis.characterization import Characterization, characterize
+    from mckibben.report.results import characterization
 
-    places, x, y = along(recording[given], recording[wanted], plots.POINTS)
-    step = recording.sample_time or 1.0
-    rate = np.abs(np.gradient(recording[given]) / step)[places.astype(int)]
-    figure = plots.lines(
-        [],
-        x=f"{given} [{recording.units[given]}]",
-        y=f"{wanted} [{recording.units[wanted]}]",
-        height=440,
-    )
-    bar = {"title": {"text": f"{recording.units[given]}/s"}}
-    marker = {"color": rate.tolist(), "colorscale": "Viridis", "size": 4, "showscale": True}
-    figure["data"] = [
-        {"type": "scatter", "mode": "markers", "x": x.tolist(), "y": y.tolist()}
-        | {"marker": marker | {"colorbar": bar}}
-    ]
-    return figure
+    used, (given, wanted) = list(state.workspace.used().values()), pair
+    beside = [name for name in (*sides.inputs, *(sides.scheduling or ())) if name != given]
+
+    def show(found: Characterization) -> None:
+        widgets.items(characterization(found))
+
+    what = f": {wanted}" if len(sides.outputs) > 1 else ""
+    with widgets.card(f"What the muscle does{what}") as card:
+        mark(card, "words")
+        key = "characterization", state.workspace.digest(), pair, tuple(beside)
+        later(key, partial(characterize, used, given, wanted, beside=beside), show, height=120)
 
 
-def _words(desk: Desk, given: str, wanted: str) -> None:
-    from mckibben.diagnosis.characterization import characterize
-    from mckibben.report import words
-
-    what = f": {wanted}" if len(desk.outputs) > 1 else ""
-    ui.label(f"What the muscle does{what}").classes("text-lg")
-    place = named(ui.column().classes("w-full"), "characterization")
-    with place:
-        ui.spinner()
-
-    async def find() -> None:
-        recordings = desk.workspace.with_role("train") + desk.workspace.with_role("test")
-        sides = desk.sides
-        others = (*sides.inputs, *(sides.scheduling or ()))
-        beside = [name for name in others if name != given]
-        try:
-            found = await asyncio.to_thread(characterize, recordings, given, wanted, beside=beside)
-        except MckibbenError as error:
-            if place.is_deleted:  # something else is looked at by now
-                return
-            place.clear()
-            with place:
-                refused(error)
-            return
-        if place.is_deleted:
-            return
-        place.clear()
-        with place:
-            for sentence in words.characterization_sentences(found):
-                ui.label(typeset_within(said(sentence)))
-            if len(recordings) > 1:
-                ui.label(f"Over all {len(recordings)} recordings:").classes("text-sm opacity-70")
-            rows = [
-                {
-                    "what": name,
-                    "value": number(value) if isinstance(value, float) else value,
-                    "limits": " to ".join(map(number, limits or ())),
-                    "unit": unit,
-                    "note": note,
-                }
-                for name, value, limits, unit, note in words.quantities(found)
-                if value is not None
-            ]
-            columns = [
-                {"name": key, "label": label, "field": key, "align": align}
-                for key, label, align in (
-                    ("what", "Quantity", "left"),
-                    ("value", "Value", "right"),
-                    ("limits", "95 % interval", "right"),
-                    ("unit", "Unit", "left"),
-                )
-            ]
-            table = ui.table(rows=rows, columns=columns, row_key="what").classes("w-full")
-            table.props("dense flat").add_slot("body-cell-what", EXPLAINED)
-            told = f", beside={beside!r}" if beside else ""
-            call = f"mckibben.characterize(recordings, {given!r}, {wanted!r}{told})"
-            desk.did("characterized the recordings", call)
-
-    ui.timer(0.05, guarded(find, "Looking what the muscle does"), once=True)
-
-
-def _gaps(desk: Desk, given: str) -> None:
-    from mckibben.diagnosis.data_gaps import data_gaps
+def _gaps(state: State, sides: Channels, pair: Pair) -> None:
+    """Show what the recordings cannot identify, and plan what to record next."""
+    from mckibben.diagnosis.data_gaps import Gap, data_gaps
     from mckibben.report.words import gap_run, gap_sentence
 
-    tested = any(entry.role == "test" for entry in desk.workspace.entries())
-    which = "the recordings to train on" if tested else "these recordings"
-    ui.label(f"Data gaps of {which}").classes("text-lg")
-    place = named(ui.column().classes("w-full"), "data-gaps")
-    inputs = (
-        desk.sides.inputs if len(desk.sides.inputs) > 1 else (given,)
-    )  # each moves every output
+    train, test = state.workspace.with_role("train"), state.workspace.with_role("test")
+    inputs = sides.inputs if len(sides.inputs) > 1 else (pair[0],)
 
-    async def find() -> None:
-        train, test = desk.workspace.with_role("train"), desk.workspace.with_role("test")
-        outputs = desk.outputs
-        try:
-            gaps = await asyncio.to_thread(
-                data_gaps, train or test, inputs, outputs, tests=test if train else ()
-            )
-        except MckibbenError as error:
-            if not place.is_deleted:
-                with place:
-                    refused(error)
-            return
-        if place.is_deleted:
-            return
-        with place:
-            if not gaps:
-                ui.label("None.")
-            for gap in gaps:
-                ui.label(typeset_within(gap_sentence(gap)))
-                ui.label(typeset_within(gap_run(gap))).classes("text-caption pl-4")
-            desk.did(
-                "looked for data gaps",
-                f"mckibben.data_gaps(train, {inputs!r}, {outputs!r}, tests=test)",
-            )
+    def one(gap: Gap) -> None:
+        with ui.element("div"):
+            ui.label(typeset_within(gap_sentence(gap)))
+            ui.label(typeset_within(gap_run(gap))).classes("muted")
 
-    ui.timer(0.05, guarded(find, "Looking for data gaps"), once=True)
+    def show(found: tuple[Gap, ...]) -> None:
+        if not found:
+            ui.label("Nothing is missing: the recordings show all that models ask for.")
+        for gap in found[:GAPS]:
+            one(gap)
+        if found[GAPS:]:
+            with widgets.details(f"{len(found[GAPS:])} more"):
+                for gap in found[GAPS:]:
+                    one(gap)
+
+    with widgets.card("What to record next") as card:
+        mark(card, "gaps")
+        key = "gaps", state.workspace.digest(), inputs, sides.outputs
+        make = partial(data_gaps, train or test, inputs, sides.outputs, tests=test if train else ())
+        later(key, make, show)
+        _planned(state, inputs)
+
+
+def _planned(state: State, inputs: tuple[str, ...]) -> None:
+    jobs = [job for job in state.jobs.jobs.values() if job.kind == "plan"]
+    if running := next((job for job in jobs if job.active), None):
+
+        def cancel() -> None:
+            state.jobs.cancel(running.name)
+            state.changed()
+
+        with widgets.row():
+            ui.spinner(size="20px")
+            ui.label("Planning the next recording …").classes("muted")
+            widgets.button("Cancel", cancel)
+        return
+    made = last_plan(state.workspace)
+    if jobs and jobs[-1].state == "failed":
+        widgets.error_box(jobs[-1].message)
+    elif made:
+        text = " ".join(typeset_within(said(one)) for one in made[0]["sentences"])
+        mark(ui.label(f"Planned: {text}").classes("muted"), "planned")
+    with widgets.row():
+        text = "Plan another" if made else "Plan the next recording"
+        mark(widgets.button(text, partial(_ask, state, inputs), "edit_calendar"), "plan")
+        if made:
+            path = made[1]
+
+            def download() -> None:
+                ui.download.content(path.read_bytes(), path.name, "text/csv")
+
+            mark(widgets.button("Download its commands (CSV)", download, "download"), "commands")
+
+
+def _ask(state: State, inputs: tuple[str, ...]) -> None:
+    used = list(state.workspace.used().values())
+    fields: dict[str, list[Any]] = {}
+
+    def submit() -> None:
+        limits = {name: [one.value for one in two] for name, two in fields.items()}
+        limits = {name: two for name, two in limits.items() if two != [None, None]}
+        for job in [j for j in state.jobs.jobs.values() if j.kind == "plan"]:
+            state.jobs.forget(job.name)
+        minutes = float(field.value or 3)
+        state.jobs.submit(plan, "next recording", minutes=minutes, limits=limits)
+        dialog.close()
+        state.changed()
+
+    with widgets.dialog("Plan the next recording") as dialog:
+        ui.label("Random motion within limits, and what closes the gaps.").classes("muted")
+        field = mark(ui.number("Minutes", value=3, min=0.5, max=60), "minutes")
+        with widgets.details("Limits, where they are not those recorded"):
+            for name in inputs:
+                ends = min(run[name].min() for run in used), max(run[name].max() for run in used)
+                with widgets.row():
+                    fields[name] = [
+                        ui.number(
+                            f"{which} {name} [{used[0].units[name]}]", placeholder=f"{end:.3g}"
+                        )
+                        for which, end in zip(("Lowest", "Highest"), ends, strict=True)
+                    ]
+        mark(widgets.primary("Plan it", submit), "plan-it")

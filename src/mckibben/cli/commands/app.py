@@ -14,12 +14,12 @@ def app(
     folder: Annotated[
         Path, Argument("[FOLDER]", "Workspace: a folder that holds everything; made if missing.")
     ] = Path("workbench"),
-    host: Annotated[str, Option("Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, Option("Port; 0 for any free one.")] = 8750,
     show: Annotated[bool, Option("Open a browser.")] = True,
 ) -> None:
-    from mckibben.app.server import serve
     from mckibben.system.extras import demand
 
     demand("nicegui", "app", "the workbench")
-    serve(folder, host=host, port=port, show=show)
+    from mckibben.app.main import serve
+
+    serve(folder, port=port, show=show)

@@ -1,0 +1,66 @@
+"""What takes a while to make, shown once it is made: the page is there before it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Any, TypeVar
+
+from nicegui import run, ui
+
+from mckibben.app import widgets
+from mckibben.errors import MckibbenError
+
+T = TypeVar("T")
+
+MOST = 48
+"""Things that are remembered."""
+
+_made: dict[Hashable, Any] = {}
+
+
+def later(
+    key: Hashable, make: Callable[[], T], show: Callable[[T], Any], *, height: int = 0
+) -> None:
+    """Show what ``make`` returns, which is called in a thread, and once for a key.
+
+    Parameters
+    ----------
+    key : hashable
+        All that it depends on.
+    make : callable
+        Makes it. Its errors are shown in its place.
+    show : callable
+        Makes elements of it.
+    height : int
+        Room that is left for it meanwhile [px].
+    """
+    place = ui.element("div").classes("stack")
+    if key in _made:
+        with place:
+            _shown(key, show)
+        return
+    with place, ui.element("div").classes("empty").style(f"min-height: {height}px"):
+        ui.spinner()
+
+    async def fill() -> None:
+        try:
+            found: Any = await run.io_bound(make)
+        except MckibbenError as error:
+            found = error
+        _made[key] = found
+        while len(_made) > MOST:
+            del _made[next(iter(_made))]
+        if not place.is_deleted:
+            place.clear()
+            with place:
+                _shown(key, show)
+
+    ui.timer(0.01, fill, once=True)
+
+
+def _shown(key: Hashable, show: Callable[[Any], Any]) -> None:
+    found = _made[key] = _made.pop(key)  # the last used goes last
+    if isinstance(found, MckibbenError):
+        widgets.error_box(found)
+    else:
+        show(found)

@@ -1,0 +1,206 @@
+"""The workbench as a server: one folder, one address, a header with tabs, and the pages."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import socket
+import threading
+import time
+import warnings
+import webbrowser
+from collections.abc import Callable
+from html import escape
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from nicegui import app, context, ui
+
+from mckibben.app import jobs, widgets
+from mckibben.app.guard import HEAD, Guard, Links
+from mckibben.app.jobs import Jobs
+from mckibben.app.state import State, view
+from mckibben.app.workspace import Workspace
+from mckibben.errors import DataError, MckibbenError, MckibbenWarning
+from mckibben.system.atomic import write_text
+
+PAGES = ("data", "look", "models", "compensate", "takeaway")
+"""Modules of `mckibben.app.pages`, in the order of tabs; those that do not exist have none."""
+
+TICK = 0.3
+"""How often jobs are asked how far they are [s]."""
+
+ABSENCE = 30.0
+"""How long a page that has lost the server is kept as it was [s]."""
+
+
+def serve(
+    folder: str | Path,
+    *,
+    port: int = 8750,
+    show: bool = True,
+    announce: Callable[[str], None] = lambda text: print(text, flush=True),
+) -> None:
+    """Serve the workbench over a folder on this machine until it is stopped.
+
+    Parameters
+    ----------
+    folder : path
+        Made where it is missing.
+    port : int
+        To listen on; 0 for any free one.
+    show : bool
+        Whether to open a browser.
+    announce : callable
+        Called with every one-time link, in words.
+
+    Raises
+    ------
+    DataError
+        If the folder cannot be used or is open in another workbench, or the port is taken.
+    """
+    os.umask(0o077)  # what is written is its user's alone
+    workspace = Workspace(folder)
+    workspace.claim()
+    port = _free(port)
+    links = Links(f"http://127.0.0.1:{port}", lambda link: announce(f"Another browser: {link}"))
+    state = State(workspace, Jobs(workspace))
+    app.add_middleware(Guard, port=port, links=links)
+    app.on_shutdown(state.jobs.close)
+    app.timer(TICK, lambda: state.changed() if state.jobs.poll() else None)
+    logging.getLogger("nicegui").addFilter(_unforeseen)
+    warnings.simplefilter("ignore", MckibbenWarning)  # pages show the notes of recordings
+
+    @ui.page("/")
+    @ui.page("/{_:path}")
+    async def page() -> None:
+        await asyncio.to_thread(state.settle)  # reads what is new, away from clicks
+        build(state)
+
+    def ready() -> None:
+        """Say where it is once it listens, and load what the first job needs."""
+        for _ in range(200):
+            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+                break
+            time.sleep(0.05)
+        announce(f"Workbench over {workspace.folder}: {links.link} (Ctrl-C ends it)")
+        jobs.warm()
+
+    app.on_startup(lambda: threading.Thread(target=ready, daemon=True).start())
+    door = workspace.folder / ".open.html"
+    with contextlib.suppress(KeyboardInterrupt):
+        try:
+            if show:
+                _open(door, links.link)
+            ui.run(
+                host="127.0.0.1",
+                port=port,
+                title="mckibben",
+                show=False,
+                reload=False,
+                show_welcome_message=False,
+                reconnect_timeout=ABSENCE,
+                favicon="🦾",
+                gzip_middleware_factory=None,
+                http="h11",
+                h11_max_incomplete_event_size=HEAD,
+            )
+        finally:
+            door.unlink(missing_ok=True)
+
+
+def pages() -> dict[str, Any]:
+    """Return the pages that exist, by their paths; the first is at ``/``."""
+    names = [name for name in PAGES if find_spec(f"mckibben.app.pages.{name}")]
+    modules = [import_module(f"mckibben.app.pages.{name}") for name in names]
+    return {"/" if at == 0 else f"/{names[at]}": one for at, one in enumerate(modules)}
+
+
+def build(state: State) -> None:
+    """Build the frame of a window, and the page that its address names."""
+    ui.add_css(widgets.style())
+    ui.dark_mode().bind_value_from(widgets.theme, "dark")
+    known, router = pages(), context.client.sub_pages_router
+    with ui.header().classes("bar"):
+        ui.link("Skip to the content", "#content").classes("skip")
+        ui.label("mckibben").classes("brand").props('role=heading aria-level="1"')
+        with ui.element("nav").props('aria-label="Pages"'):
+            tabs = {path: _tab(path, page) for path, page in known.items()}
+        ui.space()
+        running(state)
+        widgets.icon_button("contrast", "Light or dark", lambda: _switch(state))
+
+    def choose(path: str) -> None:
+        for each, tab in tabs.items():
+            tab.classes(**{"add" if each == path.partition("?")[0] else "remove": "chosen"})
+
+    router.on_path_changed(choose)
+    choose(router.current_path)
+    with ui.element("main").props('id=content tabindex="-1"'):
+        ui.sub_pages({path: _builder(page, state) for path, page in known.items()})
+    ui.timer(0.1, lambda: _prefer(state), once=True)
+
+
+def _tab(path: str, page: Any) -> Any:
+    with ui.link(target=path).classes("tab") as tab:
+        ui.icon(page.ICON)
+        ui.label(page.TITLE)
+    return widgets.mark(tab, f"tab-{page.TITLE.split()[0].lower()}")
+
+
+def _builder(page: Any, state: State) -> Callable[[], Any]:
+    return lambda: page.build(state)
+
+
+@view
+def running(state: State) -> None:
+    """Show how many jobs wait or run, on every page."""
+    active = state.jobs.active()
+    if active:
+        ui.spinner(size="16px", color="currentColor")
+        widgets.mark(ui.label(f"{len(active)} running"), "running").props("role=status")
+
+
+def _switch(state: State) -> None:
+    widgets.theme.dark, widgets.theme.known = not widgets.theme.dark, True
+    state.changed()
+
+
+async def _prefer(state: State) -> None:
+    """Take the first browser's preference for light or dark."""
+    if not widgets.theme.known:
+        widgets.theme.known = True
+        with contextlib.suppress(TimeoutError):
+            query = "matchMedia('(prefers-color-scheme: dark)').matches"
+            if await ui.run_javascript(query, timeout=5.0):
+                widgets.theme.dark = True
+                state.changed()
+
+
+def _open(door: Path, link: str) -> None:
+    """Open the browser by a file that only its user can read: commands are seen by all users."""
+    refresh = f'<meta http-equiv="refresh" content="1;url={escape(link)}">'
+    write_text(door, f"<!doctype html><meta charset=utf-8>{refresh}<p>Starting the workbench …</p>")
+    threading.Thread(target=webbrowser.open, args=(door.as_uri(),), daemon=True).start()
+
+
+def _unforeseen(record: logging.LogRecord) -> bool:
+    """Return whether what is logged is no error that a page shows with its remedy."""
+    error = record.exc_info[1] if record.exc_info else record.msg
+    return not isinstance(error, MckibbenError)
+
+
+def _free(port: int) -> int:
+    """Return the port, or a free one for 0; `DataError` if it is taken."""
+    try:
+        with socket.socket() as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind(("127.0.0.1", port))
+            return int(trial.getsockname()[1])
+    except (OSError, OverflowError) as error:
+        problem = f"port {port} cannot be listened on ({error})"
+        raise DataError(problem, remedy="give another `port`, or close what uses it") from None

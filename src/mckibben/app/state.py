@@ -1,0 +1,92 @@
+"""The state that all windows of a workbench share, and the parts of pages that show it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import field
+from functools import wraps
+from typing import Any
+
+from nicegui import binding, ui
+
+from mckibben.app.jobs import Jobs
+from mckibben.app.widgets import error_box
+from mckibben.app.workspace import Workspace
+from mckibben.errors import DataError, MckibbenError
+
+_VIEWS: list[Any] = []
+
+
+def view(build: Callable[..., None]) -> Any:
+    """Make a function a `ui.refreshable` that `State.changed` builds again, in every window.
+
+    What cannot be shown, such as a damaged model, is an error in its place.
+    """
+
+    @wraps(build)
+    def built(*given: Any) -> None:
+        try:
+            build(*given)
+        except MckibbenError as error:
+            error_box(error)
+
+    made = ui.refreshable(built)
+    _VIEWS.append(made)
+    return made
+
+
+@binding.bindable_dataclass
+class State:
+    """What is chosen, for all windows; what is known is in ``workspace`` and ``jobs``.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    jobs : Jobs
+    recording : str
+        Name of the recording that is shown.
+    inputs, outputs : list of str
+        Channels that are modelled.
+    load : str
+        Channel of the load, or empty.
+    model : str
+        Name of the model that is chosen.
+    chosen : dict
+        What else pages choose, by names that begin with the page's.
+    """
+
+    workspace: Workspace
+    jobs: Jobs
+    recording: str = ""
+    inputs: list[str] = field(default_factory=list)
+    outputs: list[str] = field(default_factory=list)
+    load: str = ""
+    model: str = ""
+    chosen: dict[str, Any] = field(default_factory=dict)
+
+    def settle(self) -> None:
+        """Choose what is not chosen, or not there any more."""
+        from mckibben.comparison.channels import channels_of
+
+        names = [entry.name for entry in self.workspace.entries()]
+        if self.recording not in names:
+            self.recording = next(iter(names), "")
+        models = self.workspace.models()
+        if self.model not in models:
+            self.model = next(iter(models), "")
+        known = self.workspace.channels()
+        if not self.inputs or not self.outputs or {*self.inputs, *self.outputs} - {*known}:
+            self.inputs, self.outputs = [], []
+            used = list(self.workspace.used().values())
+            if known and used:
+                try:
+                    sides = channels_of([one.select(known) for one in used], None, None, None)
+                except DataError:
+                    return
+                self.inputs, self.outputs = list(sides.inputs), list(sides.outputs)
+
+    def changed(self) -> None:
+        """Build every `view` again, in all windows; call it after the folder or a choice has changed."""
+        self.settle()
+        for one in _VIEWS:
+            one.refresh()

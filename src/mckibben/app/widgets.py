@@ -1,0 +1,351 @@
+"""Parts that every page is made of: cards, buttons, plots, tables, uploads, errors, empty states.
+
+All sizes are multiples of one unit (8 px), all text has one of four sizes, and all colours are of the
+report's style sheet, light or dark. Pages use these parts, and no colours or sizes of their own.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import traceback
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from functools import cache, partial, wraps
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from nicegui import binding, context, events, run, ui
+
+from mckibben.app.steps import LARGEST
+from mckibben.app.terms import said
+from mckibben.errors import MckibbenError, unforeseen
+from mckibben.numerals import typeset, typeset_within
+from mckibben.report import interactive
+from mckibben.report.builder import Figure, Item, Table, Text
+from mckibben.report.builder import cell as as_text
+from mckibben.report.drawing import Drawing
+
+Json = dict[str, Any]
+
+
+class Theme:
+    """Whether pages are dark; ``known`` once a browser has said so, or a person."""
+
+    dark = binding.BindableProperty()
+    known = False
+
+    def __init__(self) -> None:
+        self.dark = False
+
+
+theme = Theme()
+
+# -- colours and style ----------------------------------------------------------------------------
+
+
+@cache
+def colours(dark: bool) -> dict[str, str]:
+    """Return the report's colours by name."""
+    style = resources.files("mckibben.report").joinpath("templates/report.css").read_text("utf-8")
+    light, _, rest = style.partition("@media")
+    found = dict(re.findall(r"--([\w-]+):\s*(#[0-9a-fA-F]{3,8})", light))
+    if dark:
+        found |= dict(re.findall(r"--([\w-]+):\s*(#[0-9a-fA-F]{3,8})", rest.partition("@media")[0]))
+    return found
+
+
+def style() -> str:
+    """Return the style sheet of all pages."""
+    sheets = []
+    for body, dark in (("body", False), ("body.body--dark", True)):
+        named = "; ".join(f"--{name}: {colour}" for name, colour in colours(dark).items())
+        on = "#10161b" if dark else "#ffffff"
+        brand = "; ".join(
+            f"--q-{name}: {colours(dark)[of]} !important"
+            for name, of in {"primary": "accent", "negative": "warn", "warning": "warn"}.items()
+        )
+        sheets.append(f"{body} {{ {named}; --on: {on}; {brand} }}")
+    sheet = resources.files("mckibben.app").joinpath("style.css").read_text("utf-8")
+    return "\n".join([*sheets, sheet])
+
+
+def mark(element: Any, name: str) -> Any:
+    """Give an element a name for tests and the tour of screenshots (``data-testid``)."""
+    element.props["data-testid"] = name
+    return element
+
+
+def labelled(element: Any, text: str) -> Any:
+    """Give an element a label for screen readers; in a text of props, names could be code."""
+    element.props["aria-label"] = text
+    return element
+
+
+# -- frame of a page --------------------------------------------------------------------------------
+
+
+def heading(title: str, explanation: str = "") -> None:
+    """Show the title of a page, and what it is for in a line."""
+    with ui.element("div").classes("heading"):
+        ui.label(title).classes("title").props('role=heading aria-level="2"')
+        if explanation:
+            ui.label(explanation).classes("muted")
+
+
+@contextmanager
+def card(title: str = "", *, classes: str = "") -> Iterator[Any]:
+    """Make a card; what is made inside stands in it."""
+    with ui.element("section").classes(f"card {classes}") as found:
+        if title:
+            ui.label(title).classes("subtitle").props('role=heading aria-level="3"')
+        yield found
+
+
+@contextmanager
+def row(*, classes: str = "") -> Iterator[Any]:
+    """Make a row of controls, which wraps."""
+    with ui.element("div").classes(f"controls {classes}") as found:
+        yield found
+
+
+@contextmanager
+def details(title: str) -> Iterator[Any]:
+    """Make a fold-out, closed at first, for what is rarely needed."""
+    with ui.expansion(title).classes("details").props("dense") as found, ui.element("div"):
+        yield found
+
+
+@contextmanager
+def dialog(title: str) -> Iterator[Any]:
+    """Make and open a dialog; it is deleted when it closes. Yields it, with ``close()``."""
+    with ui.dialog() as found, ui.element("div").classes("card dialog"):
+        with ui.element("div").classes("controls spread"):
+            ui.label(title).classes("subtitle").props('role=heading aria-level="3"')
+            ui.button(icon="close", on_click=found.close).props(
+                'flat round dense aria-label="Close"'
+            )
+        yield found
+    found.on("hide", found.delete)
+    found.open()
+
+
+def empty(icon: str, title: str, text: str) -> Any:
+    """Show what a place is for while there is nothing in it; add a button with ``with``."""
+    with ui.element("div").classes("empty") as found:
+        ui.icon(icon).classes("large")
+        ui.label(title).classes("subtitle")
+        ui.label(text).classes("muted")
+    return found
+
+
+def next_step(text: str, page: str, path: str) -> None:
+    """Say what comes next, and lead there."""
+    with ui.element("div").classes("next"):
+        ui.label(text).classes("muted")
+        ui.link(f"{page} →", path)
+
+
+# -- actions ---------------------------------------------------------------------------------------
+
+
+def guarded(action: Callable[..., Any]) -> Callable[..., Awaitable[None]]:
+    """Make an action show its errors; it may be a coroutine, and take an event or nothing."""
+
+    @wraps(action)  # so that it is called with an event if the action takes one
+    async def act(*given: Any) -> None:
+        try:
+            found = action(*given)
+            if inspect.iscoroutine(found):
+                await found
+        except MckibbenError as error:
+            error_toast(error)
+        except Exception as error:
+            traceback.print_exception(error)
+            error_toast(unforeseen(error))
+
+    return act
+
+
+def primary(text: str, action: Callable[..., Any], icon: str = "") -> Any:
+    """Make the primary button of a page, of which there is one."""
+    act = guarded(action)
+    return ui.button(text, icon=icon or None, on_click=lambda: act()).props("unelevated no-caps")
+
+
+def button(text: str, action: Callable[..., Any], icon: str = "") -> Any:
+    """Make any other button; without text, the icon needs a tooltip and an ``aria-label``."""
+    act = guarded(action)
+    return ui.button(text, icon=icon or None, on_click=lambda: act()).props("flat dense no-caps")
+
+
+def icon_button(icon: str, label: str, action: Callable[..., Any]) -> Any:
+    """Make a button that is an icon, whose label is its tooltip."""
+    return labelled(button("", action, icon).props("round"), label).tooltip(label)
+
+
+def error_toast(error: Exception | str) -> None:
+    """Show an error, with its remedy in terms of controls, until it is closed."""
+    ui.notify(
+        said(error),
+        type="negative",
+        multi_line=True,
+        timeout=0,
+        close_button="Close",
+        color="warning",
+    )
+
+
+def error_box(error: Exception | str) -> None:
+    """Show an error in its place in a page."""
+    with ui.element("div").classes("error").props("role=alert"):
+        ui.icon("error_outline")
+        ui.label(said(error))
+
+
+def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endings: str) -> Any:
+    """Make a place to drop files, which are streamed to the disk, or to choose them."""
+    found = ui.upload(
+        label=text,
+        multiple=True,
+        auto_upload=True,
+        max_file_size=LARGEST,
+        on_upload=guarded(action),
+        on_rejected=lambda: error_toast(f"A file has more than {LARGEST // 2**20} MiB"),
+    )
+    return found.props(f'flat accept="{endings}"').classes("upload")
+
+
+async def download(path: Path) -> None:
+    """Hand a file over to the browser, through the page's own connection."""
+    client = context.client  # what was clicked may be built again meanwhile
+    content = await run.io_bound(path.read_bytes)
+    client.download(content or b"", path.name)
+
+
+# -- what is shown -----------------------------------------------------------------------------------
+
+
+def plot(drawing: Drawing, *, height: int = 320, dragged: str = "zoom") -> list[Any]:
+    """Show a drawing of `mckibben.report.figures.draw`; return its plots, one for each plane.
+
+    Axes, fonts and colours are the same everywhere; colours follow the theme.
+    """
+    return [
+        plot_of(figure, height=height, dragged=dragged) for figure in interactive.plots(drawing)
+    ]
+
+
+def plot_of(figure: Json, *, height: int = 320, dragged: str = "zoom") -> Any:
+    """Show one figure as `mckibben.report.interactive` makes them."""
+    layout = dict(figure["layout"])
+    axis = {
+        "automargin": True,
+        "gridcolor": "--grid",
+        "linecolor": "--rule",
+        "zerolinecolor": "--rule",
+    }
+    for key in [key for key in layout if key.startswith(("xaxis", "yaxis"))]:
+        layout[key] = axis | layout[key]
+    layout |= {
+        "height": height,
+        "dragmode": dragged,
+        "margin": {"l": 56, "r": 16, "t": 32 if "title" in layout else 16, "b": 48},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "font": {"color": "--ink", "family": "system-ui, sans-serif", "size": 12},
+        "legend": {"orientation": "h", "x": 0, "y": 1, "yanchor": "bottom"},
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "--muted", "activecolor": "--accent"},
+        "uirevision": "same",
+    }
+    config = interactive.CLOSED | {"displayModeBar": "hover", "responsive": True}
+    plain = _plain({"data": figure["data"], "layout": layout}, colours(theme.dark))
+    return ui.plotly(plain | {"config": config}).classes("plot")
+
+
+def _plain(value: Any, palette: dict[str, str]) -> Any:
+    if isinstance(value, dict):
+        if set(value) == {"base", "f4"}:
+            numbers = interactive.unpacked(value)
+            return [None if np.isnan(x) else float(f"{x:.7g}") for x in numbers]
+        return {key: _plain(item, palette) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item, palette) for item in value]
+    if isinstance(value, str) and value.startswith("--"):
+        return palette.get(value[2:], value)
+    return value
+
+
+SCROLL = """{const row = getHtmlElement(%d), list = row?.closest(".list");
+if (list) list.scrollTop = row.offsetTop - list.clientHeight / 2}"""
+"""Keeps the chosen row of a long list in sight when it is built again."""
+
+
+def table(
+    columns: Sequence[str],
+    rows: Sequence[Sequence[Any]],
+    *,
+    chosen: int | None = None,
+    on_choose: Callable[[int], Any] | None = None,
+) -> Any:
+    """Show rows of text and numbers; a row can be chosen by click or keyboard.
+
+    Numbers are to the right and have three digits. A cell that is callable makes its own elements.
+    """
+    scrolls = "wide" if on_choose is None else "wide list"
+    with ui.element("div").classes(scrolls), ui.element("table").classes("table") as found:
+        with ui.element("thead"), ui.element("tr"):
+            for at, name in enumerate(columns):
+                kind = "number" if rows and isinstance(rows[0][at], int | float) else ""
+                with ui.element("th").classes(kind):
+                    ui.label(name)
+        with ui.element("tbody"):
+            for at, cells in enumerate(rows):
+                line = ui.element("tr")
+                if on_choose is not None:
+                    choose = guarded(lambda at=at: on_choose(at))
+                    line.classes("choosable" + " chosen" * (at == chosen)).props("tabindex=0")
+                    if at == chosen:
+                        ui.run_javascript(SCROLL % line.id)
+                    line.on("click", lambda choose=choose: choose(), [])
+                    line.on("keydown.enter.self", lambda choose=choose: choose(), [])
+                with line:
+                    for cell in cells:
+                        _cell(cell)
+    return found
+
+
+def _cell(cell: Any) -> None:
+    number = isinstance(cell, int | float)
+    with ui.element("td").classes("number" if number else ""):
+        if callable(cell):
+            cell()
+        else:
+            ui.label(typeset(as_text(cell)) if number else as_text(cell))
+
+
+def items(found: Sequence[Item]) -> None:
+    """Show what is shown of a result everywhere (`mckibben.report.results`); tables may be folded."""
+    for item in filter(None, found):
+        if isinstance(item, Text):
+            for sentence in item.sentences:
+                ui.label(typeset_within(said(sentence))).classes("muted" if item.style else "")
+        elif isinstance(item, Table):
+            with details(item.summary) if item.summary else nullcontext():
+                titles = item.titles or [""] * len(item.rows)
+                rows = [
+                    [partial(_titled, as_text(line[0]), title), *line[1:]]
+                    for line, title in zip(item.rows, titles, strict=True)
+                ]
+                table(item.headings, rows)
+        elif isinstance(item, Figure):
+            for figure in item.plots[0]:
+                plot_of(figure)
+
+
+def _titled(text: str, title: str) -> None:
+    label = ui.label(text)
+    if title:
+        label.tooltip(title)

@@ -1,1 +1,0 @@
-"""The workbench in the browser: data, loops, models, compensation and code over one folder."""

@@ -1,0 +1,192 @@
+"""Compensators in the workbench: motions, loops, commands, forces and logs, as jobs and in Chromium."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import PI, example, workflow
+from mckibben.app import following
+from mckibben.app.workspace import Workspace
+from mckibben.errors import DataError
+from mckibben.files import write
+from mckibben.options import InvertOptions, TrackOptions
+from mckibben.recording import Recording
+from tests.app.browsing import SLOW, Workbench, seen, visited, workbench
+
+pytestmark = pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
+
+
+def silent(*_: Any) -> None:
+    """Hear of no progress."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the example and two models of it, made without a browser."""
+    workspace = Workspace(tmp_path_factory.mktemp("bench"))
+    for source, role in ((example.TRAIN, "train"), (example.TEST, "test")):
+        file = Path(str(source))
+        with workspace.receiving(file.name, file.stat().st_size) as (part, path):
+            part.write_bytes(file.read_bytes())
+        workspace.add(path.name, role=role)  # type: ignore[arg-type]
+    for model in ("pi", "p2z"):
+        found = workflow.fit(model, workspace.with_role("train"))
+        row: dict[str, Any] = {
+            "status": "ok",
+            "model": model,
+            "data": workspace.digest(),
+            "settings": {},
+        }
+        workspace.save_model(model, found.model, row)
+    return workspace.folder
+
+
+@pytest.fixture
+def workspace(folder: Path) -> Workspace:
+    return Workspace(folder)
+
+
+def stored(workspace: Workspace, kind: str = "triangle") -> str:
+    points = {"displacement": following.motion(kind, 10.0, 5.0, 20.0, 1)}
+    return following.stored(
+        workspace, following.reference(points, {}, 0.02, {"displacement": "mm"})
+    )
+
+
+def test_motions_are_between_their_ends_and_what_is_none_is_refused() -> None:
+    for kind in following.MOTIONS:
+        times, values = np.transpose(following.motion(kind, 12.0, 3.0, 9.0, 2))
+        assert (times[0], times[-1], values[0]) == (0.0, 12.0, 3.0)
+        assert (np.diff(times) > 0).all()
+        assert values.min() >= 3.0
+        assert 5.0 < values.max() <= 9.0
+    run = following.reference({"a": [(0, 1), (2, 3)], "b": [(0, 0), (1, 1)]}, {"c": 5.0}, 0.5, {})
+    assert run.matrix(["a", "b", "c"])[[1, 4]].tolist() == [[1.5, 0.5, 5.0], [3.0, 1.0, 5.0]]
+    for points in ([], [(0.0, 1.0), (0.0, 2.0)]):
+        with pytest.raises(DataError):
+            following.reference({"a": points}, {}, 0.5, {})
+    with pytest.raises(DataError):
+        following.motion("sine", 10.0, 1.0, 1.0, 2)
+    with pytest.raises(DataError):
+        following.of_file(run, ["d"])
+
+
+def test_what_a_model_is_used_as_and_reaches(workspace: Workspace) -> None:
+    assert following.having(workspace, following.compensator) == ["pi"]
+    assert {"inverse", "adaptive", "predictive"} <= following.kinds(workspace, "pi").keys()
+    moved = np.concatenate([run["displacement"] for run in workspace.with_role("train")])
+    ((low, high),) = following.reach(workspace, "pi", {}).values()
+    assert abs(low - moved.min()) < 0.2 * np.ptp(moved) > abs(high - moved.max())
+    assert [*following.twins(workspace, "pi")] == ["p2z", "pi"]  # itself last
+    assert "soft-arm" not in following.rigs(workspace, "pi")
+    assert following.laws(workspace, "pi", "p2z", "")["feedforward"] == ""
+
+
+def test_a_loop_is_beside_no_compensation_and_commands_are_those_of_the_inverse(
+    workspace: Workspace,
+) -> None:
+    name = stored(workspace)
+    given: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}, "reference": name}
+    options = {"noise": 0.1, "approach": 5.0}
+    following.loop(
+        workspace, silent, name="a", controller="feedforward-pid", plant="p2z", options=options,
+        **given,
+    )  # fmt: skip
+    one = following.newest(workspace, "runs")["a"]
+    assert one["rmse"]["displacement"] < one["uncompensated"]["displacement"]
+    assert {"reference_displacement", "uncompensated_displacement", "command_pressure"} <= {
+        *following.read_run(workspace, "a").channels
+    }
+    following.commands(workspace, silent, name="b", **given)
+    wanted = following.read_run(workspace, name)
+    found = following.read_run(workspace, "b")
+    again = workspace.model("pi").simulate(found.select(["pressure"]))
+    np.testing.assert_allclose(again["displacement"], wanted["displacement"], atol=0.05)
+
+
+def test_a_log_is_reviewed_and_a_force_estimated(workspace: Workspace) -> None:
+    given: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}}
+    name = stored(workspace, "sine")
+    following.loop(
+        workspace, silent, name="c", controller="feedforward", plant="p2z", reference=name,
+        options={}, **given,
+    )  # fmt: skip
+    write(following.read_run(workspace, "c"), workspace.path("uploads", "log.csv"))
+    following.review(workspace, silent, name="log", log="log.csv", refit=False, **given)
+    one = following.newest(workspace, "reviews")["log"]
+    assert one["achieved"] == pytest.approx(
+        following.newest(workspace, "runs")["c"]["rmse"]["displacement"], rel=0.3
+    )
+    assert {curve["below"] for curve in one["curves"]} == {True, False}
+
+    time = np.arange(500) * 0.02
+    force = PI.example().simulate(Recording({"pressure": 2 + np.sin(time)}, 0.02))["displacement"]
+    channels = {"pressure": 2 + np.sin(time), "force": force}
+    workspace.add_recording(Recording(channels, 0.02), name="isometric", role="unused")
+    fitted = workflow.fit(
+        "pi", [workspace.recording("isometric")], input=("pressure",), output=("force",)
+    )
+    fitted.model.save(workspace.path("models", "of-force.json"))
+    assert "of-force" in following.having(workspace, following.force_estimate)
+    following.estimate(workspace, silent, name="f", model="of-force", recording="isometric")
+    assert following.newest(workspace, "forces")["f"]["rmse"] < 0.2 * np.ptp(force)
+    workspace.delete("models", "of-force")
+    workspace.remove("isometric")
+
+
+def test_options_are_asked_for_by_their_dataclasses() -> None:
+    pytest.importorskip("nicegui")
+    from mckibben.app.forms import given
+
+    filled = {"horizon": 30.0, "pressures": "0.5 4", "rate_limit": None, "noise": ""}
+    assert given(InvertOptions, filled) == {"horizon": 30, "pressures": (0.5, 4.0)}
+    assert given(TrackOptions, {"noise": 0.0, "delay": 3.0, "pressure_loop": False}) == {
+        "delay": 3,
+        "pressure_loop": False,
+    }
+    with pytest.raises(DataError):
+        given(InvertOptions, {"pressures": "low"})
+
+
+@pytest.fixture
+def bench(folder: Path) -> Iterator[Workbench]:
+    pytest.importorskip("nicegui")
+    with workbench(folder) as found:
+        yield found
+
+
+def test_a_motion_is_followed_in_chromium_and_the_commands_taken(
+    browser: Any, bench: Workbench, workspace: Workspace
+) -> None:
+    for name in following.newest(workspace, "runs"):
+        workspace.delete("runs", name)
+    with visited(browser, bench) as page:
+        seen(page, "tab-compensate").click()
+        seen(page, "nothing-yet")
+        assert page.evaluate("document.documentElement.scrollHeight") <= 1350
+        page.get_by_test_id("field-other").fill("15")
+        seen(page, "edit-points").click()
+        page.get_by_label("displacement of point 2", exact=True).fill("6.5")
+        seen(page, "use-points").click()
+        seen(page, "run").click()
+        runs = seen(page, "runs").locator("tbody tr")
+        page.wait_for_function(
+            "() => document.querySelectorAll('[data-testid=runs] tbody tr').length == 2",
+            timeout=SLOW,
+        )
+        seen(page, "commands-plot")
+        made = following.newest(workspace, "runs")
+        assert {one["controller"] for one in made.values()} == {"feedforward", "feedforward-pid"}
+        (reference,) = {one["reference"].removesuffix(".csv") for one in made.values()}
+        wanted = following.read_run(workspace, reference)["displacement"]
+        assert wanted.max() == pytest.approx(15.0, abs=0.1)
+        page.reload()
+        seen(page, "runs")  # what was done is there again
+        with page.expect_download() as taken:
+            runs.first.get_by_role("button").first.click()
+        assert taken.value.path().read_text().splitlines()[0].count("reference_displacement") == 1

@@ -1,0 +1,163 @@
+"""Models: what is on offer, what jobs write, and fits in Chromium from the drawer to the leaderboard."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mckibben import example
+from mckibben.app import modelling
+from mckibben.app.modelling import comparable, offered, sides_of
+from mckibben.app.workspace import Workspace
+from mckibben.blocks.bands import Banded
+from mckibben.errors import DataError
+from tests.app.browsing import SLOW, seen, visited, workbench
+
+pytestmark = pytest.mark.filterwarnings("ignore::mckibben.errors.MckibbenWarning")
+
+GIVEN: dict[str, Any] = {"inputs": ["pressure"], "outputs": ["displacement"]}
+
+
+def silent(*_: Any) -> None:
+    pass
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    """Return a folder with the example: one recording to train on, one to test on."""
+    found = Workspace(tmp_path / "bench")
+    for source, role in ((example.TRAIN, "train"), (example.TEST, "test")):
+        file = Path(str(source))
+        with found.receiving(file.name, file.stat().st_size) as (part, path):
+            part.write_bytes(file.read_bytes())
+        found.add(path.name, role=role)  # type: ignore[arg-type]
+    return found
+
+
+def test_offers_follow_the_recordings(workspace: Workspace) -> None:
+    sides = sides_of(workspace, ["pressure"], ["displacement"])
+    found = offered(workspace, sides)
+    assert {"pi", "gpi", "arx"} <= {*found.quick} < {one.model for one in found.offers}
+    assert all(found.others.values())
+    for entry in workspace.entries():
+        workspace.change(entry.name, role="test")
+    with pytest.raises(DataError) as raised:
+        offered(workspace, sides)
+    assert raised.value.remedy
+
+
+def test_jobs_write_results_that_compare(workspace: Workspace) -> None:
+    sides = sides_of(workspace, ["pressure"], ["displacement"])
+    modelling.fit(workspace, silent, model="pi", **GIVEN)
+    modelling.fit(workspace, silent, model="gpi", **GIVEN)
+    modelling.fit(workspace, silent, model="gpi", settings={"n_operators": 3}, **GIVEN)
+    rows = comparable(workspace, sides)
+    assert {row["name"] for row in rows} == {"pi", "gpi", "gpi-2"}
+    errors = [row["validation_rmse"] for row in rows]
+    assert errors == sorted(errors)
+    assert errors[-1] < rows[0]["constant"]["validation_rmse"]
+    assert modelling.against(rows) == ""
+    modelling.fit(workspace, silent, model="gpi", **GIVEN)  # takes the place of the first
+    assert len(comparable(workspace, sides)) == 3
+
+    modelling.check(workspace, silent, name="pi")
+    modelling.calibrate(workspace, silent, name="pi")
+    row = next(row for row in comparable(workspace, sides) if row["name"] == "pi")
+    assert row["check"]["on"] == "test"
+    assert row["check"]["verdict"]
+    assert isinstance(workspace.model("pi", "banded"), Banded)
+    modelling.fit(workspace, silent, model="pi", **GIVEN)
+    assert "check" not in (workspace.read("results", "pi") or {})
+
+    test = next(entry.name for entry in workspace.entries() if entry.role == "test")
+    assert next(iter(modelling.parts(workspace, sides))) == test
+    workspace.change(test, role="unused")
+    assert not any(row["current"] for row in comparable(workspace, sides))
+    with pytest.raises(DataError):
+        modelling.calibrate(workspace, silent, name="pi")
+    (part,) = modelling.parts(workspace, sides).values()
+    assert part[1] is not None  # its last part is held out
+    assert comparable(workspace, sides_of(workspace, ["displacement"], ["pressure"])) == []
+
+
+def test_a_model_no_better_than_the_mean_is_not_recommended() -> None:
+    row = {"name": "pi", "model": "pi", "unit": "mm", "current": True, "skill_least": -0.1}
+    row |= {"validation_rmse": 2.0, "test": {"rmse": 2.0}}
+    row["constant"] = {"validation_rmse": 1.0, "test": {"rmse": 1.0}}
+    assert modelling.against([row])
+    assert not modelling.against([row | {"skill_least": 0.5, "test": {"rmse": 0.5}}])
+    assert not modelling.against([row | {"current": False}])
+
+
+def test_models_are_chosen_fitted_and_seen_closer_in_two_windows(
+    browser: Any, workspace: Workspace, tmp_path: Path
+) -> None:
+    narrow: dict[str, Any] = {"viewport": {"width": 400, "height": 850}, "color_scheme": "dark"}
+    with (
+        workbench(tmp_path / "bench") as bench,
+        visited(browser, bench) as page,
+        visited(browser, bench, **narrow) as other,
+    ):
+        for one in (page, other):
+            seen(one, "over-time")
+            one.get_by_test_id("tab-models").click()
+            seen(one, "fit-models")
+        page.get_by_test_id("fit-models").click()
+        seen(page, "tick-none").click()
+        page.get_by_text("Fit 0 models").wait_for(timeout=SLOW)
+        for model in ("pi", "gpi", "mpi"):
+            seen(page, f"model-{model}").click()
+        seen(page, "settings-gpi").click()
+        seen(page, "set-n_operators").fill("4")
+        page.keyboard.press("Tab")
+        seen(page, "fit").click()
+        for one in (page, other):
+            board = seen(one, "leaderboard")
+            board.locator("tr.choosable").nth(2).wait_for(timeout=SLOW)
+        names = [row["name"] for row in workspace.results()]
+        assert {*names} == {"pi", "gpi", "mpi"}
+        assert (workspace.read("results", "gpi") or {})["settings"] == {"n_operators": 4}
+        page.locator("tr.choosable").nth(1).click()
+        for one in (page, other):
+            one.get_by_test_id("closer").get_by_text(f"· {names[1]}").wait_for(timeout=SLOW)
+        page.locator("tr.choosable").nth(2).focus()
+        page.keyboard.press("Enter")
+        page.get_by_test_id("closer").get_by_text(f"· {names[2]}").wait_for(timeout=SLOW)
+        for tab in ("time", "residual"):
+            page.get_by_test_id(f"tab-{tab}").click()
+            seen(page, f"closer-{tab}")
+        page.get_by_test_id("tab-parameters").click()
+        seen(page, "parameters")
+        page.get_by_test_id("tab-band").click()
+        if names[2] not in workspace.names("banded"):
+            seen(page, "calibrate").click()
+        seen(page, "closer-band")
+        page.get_by_test_id("tab-check").click()
+        seen(page, "check").click()
+        seen(other, "verdict")
+        assert other.evaluate("document.documentElement.scrollWidth") <= 400
+        page.reload()
+        seen(page, "verdict")
+        seen(page, "delete-model").click()
+        seen(page, "delete-sure").click()
+        page.locator("tr.choosable").nth(2).wait_for(state="detached", timeout=SLOW)
+        assert len(workspace.names("models")) == 2
+
+
+def test_a_fit_is_cancelled_and_one_that_fails_says_why(
+    browser: Any, workspace: Workspace, tmp_path: Path
+) -> None:
+    failed = {"kind": "fit", "state": "failed", "message": "too few samples"}
+    workspace.write("jobs", "fit-narx", failed | {"given": {"model": "narx", "title": "narx"}})
+    with workbench(tmp_path / "bench") as bench, visited(browser, bench) as page:
+        seen(page, "over-time")
+        page.get_by_test_id("tab-models").click()
+        seen(page, "fits").get_by_text("too few samples").wait_for(timeout=SLOW)
+        page.get_by_test_id("fit-models").click()
+        seen(page, "tick-all").click()
+        seen(page, "fit").click()
+        seen(page, "cancel-all").click()
+        page.get_by_test_id("fits").wait_for(state="detached", timeout=SLOW)
+        assert not workspace.names("jobs") or len(workspace.names("models")) < 5

@@ -1,0 +1,110 @@
+"""What is taken away from the workbench: files made by jobs, scripts that repeat it, in Chromium."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mckibben
+from mckibben import example, workflow
+from mckibben.app import taking
+from mckibben.app.workspace import Workspace
+from tests.app.browsing import Workbench, seen, visited, workbench
+
+pytestmark = pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
+
+SIDES: dict[str, Any] = {"inputs": ["pressure"], "outputs": ["displacement"]}
+
+
+def silent(*_: Any) -> None:
+    """Hear of no progress."""
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """The example, and a model of it."""
+    workspace = Workspace(tmp_path_factory.mktemp("bench"))
+    for source, role in ((example.TRAIN, "train"), (example.TEST, "test")):
+        file = Path(str(source))
+        with workspace.receiving(file.name, file.stat().st_size) as (part, path):
+            part.write_bytes(file.read_bytes())
+        workspace.add(path.name, role=role)  # type: ignore[arg-type]
+    found = workflow.fit("pi", workspace.with_role("train"))
+    row = {"status": "ok", "model": "pi", "data": workspace.digest(), "settings": {}}
+    workspace.save_model("pi", found.model, row)
+    return workspace
+
+
+def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:
+    common: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}}
+    taking.code(workspace, silent, file="a-c.zip", target="c", options={"single": True}, **common)
+    taking.code(workspace, silent, file="b-ros2.zip", target="ros2", options={}, **common)
+    taking.block(workspace, silent, file="c.json", **common)
+    taking.recordings(workspace, silent, file="r.zip", ending=".csv")
+    for kind in ("loops", "time"):
+        taking.figure(workspace, silent, file=f"{kind}.svg", kind=kind, model="pi", **SIDES)
+    folder = workspace.folder / "takeaway"
+    held = {p.name: zipfile.ZipFile(p).namelist() for p in folder.glob("*.zip")}
+    assert {"a_c.c", "a_c.h"} <= {Path(name).name for name in held["a-c.zip"]}
+    assert any(name.endswith("package.xml") for name in held["b-ros2.zip"])
+    assert {name.partition("/")[0] for name in held["r.zip"]} == {"train", "test"}
+    assert [c.name for c in mckibben.load(folder / "c.json").outputs] == ["pressure"]
+    assert all(b"</svg>" in (folder / f"{kind}.svg").read_bytes() for kind in ("loops", "time"))
+
+
+def test_the_scripts_repeat_the_work(workspace: Workspace, tmp_path: Path) -> None:
+    given = workspace, SIDES["inputs"], SIDES["outputs"], "", "pi", "inverse"
+    script = workspace.folder / "script.py"
+    script.write_text(taking.python(*given), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, script], cwd=workspace.folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert mckibben.load(workspace.folder / "pi.json") == workspace.model("pi")
+    assert (workspace.folder / "pi-inverse-c").is_dir()
+
+    taking.recordings(workspace, silent, file="all.zip", ending=".csv")
+    with zipfile.ZipFile(workspace.folder / "takeaway" / "all.zip") as archive:
+        archive.extractall(tmp_path / "recordings")
+    commands = taking.shell(*given).replace("mckibben ", f"{sys.executable} -m mckibben ")
+    (tmp_path / "script.sh").write_text(commands, encoding="utf-8")
+    done = subprocess.run(
+        ["sh", "-e", "script.sh"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert {"leaderboard.json"} <= {path.name for path in (tmp_path / "results").iterdir()}
+    assert mckibben.load(tmp_path / "pi-inverse.json").outputs[0].name == "pressure"
+
+
+@pytest.fixture
+def bench(workspace: Workspace) -> Iterator[Workbench]:
+    pytest.importorskip("nicegui")
+    with workbench(workspace.folder) as found:
+        yield found
+
+
+def test_things_are_taken_in_chromium(browser: Any, bench: Workbench) -> None:
+    with visited(browser, bench) as page:
+        seen(page, "tab-take").click()
+        seen(page, "things")
+        assert page.evaluate("document.documentElement.scrollHeight") <= 1350
+        seen(page, "options-c").click()
+        seen(page, "option-name").fill("inverse_of_it")
+        page.get_by_role("button", name="Done").click()
+        with page.expect_download() as taken:
+            seen(page, "take-c").click()
+        archive = zipfile.ZipFile(io.BytesIO(taken.value.path().read_bytes()))
+        assert any(name.endswith("/inverse_of_it.c") for name in archive.namelist())
+        with page.expect_download(timeout=120_000) as taken:
+            seen(page, "take-report").click()
+        assert "</html>" in taken.value.path().read_text(encoding="utf-8")
+        with page.expect_download() as taken:
+            seen(page, "take-script").click()
+        assert "mckibben.compare(" in taken.value.path().read_text(encoding="utf-8")

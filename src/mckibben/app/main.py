@@ -34,6 +34,11 @@ PAGES = ("data", "look", "models", "compensate", "takeaway")
 TICK = 0.3
 """How often jobs are asked how far they are [s]."""
 
+LEFT = """addEventListener("unhandledrejection", (event) => {
+    if (`${event.reason}`.includes("displayed plot div")) event.preventDefault();
+});"""
+"""A page that is left before its plots are drawn: they are measured once more, in vain."""
+
 ABSENCE = 30.0
 """How long a page that has lost the server is kept as it was [s]."""
 
@@ -123,6 +128,7 @@ def pages() -> dict[str, Any]:
 def build(state: State) -> None:
     """Build the frame of a window, and the page that its address names."""
     ui.add_css(widgets.style())
+    ui.add_head_html(f"<script>{LEFT}</script>")
     ui.dark_mode().bind_value_from(widgets.theme, "dark")
     known, router = pages(), context.client.sub_pages_router
     with ui.header().classes("bar"):

@@ -237,8 +237,11 @@ def track(
     due = np.concatenate([path[:1], path[:-1]])
     errors = seen[:, at_y] - due
     reached = ends(controller.forward_model, offer.followed, offer.rest_length)
-    out = {name: outside(due[:, followed.index(name)], *reached[name]) for name in reached}
-    clipped |= np.any([*out.values(), np.diff(own, prepend=0)[:-1] > 0], axis=0)
+    clipped |= np.diff(own, prepend=0)[:-1] > 0
+    # what creeps or relaxes also goes, for a while, where it is not sure to come
+    out = {
+        name: outside(due[:, followed.index(name)], *reached[name]) & clipped for name in reached
+    }
     part, at_limit = errors[scored], clipped[scored]
     parts = dict(zip(followed, part.T, strict=True))
     far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}

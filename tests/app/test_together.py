@@ -1,0 +1,42 @@
+"""Recordings that are made alike: files of single signals, and other rates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben import Recording
+from mckibben.app import together
+from mckibben.app.workspace import Workspace
+
+
+def test_files_of_single_signals_become_one_recording(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    given = {"pressure": np.arange(50.0), "displacement": np.arange(50.0) ** 2}
+    for run in ("a", "b"):
+        for name, values in given.items():
+            one = Recording({name: values}, 0.1)
+            workspace.add_recording(one, name=f"{name}-{run}", role="test")
+    assert len(together.pairs(workspace)) == 2
+    joined = together.join(workspace)
+    assert [one.name for one in workspace.entries()] == sorted(joined)
+    for name in joined:
+        found = workspace.recording(name)
+        assert workspace.entry(name).role == "test"
+        for channel, values in given.items():
+            assert found[channel] == pytest.approx(values)
+    assert together.pairs(workspace) == []
+
+
+def test_other_rates_are_brought_to_one(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    for step in (0.1, 0.11):
+        time = np.arange(0.0, 20.0, step)
+        one = Recording({"pressure": time, "displacement": 2 * time}, step)
+        workspace.add_recording(one, name=f"run-{step}")
+    assert together.sample_times(workspace) == (0.1, 0.11)
+    together.resample(workspace, 0.11)
+    assert together.sample_times(workspace) is None
+    assert len(workspace.entry("run-0-11").steps) == 0

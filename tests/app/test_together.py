@@ -10,12 +10,14 @@ import pytest
 from mckibben import Recording
 from mckibben.app import together
 from mckibben.app.workspace import Workspace
-from mckibben.arrays import Array
 
 
 def test_files_of_single_signals_become_one_recording(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
-    given: dict[str, Array] = {"pressure": np.arange(50.0), "displacement": np.arange(50.0) ** 2}
+    given = {
+        "pressure": np.linspace(0.0, 49.0, 50),
+        "displacement": np.linspace(0.0, 49.0, 50) ** 2,
+    }
     for run in ("a", "b"):
         for name, values in given.items():
             one = Recording({name: values}, 0.1)
@@ -34,7 +36,7 @@ def test_files_of_single_signals_become_one_recording(tmp_path: Path) -> None:
 def test_other_rates_are_brought_to_one(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
     for step in (0.1, 0.11):
-        time: Array = np.arange(0.0, 20.0, step)
+        time = np.linspace(0.0, 20.0, round(20.0 / step))
         one = Recording({"pressure": time, "displacement": 2 * time}, step)
         workspace.add_recording(one, name=f"run-{step}")
     assert together.sample_times(workspace) == (0.1, 0.11)

@@ -20,7 +20,8 @@ from tests.app.browsing import Workbench, seen, visited, workbench
 
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
 
-SIDES: dict[str, Any] = {"inputs": ["pressure"], "outputs": ["displacement"]}
+OF: dict[str, Any] = {"model": "pi", "use": "inverse", "settings": {}}
+OF |= {"inputs": ["pressure"], "outputs": ["displacement"], "load": ""}
 
 
 def silent(*_: Any) -> None:
@@ -43,13 +44,15 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 
 def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:
-    common: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}}
-    taking.code(workspace, silent, file="a-c.zip", target="c", options={"single": True}, **common)
-    taking.code(workspace, silent, file="b-ros2.zip", target="ros2", options={}, **common)
-    taking.block(workspace, silent, file="c.json", **common)
-    taking.recordings(workspace, silent, file="r.zip", ending=".csv")
+    def take(work: Any, file: str, **options: Any) -> None:
+        work(workspace, silent, file=file, options=options, of=OF)
+
+    take(taking.code, "a-c.zip", single=True)
+    take(taking.code, "b-ros2.zip")
+    take(taking.block, "c.json")
+    take(taking.recordings, "r.zip")
     for kind in ("loops", "time"):
-        taking.figure(workspace, silent, file=f"{kind}.svg", kind=kind, model="pi", **SIDES)
+        take(taking.figure, f"{kind}.svg", figure=kind)
     folder = workspace.folder / "takeaway"
     held = {p.name: zipfile.ZipFile(p).namelist() for p in folder.glob("*.zip")}
     assert {"a_c.c", "a_c.h"} <= {Path(name).name for name in held["a-c.zip"]}
@@ -60,9 +63,8 @@ def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:
 
 
 def test_the_scripts_repeat_the_work(workspace: Workspace, tmp_path: Path) -> None:
-    given = workspace, SIDES["inputs"], SIDES["outputs"], "", "pi", "inverse"
     script = workspace.folder / "script.py"
-    script.write_text(taking.python(*given), encoding="utf-8")
+    script.write_text(taking.python(workspace, OF), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, script], cwd=workspace.folder, capture_output=True, text=True, check=False
     )
@@ -70,10 +72,10 @@ def test_the_scripts_repeat_the_work(workspace: Workspace, tmp_path: Path) -> No
     assert mckibben.load(workspace.folder / "pi.json") == workspace.model("pi")
     assert (workspace.folder / "pi-inverse-c").is_dir()
 
-    taking.recordings(workspace, silent, file="all.zip", ending=".csv")
+    taking.recordings(workspace, silent, file="all.zip", options={}, of=OF)
     with zipfile.ZipFile(workspace.folder / "takeaway" / "all.zip") as archive:
         archive.extractall(tmp_path / "recordings")
-    commands = taking.shell(*given).replace("mckibben ", f"{sys.executable} -m mckibben ")
+    commands = taking.shell(workspace, OF).replace("mckibben ", f"{sys.executable} -m mckibben ")
     (tmp_path / "script.sh").write_text(commands, encoding="utf-8")
     done = subprocess.run(
         ["sh", "-e", "script.sh"], cwd=tmp_path, capture_output=True, text=True, check=False

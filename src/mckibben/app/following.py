@@ -288,12 +288,6 @@ def stored(workspace: Workspace, recording: Recording) -> str:
     return file
 
 
-def references(workspace: Workspace) -> list[str]:
-    """Return the files of references among the runs, newest first."""
-    paths = [p for p in (workspace.folder / "runs").glob("reference*.csv") if p.stat().st_size]
-    return [p.name for p in sorted(paths, key=lambda path: -path.stat().st_mtime_ns)]
-
-
 def read_run(workspace: Workspace, file: str) -> Recording:
     """Return a reference, or the recording of a loop."""
     from mckibben.files import read

@@ -1,4 +1,4 @@
-"""What can be taken away, the jobs that write it into ``takeaway/``, and the scripts that repeat it.
+"""What can be taken away, the jobs that write it into ``takeaway/``, and the script that repeats it.
 
 Every job is given its file, its options, and what all have in common: ``model``, ``use`` and
 ``settings``, of which `following.made` makes a block, and ``inputs``, ``outputs`` and ``load``.
@@ -6,7 +6,6 @@ Every job is given its file, its options, and what all have in common: ``model``
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -32,13 +31,13 @@ C = ("name", "sample_time", "single", "check", "emulate", "link", "limits", "saf
 """Fields of `COptions` that are asked for."""
 
 FLAGS = {
-    "inverse": ("", ""),
-    "adaptive": (", adaptive=True", " --adaptive"),
-    "predictive": (", predictive=True", " --predictive"),
-    "learned": (", learned=train", " --learned recordings/train"),
-    "force": (', wanted="force"', " --for force"),
+    "inverse": "",
+    "adaptive": ", adaptive=True",
+    "predictive": ", predictive=True",
+    "learned": ", learned=train",
+    "force": ', wanted="force"',
 }
-"""What makes a compensator in Python and in a shell."""
+"""What makes a compensator of a model in a script."""
 
 
 @dataclass(frozen=True)
@@ -149,20 +148,9 @@ def _zip(path: Path, base: Path, folder: Path) -> None:
 
 @dataclass(frozen=True)
 class Thing:
-    """Something to take away.
+    """Something to take away: what it is and what for, the job, and its options that are asked for.
 
-    Parameters
-    ----------
-    title, purpose : str
-        What it is, and what for.
-    work : callable
-        The job that writes it.
-    file : str
-        Name of its file, with options, and ``{stem}`` where it is of a model.
-    kind : type or None
-        Its options, a dataclass.
-    fields : tuple of str
-        Those that are asked for.
+    The name of its file has options in braces, and ``{stem}`` where it is of a model.
     """
 
     title: str
@@ -203,7 +191,7 @@ THINGS = {
 }  # fmt: skip
 
 
-# -- scripts ----------------------------------------------------------------------------------------
+# -- the script -------------------------------------------------------------------------------------
 
 
 def fitted(workspace: Workspace) -> tuple[list[str], Json]:
@@ -213,7 +201,7 @@ def fitted(workspace: Workspace) -> tuple[list[str], Json]:
     return list(dict.fromkeys(row["model"] for row in rows)), settings
 
 
-def python(workspace: Workspace, of: Json) -> str:
+def script(workspace: Workspace, of: Json) -> str:
     """Return a Python script: read, compare, save, invert, export."""
     models, settings = fitted(workspace)
     lines = ['"""What was done in the workbench; run it in its folder."""', ""]
@@ -225,38 +213,12 @@ def python(workspace: Workspace, of: Json) -> str:
     sides = {key: of[key] for key in ("inputs", "outputs", "load") if of[key]}
     given = sides | {"models": models} | ({"settings": settings} if settings else {})
     lines += [*(f"    {key}={value!r}," for key, value in given.items()), ")", "print(board)"]
-    if chosen := _kind(workspace, of["model"]):
+    rows = [row["model"] for row in workspace.results() if row["name"] == of["model"]]
+    for chosen in rows:
         lines.append(f"model = next(row.block for row in board.rows if row.model == {chosen!r})")
         lines.append(f'model.save("{chosen}.json")')
         if (use := of["use"]) in FLAGS:
-            lines.append(f"inverse = workflow.invert(model{FLAGS[use][0]})")
+            lines.append(f"inverse = workflow.invert(model{FLAGS[use]})")
             lines.append(f'inverse.block.save("{chosen}-{use}.json")')
             lines.append(f'workflow.export(inverse, "{chosen}-{use}-c", "c")')
     return "\n".join(lines) + "\n"
-
-
-def shell(workspace: Workspace, of: Json) -> str:
-    """Return the same as commands, on the recordings as they are taken away."""
-    models, settings = fitted(workspace)
-    sides = [f"--{side[:-1]}={name}" for side in ("inputs", "outputs") for name in of[side]]
-    more = [f"--load={of['load']}"] if of["load"] else []
-    for kind, own in settings.items():
-        more += [f"--set={kind}.{key}={value}" for key, value in own.items()]
-    tests = [one.name for one in workspace.entries() if one.role == "test"]
-    more += [f"--test=recordings/test/{name}.csv" for name in tests]
-    common = shlex.join(sides)
-    compared = f"mckibben compare recordings/train {common} {shlex.join(more)}"
-    lines = ["# with recordings.zip (CSV) unpacked in the folder recordings"]
-    lines.append(f"{compared} --models {','.join(models)} -o results")
-    if chosen := _kind(workspace, of["model"]):
-        lines.append(f"mckibben fit {chosen} recordings/train {common} -o {chosen}.json")
-        if (use := of["use"]) in FLAGS:
-            file = f"{chosen}-{use}"
-            lines.append(f"mckibben invert {chosen}.json{FLAGS[use][1]} -o {file}.json")
-            lines.append(f"mckibben export c {file}.json -o {file}-c")
-    return "\n".join(lines) + "\n"
-
-
-def _kind(workspace: Workspace, model: str) -> str:
-    """Return what kind a fitted model is."""
-    return next((str(r["model"]) for r in workspace.results() if r["name"] == model), "")

@@ -141,17 +141,21 @@ def _wish(state: State) -> dict[str, Any]:
     if asked == [[*wish.get("channels", {})], [*wish.get("held", {})]]:
         return wish
     wish = state.chosen["compensate.wish"] = following.wish(workspace, name)
-    ran = [one["reference"] for one in following.newest(workspace, "runs").values()
-           if one["model"] == name]  # fmt: skip
-    with suppress(MckibbenError):  # it may be gone
-        _take(wish, following.read_run(workspace, ran[0]) if ran else None, ran[0] if ran else "")
+    ran = [one["reference"] for one in _ran(state).values()]
+    for file in ran[:1]:
+        with suppress(MckibbenError):  # it may be gone
+            _take(wish, following.read_run(workspace, file), file)
     return wish
 
 
-def _take(wish: dict[str, Any], recording: Recording | None, stored: str = "") -> None:
+def _ran(state: State) -> dict[str, dict[str, Any]]:
+    """Return the runs of the model that is inverted, the newest first."""
+    runs, name = following.newest(state.workspace, "runs"), _able(state)
+    return {run: one for run, one in runs.items() if one["model"] == name}
+
+
+def _take(wish: dict[str, Any], recording: Recording, stored: str = "") -> None:
     """Take the motion of a recording; a stored one keeps its name, so that its runs are shown."""
-    if recording is None:
-        return
     for channel, points in following.of_file(recording, wish["channels"]).items():
         wish["channels"][channel] |= {"kind": "points", "points": points}
     for channel in {*wish["held"]} & {*recording.channels}:
@@ -181,6 +185,10 @@ def _motion(state: State, names: list[str]) -> None:
         moved()
         page.refresh()
 
+    async def loaded(event: events.UploadEventArguments) -> None:
+        _take(wish, (await trying.received(state, event))[1])
+        page.refresh()
+
     with widgets.card("Motion"):
         if len(channels) > 1:
             toggle = ui.toggle([*channels]).bind_value(wish, "now")
@@ -207,7 +215,10 @@ def _motion(state: State, names: list[str]) -> None:
                 _number(wish["held"], key, f"{key}, held [{channel.unit}]", moved)
         with widgets.row():
             mark(widgets.button("Edit points", lambda: _edit(state), "table_rows"), "edit-points")
-            _files(state, wish)
+            with ui.element("div").style("display: none"):
+                files = widgets.upload("", loaded, ".csv,.tsv,.txt,.parquet,.xlsx,.mat")
+                mark(files, "reference-file")
+            widgets.button("From a file", lambda: files.run_method("pickFiles"), "upload_file")
     _compensator(state, name)
 
 
@@ -215,31 +226,6 @@ def _number(values: dict[str, Any], key: str, label: str, changed: Callable[[], 
     field = ui.number(label, format="%.6g").bind_value(values, key)
     field.props("dense outlined debounce=400").classes("number")
     mark(field, f"field-{key}").on_value_change(lambda _: changed())
-
-
-def _files(state: State, wish: dict[str, Any]) -> None:
-    """Let the motion be taken from a file, or from an earlier reference."""
-
-    async def loaded(event: events.UploadEventArguments) -> None:
-        _take(wish, (await trying.received(state, event))[1])
-        page.refresh()
-
-    with ui.element("div").style("display: none"):
-        files = widgets.upload("", loaded, ".csv,.tsv,.txt,.parquet,.xlsx,.mat")
-        mark(files, "reference-file")
-    widgets.button("From a file", lambda: files.run_method("pickFiles"), "upload_file")
-    if not (earlier := following.references(state.workspace)):
-        return
-
-    def again(event: events.ValueChangeEventArguments[Any]) -> None:
-        file = str(event.value)
-        _take(wish, following.read_run(state.workspace, file), file)
-        page.refresh()
-
-    value = wish["stored"] if wish["stored"] in earlier else None
-    titles = {file: file.removesuffix(".csv") for file in earlier}
-    field = ui.select(titles, value=value, label="Earlier", on_change=widgets.guarded(again))
-    mark(field.props("dense outlined"), "earlier")
 
 
 def _edit(state: State) -> None:
@@ -355,17 +341,13 @@ async def _start(state: State, name: str) -> None:
 
 
 def _followed(state: State) -> None:
-    name, wish, workspace = _able(state), _wish(state), state.workspace
-    reach = following.reach(workspace, name)
-    runs = {
-        run: one for run, one in following.newest(workspace, "runs").items()
-        if one["model"] == name and one["reference"] == wish["stored"]
-    }  # fmt: skip
+    wish, runs, reference = _wish(state), _ran(state), _reference(state)
+    reach = following.reach(state.workspace, _able(state))
+    of_it = [run for run, one in runs.items() if one["reference"] == wish["stored"]]
     chosen = state.chosen.get("compensate.run")
-    chosen = chosen if chosen in runs else next(iter(runs), "")
-    with widgets.card("What is wanted, and what came of it" if runs else "What is wanted"):
-        reference = _reference(state)
-        drawn = dict.fromkeys([*([chosen] if chosen else []), *runs])
+    chosen = chosen if chosen in of_it else next(iter(of_it), "")
+    with widgets.card("What is wanted, and what came of it" if chosen else "What is wanted"):
+        drawn = dict.fromkeys([*filter(None, [chosen]), *of_it])
         _motion_plot(state, reference, reach, {run: runs[run] for run in [*drawn][:DRAWN]})
         together = "; each channel by itself, all at once less" if len(reach) > 1 else ""
         ui.label(f"Shaded: what the model reaches{together}.").classes("muted")
@@ -437,7 +419,7 @@ def _due(one: Recording) -> Any:
 
 
 def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) -> None:
-    """Show the errors of all runs of the motion; what else is shown is of the one that is chosen."""
+    """Show the errors of all runs of the model; one that is chosen brings its motion back."""
     names, rows = [*runs], []
     for name, one in runs.items():
         plain = one.get("uncompensated") or {}
@@ -448,16 +430,20 @@ def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) ->
             or "–"
             for of in errors
         ]
-        rows.append(
-            [_title(one), *texts, str(one.get("clipped", "–")), partial(_acts, state, name)]
-        )
+        motion = one["reference"].removesuffix(".csv")
+        limited = str(one.get("clipped", "–"))
+        rows.append([_title(one), motion, *texts, limited, partial(_acts, state, name)])
 
     def choose(at: int) -> None:
-        state.chosen["compensate.run"] = names[at]
-        results.refresh()
+        state.chosen["compensate.run"], file = names[at], runs[names[at]]["reference"]
+        if file == _wish(state)["stored"]:
+            results.refresh()
+        else:
+            _take(_wish(state), following.read_run(state.workspace, file), file)
+            page.refresh()
 
-    columns = ["Run", "RMSE", "No compensation", "Largest", "Steps at a limit", ""]
-    at = names.index(chosen)
+    columns = ["Run", "Motion", "RMSE", "No compensation", "Largest", "Steps at a limit", ""]
+    at = names.index(chosen) if chosen else None
     mark(widgets.table(columns, rows, chosen=at, on_choose=choose), "runs")
 
 

@@ -147,16 +147,12 @@ def script(state: State) -> None:
     """Show the script that does it all again."""
     if not taking.fitted(state.workspace)[0]:
         return
-    kinds = {"script.py": "Python", "script.sh": "Shell"}
-    name = state.chosen.setdefault("takeaway.script", "script.py")
-    text = (taking.python if name == "script.py" else taking.shell)(state.workspace, _of(state))
+    text = taking.script(state.workspace, _of(state))
     with widgets.card("All of it as a script"):
-        with widgets.row(classes="spread"):
-            field = ui.toggle(kinds).bind_value(state.chosen, "takeaway.script")
-            field.props("dense no-caps unelevated").on_value_change(script.refresh)
-            mark(field, "script-kind")
-            get = widgets.button(name, lambda: ui.download.content(text, name), "download")
-            mark(get, "take-script")
+        take = widgets.button(
+            "script.py", lambda: ui.download.content(text, "script.py"), "download"
+        )
+        mark(take, "take-script")
         mark(ui.label(text).classes("code script"), "script")
 
 

@@ -95,15 +95,15 @@ def test_a_loop_is_beside_no_compensation_and_commands_are_those_of_the_inverse(
     given: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}, "reference": name}
     options = {"noise": 0.1, "approach": 5.0}
     following.loop(
-        workspace, silent, name="a", controller="feedforward-pid", plant="model p2z", options=options,
-        **given,
+        workspace, silent, name="a",
+        asked=given | {"controller": "feedforward-pid", "plant": "model p2z", "options": options},
     )  # fmt: skip
     one = following.newest(workspace, "runs")["a"]
     assert one["rmse"]["displacement"] < one["uncompensated"]["rmse"]["displacement"]
     assert {"reference_displacement", "uncompensated_displacement", "command_pressure"} <= {
         *following.read_run(workspace, "a.csv").channels
     }
-    following.commands(workspace, silent, name="b", **given)
+    following.commands(workspace, silent, name="b", asked=given)
     wanted = following.read_run(workspace, name)
     found = following.read_run(workspace, "b.csv")
     again = workspace.model("pi").simulate(found.select(["pressure"]))
@@ -112,15 +112,13 @@ def test_a_loop_is_beside_no_compensation_and_commands_are_those_of_the_inverse(
 
 def test_a_log_is_reviewed_and_a_force_estimated(workspace: Workspace) -> None:
     given: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}}
-    name = stored(workspace, "sine")
+    given["reference"] = stored(workspace, "sine")
     following.loop(
-        workspace, silent, name="c", controller="feedforward", plant="model p2z", reference=name,
-        options={}, **given,
+        workspace, silent, name="c",
+        asked=given | {"controller": "feedforward", "plant": "model p2z", "options": {}},
     )  # fmt: skip
     write(following.read_run(workspace, "c.csv"), workspace.path("uploads", "log.csv"))
-    following.review(
-        workspace, silent, name="log", log="log.csv", model="pi", form="inverse", refit=False
-    )
+    following.review(workspace, silent, name="log", asked=given | {"log": "log.csv"})
     one = following.newest(workspace, "reviews")["log"]
     assert one["outputs"][0]["achieved"] == pytest.approx(
         following.newest(workspace, "runs")["c"]["rmse"]["displacement"], rel=0.3

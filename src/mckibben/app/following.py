@@ -20,7 +20,7 @@ from mckibben.app.workspace import Workspace
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
-from mckibben.errors import DataError, DataWarning, MckibbenError, ModelError, ModelWarning
+from mckibben.errors import DataError, MckibbenError, MckibbenWarning, ModelError
 from mckibben.recording import Recording
 
 if TYPE_CHECKING:
@@ -93,6 +93,11 @@ def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any])
     return invert(block, **given).block
 
 
+def of_model(workspace: Workspace, name: str, key: str, make: Callable[[], Any]) -> Any:
+    """Return what is made of a model, once."""
+    return workspace.cached(workspace.path("models", f"{name}.json"), key, make)
+
+
 def uses(workspace: Workspace, name: str) -> dict[str, str]:
     """Return what a model can be used as, in words; the first time takes a moment."""
     from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
@@ -105,8 +110,9 @@ def uses(workspace: Workspace, name: str) -> dict[str, str]:
             return bool(made(workspace, name, use, {}))
         return False
 
-    path = workspace.path("models", f"{name}.json")
-    known = workspace.cached(path, "uses", lambda: [u for u in USES if u != "banded" and able(u)])
+    known = of_model(
+        workspace, name, "uses", lambda: [*filter(able, [u for u in USES if u != "banded"])]
+    )
     if workspace.path("banded", f"{name}.json").is_file():
         known = [*known, "banded"]
     return {use: words for use, words in USES.items() if use in known}
@@ -136,9 +142,8 @@ def asked_for(workspace: Workspace, name: str) -> tuple[dict[str, Channel], dict
         held = {key: channels[key] for key in block.scheduling if key in channels}
         return {key: one for key, one in channels.items() if key not in held}, held
 
-    path = workspace.path("models", f"{name}.json")
-    found: tuple[dict[str, Channel], dict[str, Channel]] = workspace.cached(path, "asked", make)
-    return found
+    channels, held = of_model(workspace, name, "asked", make)
+    return channels, held
 
 
 # -- what the recordings say of a motion --------------------------------------------------------------
@@ -181,8 +186,7 @@ def reach(workspace: Workspace, name: str) -> dict[str, Ends]:
             found[channel] = low, high if high > low else low + 1.0
         return found
 
-    path = workspace.path("models", f"{name}.json")
-    return dict(workspace.cached(path, f"reach {workspace.digest()}", make))
+    return dict(of_model(workspace, name, f"reach {workspace.digest()}", make))
 
 
 # -- motions ----------------------------------------------------------------------------------------
@@ -359,23 +363,20 @@ def titled(law: str) -> str:
 # -- jobs -------------------------------------------------------------------------------------------
 
 
-def loop(
-    workspace: Workspace, tell: Tell, *, name: str, model: str, form: str, settings: Json,
-    reference: str, controller: str, plant: str, options: Json,
-) -> str:  # fmt: skip
+def loop(workspace: Workspace, tell: Tell, *, name: str, asked: Json) -> str:
     """Let a controller follow a reference on a model or a virtual rig, beside no compensation."""
     from mckibben.files import write
     from mckibben.report import results
     from mckibben.workflow import track
 
-    block, wanted = made(workspace, model, form, settings), read_run(workspace, reference)
-    there: Json = {plant.partition(" ")[0].replace("model", "plant"): plant_of(workspace, plant)}
-    run = track(block, wanted, controller=controller, progress=tell, **there, **options)
+    block = made(workspace, asked["model"], asked["form"], asked["settings"])
+    plant: Any = "rig" if asked["plant"].startswith("rig ") else "plant"
+    there = {plant: plant_of(workspace, asked["plant"])} | asked["options"]
+    wanted = read_run(workspace, asked["reference"])
+    run = track(block, wanted, controller=asked["controller"], progress=tell, **there)
     recording = run.uncompensated.beside(run.tracked.recording).with_meta(name=name)
     write(recording, workspace.path("runs", f"{name}.csv"))
-    content = run.to_dict() | {"model": model, "form": form, "settings": settings}
-    content |= {"reference": reference, "controller": controller, "plant": plant}
-    content |= {"options": options, "shown": kept(results.tracking(run))}
+    content = run.to_dict() | asked | {"shown": kept(results.tracking(run))}
     content["units"] = {key: recording.units[key] for key in run.tracked.rmse}
     workspace.write("runs", name, content)
     if isinstance(run.controller, Block):
@@ -383,57 +384,50 @@ def loop(
     return "It is done"
 
 
-def commands(
-    workspace: Workspace, tell: Tell, *, name: str, model: str, form: str, settings: Json,
-    reference: str,
-) -> str:  # fmt: skip
+def commands(workspace: Workspace, tell: Tell, *, name: str, asked: Json) -> str:
     """Write what a compensator commands for a reference, for a rig that is elsewhere."""
     from mckibben.files import write
     from mckibben.report.builder import Text
 
-    tell(0.1)
-    whole, notes = read_run(workspace, reference), []
+    form, whole, notes = asked["form"], read_run(workspace, asked["reference"]), []
     if form == "adaptive":
+        form = "inverse"
         notes.append("These are the commands that it begins with: it learns from measurements.")
-    block = made(workspace, model, "inverse" if form == "adaptive" else form, settings)
+    block = made(workspace, asked["model"], form, asked["settings"] if form != "inverse" else {})
     ahead = block.samples_ahead  # it is given what is wanted so many samples early
-    given = {
-        channel.name: np.append(whole[channel.name], np.repeat(whole[channel.name][-1:], ahead))
-        for channel in block.inputs
-    }
-    units = {channel: whole.units[channel] for channel in given}
-    found, said = heard(lambda: block.simulate(Recording(given, whole.sample_time, units)))
+    names = [channel.name for channel in block.inputs]
+    given = {key: np.append(whole[key], np.repeat(whole[key][-1:], ahead)) for key in names}
+    units = {key: whole.units[key] for key in names}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = block.simulate(Recording(given, whole.sample_time, units))
+    notes += [str(one.message) for one in caught if issubclass(one.category, MckibbenWarning)]
     channels = {f"reference_{key}": whole[key] for key in whole.channels}
     units = {f"reference_{key}": unit for key, unit in whole.units.items()} | dict(found.units)
     channels |= {key: found[key][ahead:] for key in found.channels}
     run = Recording(channels, whole.sample_time, units, meta={"name": name})
     write(run, workspace.path("runs", f"{name}.csv"))
-    content: Json = {"model": model, "form": form, "settings": settings, "reference": reference}
-    workspace.write("runs", name, content | {"shown": kept([Text([*notes, *said], "note")])})
+    shown = [Text(list(dict.fromkeys(notes)), "note")]
+    workspace.write("runs", name, asked | {"shown": kept(shown)})
     return "It is done"
 
 
-def review(
-    workspace: Workspace, tell: Tell, *, name: str, log: str, model: str, form: str, refit: bool
-) -> str:
+def review(workspace: Workspace, tell: Tell, *, name: str, asked: Json, refit: bool = False) -> str:
     """Say how far a logged loop was off its reference, and why; with a refit, save that too."""
     from mckibben.diagnosis.refit import Refit
     from mckibben.files import read
     from mckibben.report import results, words
-    from mckibben.report.builder import Text
     from mckibben.workflow import review as find
 
-    read_log, notes = heard(lambda: read(workspace.path("uploads", log), informative=False))
-    runs, block = list(read_log), workspace.model(model)
+    runs = list(read(workspace.path("uploads", asked["log"]), informative=False))
+    block = workspace.model(asked["model"])
     if refit:
         needed = {channel.name for channel in (*block.inputs, *block.outputs)}
         older = [run for run in workspace.with_role("train") if needed <= {*run.channels}]
         runs += [r for r in older if not any(c.startswith("reference_") for c in r.channels)]
-    tell(0.1)
-    ran = made(workspace, model, form, {})
+    ran = made(workspace, asked["model"], asked["form"], {})
     found = find(runs, model=block, compensator=ran, refit=refit)
-    content = found.to_dict() | {"log": log, "model": model, "form": form}
-    content |= {"shown": kept([*results.review(found, DRAWN), Text(notes, "note")])}
+    content = found.to_dict() | asked | {"shown": kept(results.review(found, DRAWN))}
     if isinstance(found.refit, Refit):
         found.refit.model.save(workspace.path("reviews", f"{name}-refit.json"))
         content["refitted"] = True
@@ -453,15 +447,6 @@ def shown(one: Mapping[str, Any]) -> list[Any]:
     known: dict[str, Any] = {"text": Text, "table": Table, "figure": Figure}
     sentences = one.get("sentences") or one.get("notes") or []
     return [known[i["kind"]](**i) for i in one.get("shown", [])] or [Text(sentences)]
-
-
-def heard(work: Callable[[], Any]) -> tuple[Any, list[str]]:
-    """Return what work gives, and the package's warnings meanwhile."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        found = work()
-    notes = [str(w.message) for w in caught if issubclass(w.category, (DataWarning, ModelWarning))]
-    return found, list(dict.fromkeys(notes))
 
 
 def newest(workspace: Workspace, kind: str) -> dict[str, Json]:

@@ -16,17 +16,9 @@ from mckibben.options import Option, parsed
 def fields(
     kind: type, names: Iterable[str], values: dict[str, Any], words: Mapping[str, str] | None = None
 ) -> None:
-    """Make a control for each of some options, bound to a value of its name.
+    """Make controls of some fields of a dataclass, bound to values of their names; see `given`.
 
-    Parameters
-    ----------
-    kind : type
-        Dataclass of options, as those of `mckibben.options`.
-    names : iterable of str
-    values : dict
-        Values by name, which the controls read and set; see `given`.
-    words : mapping of str to str, optional
-        What can be chosen, in words.
+    ``words`` say what can be chosen.
     """
     hints, defaults = get_type_hints(kind, include_extras=True), kind()
     for name in names:
@@ -54,10 +46,7 @@ def fields(
 def given(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return what was filled in, as JSON, without what is empty or as it is by default.
 
-    Raises
-    ------
-    DataError
-        On a text that is not of the form of its option.
+    `DataError` on a text that is not of the form of its option.
     """
     hints, defaults = get_type_hints(kind, include_extras=True), kind()
     found: dict[str, Any] = {}

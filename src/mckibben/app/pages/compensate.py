@@ -334,7 +334,6 @@ async def _start(state: State, name: str) -> None:
         loop = given | {"plant": plant, "options": options, "controller": law}
         title = " ".join([name, *([form] if form != "inverse" else []), law])
         trying.submit(state, following.loop, "runs", title, loop)
-    state.changed()
 
 
 # -- what came of it ----------------------------------------------------------------------------------

@@ -63,17 +63,24 @@ def select(
     return str(state.chosen[key])
 
 
-def submit(state: State, work: Any, kind: str, title: str, given: dict[str, Any]) -> None:
+def submit(
+    state: State, work: Any, kind: str, title: str, asked: dict[str, Any], **more: Any
+) -> None:
     """Submit a job that writes a result of a kind, in place of one of the same; forget failed ones."""
     for job in [job for job in state.jobs.jobs.values() if job.kind == work.__name__]:
-        if job.active and given.items() <= job.given.items():
+        if job.active and job.given["asked"] == asked:
             return
         if job.state == "failed":
             state.jobs.forget(job.name)
     before = following.newest(state.workspace, kind).items()
-    same = [name for name, one in before if all(one.get(key) == x for key, x in given.items())]
+    same = (
+        [name for name, one in before if all(one.get(key) == x for key, x in asked.items())]
+        if not more
+        else []
+    )
     name = next(iter(same), "") or state.workspace.new_name(kind, title)
-    state.jobs.submit(work, title, **given, name=name)
+    state.jobs.submit(work, title, name=name, asked=asked, **more)
+    state.changed()
 
 
 def going(state: State, kinds: Sequence[str]) -> None:
@@ -161,9 +168,8 @@ def log(state: State, names: list[str]) -> None:
         if not any(key.startswith("reference_") for key in found.channels):
             problem, remedy = "it has no reference", "name a column reference_displacement_mm"
             raise DataError(problem, file=path, remedy=remedy)
-        given = {"log": path.name, "model": name, "form": state.chosen["compensate.form"]}
-        submit(state, following.review, "reviews", path.stem, given | {"refit": False})
-        state.changed()
+        asked = {"log": path.name, "model": name, "form": state.chosen["compensate.form"]}
+        submit(state, following.review, "reviews", path.stem, asked)
 
     with widgets.card("Back from the rig"):
         ui.label(
@@ -213,9 +219,8 @@ def reviewed(state: State) -> None:
             return
 
         def again() -> None:
-            given = {key: str(one.get(key, "inverse")) for key in ("log", "model", "form")}
-            submit(state, following.review, "reviews", f"{name} refit", given | {"refit": True})
-            state.changed()
+            asked = {key: str(one.get(key, "inverse")) for key in ("log", "model", "form")}
+            submit(state, following.review, "reviews", f"{name} refit", asked, refit=True)
 
         mark(widgets.button("Try a refit with the log", again), "refit")
 

@@ -180,7 +180,7 @@ def test_a_motion_is_followed_in_chromium_and_the_commands_taken(
             "() => document.querySelectorAll('[data-testid=runs] tbody tr').length == 2",
             timeout=SLOW,
         )
-        seen(page, "commands-plot")
+        assert "command_pressure" in seen(page, "motion-plot").inner_text()
         made = following.newest(workspace, "runs")
         assert {one["controller"] for one in made.values()} == {"feedforward", "feedforward-pid"}
         (reference,) = {one["reference"] for one in made.values()}

@@ -49,7 +49,7 @@ def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:
 
     take(taking.code, "a-c.zip", single=True)
     take(taking.code, "b-ros2.zip")
-    take(taking.block, "c.json")
+    take(taking.code, "c.json")
     take(taking.recordings, "r.zip")
     for kind in ("loops", "time"):
         take(taking.figure, f"{kind}.svg", figure=kind)

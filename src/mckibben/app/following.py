@@ -243,7 +243,8 @@ def motion(kind: str, seconds: float, first: float, other: float, cycles: int) -
         shares = np.append(np.column_stack([begin, begin + 0.999 / stairs.size]).ravel()[:-1], 1.0)
         levels = np.repeat(stairs, 2)
     values = first + (other - first) * levels
-    return [(float(f"{seconds * t:.6g}"), float(f"{y:.6g}")) for t, y in zip(shares, values)]  # noqa: B905
+    pairs = zip(seconds * shares, values, strict=True)
+    return [(float(f"{t:.6g}"), float(f"{y:.6g}")) for t, y in pairs]
 
 
 def reference(

@@ -91,19 +91,15 @@ def figure(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Js
     return f"{file} is written"
 
 
-def block(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json) -> str:
-    """Write a model, or what is made of it, as JSON."""
-    found = made(workspace, of["model"], of["use"], of["settings"])
-    found.save(workspace.path("takeaway", file))
-    return f"{file} is written"
-
-
 def code(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json) -> str:
-    """Export a model, or what is made of it, as code; a folder becomes a zip."""
+    """Write a model, or what is made of it, as JSON or code; a folder becomes a zip."""
     from mckibben.workflow import export
 
     found = made(workspace, of["model"], of["use"], of["settings"])
     path = workspace.path("takeaway", file)
+    if path.suffix == ".json":
+        found.save(path)
+        return f"{file} is written"
     target: Any = next((x for x in ("c", "ros2") if file.endswith(f"-{x}.zip")), "fmu")
     name = "".join(c if c.isalnum() else "_" for c in path.stem).strip("_")
     given: Json = {"name": name.lower() if target == "ros2" else name, "force": True} | options
@@ -171,7 +167,7 @@ THINGS = {
         "Figure", "For print: measured and modelled.",
         *(figure, "{stem}-{figure}.{format}", FigureOptions, ("figure", "format")),
     ),
-    "json": Thing("JSON", "For this library again: mckibben.load(file).", block, "{stem}.json"),
+    "json": Thing("JSON", "For this library again: mckibben.load(file).", code, "{stem}.json"),
     "c": Thing(
         "C99", "For a microcontroller or a PC: compiles as it is, with a self-test.",
         *(code, "{stem}-c.zip", COptions, C),

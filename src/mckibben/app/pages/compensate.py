@@ -107,19 +107,15 @@ def results(state: State) -> None:
 
 def _empty(state: State, tab: str) -> None:
     if fitting := ", ".join(job.title for job in state.jobs.active() if job.kind == "fit"):
-        title = "Models are being fitted"
-        text = f"Their inverses can be tried here then: {fitting}."
+        title, text = "Models are being fitted", f"They can be tried here then: {fitting}."
     elif tab == "force":
         title = "No model here gives a force"
         text = "Fit balance-force with the force as output, or balance on recordings with a force."
-    elif state.workspace.models():
-        title = "None of these models has an inverse"
-        text = "Fit another kind, such as gpi for one muscle, or balance or sdchm for several."
     else:
         title = "A compensator is the inverse of a model"
         text = (
-            "Fit a model first. Its inverse says what to command so that the muscle moves as wanted; "
-            "it is tried here on another model, or on a virtual rig, before it goes to yours."
+            "Its inverse says what to command so that the muscle moves as wanted. Fit a model that "
+            "has one, such as gpi for one muscle, or balance or sdchm for several."
         )
     with widgets.card(), widgets.empty("moving", title, text):
         ui.link("Models →", "/models")
@@ -358,11 +354,12 @@ def _followed(state: State) -> None:
         trying.going(state, ("loop", "commands"))
         if runs:
             _errors(state, runs, chosen)
+            if chosen:
+                with widgets.details(f"More of {_title(runs[chosen])}"):
+                    widgets.items(following.shown(runs[chosen]))
         else:
             text = "Run shows the errors beside no compensation, and the commands, here."
             mark(ui.label(text).classes("muted"), "nothing-yet")
-    if chosen:
-        _commands(state, chosen, runs[chosen])
 
 
 def _title(one: Mapping[str, Any]) -> str:
@@ -387,7 +384,10 @@ def _motion_plot(
     reach: Mapping[str, following.Ends],
     runs: Mapping[str, Mapping[str, Any]],
 ) -> None:
-    """Draw what is wanted over time, what came of it, and shade what can be reached."""
+    """Draw what is wanted over time, and what came of it; shade what can be reached.
+
+    Below are the commands of the first run, which is the one that is chosen.
+    """
     panels = []
     ran = {name: one for name in runs if (one := _scored(state, name)) is not None}
     for channel in reach:
@@ -402,6 +402,14 @@ def _motion_plot(
                 look = _title(runs[name]), series_colour(place), "line"
                 courses.append((_due(one), one[channel], *look))
         panels.append((axis_label(channel, reference.units.get(channel, "")), courses))
+    for name, one in [*ran.items()][:1]:
+        found = _commanded(one, {*runs[name].get("rmse", {}), *_wish(state)["held"]})
+        courses = [
+            (one.time, one[key], key, series_colour(place), "line")
+            for place, key in enumerate(found)
+        ]
+        if found:
+            panels.append((axis_label("command", one.units.get(found[0], "")), courses))
     (figure,) = interactive.plots(trying.drawing(panels))
     for row, (low, high) in enumerate(reach.values()):
         axis = str(row + 1) if row else ""
@@ -459,32 +467,9 @@ def _acts(state: State, name: str) -> None:
         widgets.icon_button("delete_outline", f"Delete {name}", away)
 
 
-def _commands(state: State, name: str, one: Mapping[str, Any]) -> None:
-    """Draw what was commanded in a run, and say what else came of it."""
-    recording = _scored(state, name)
-    if recording is None:
-        return
+def _commanded(one: Recording, known: set[str]) -> list[str]:
+    """Return the channels of what was commanded in a run, or else of what drove the plant."""
     kinds = ("pressure", "voltage", "force", "command")
-    known = {*one.get("rmse", {}), *_wish(state)["held"]}
-    found = [
-        key for key in recording.channels if key.partition("_")[0] in kinds and key not in known
-    ]
-    found = [key for key in found if np.ptp(recording[key]) > 0]
-    found = [key for key in found if key.startswith("command_")] or found
-    with widgets.card(f"Commands: {_title(one)}"):
-        if found:
-            label = axis_label("command", recording.units.get(found[0], ""))
-            courses = [
-                (recording.time, recording[key], key, series_colour(place), "line")
-                for place, key in enumerate(found)
-            ]
-            (plot,) = widgets.plot(trying.drawing([(label, courses)]), height=200)
-            mark(plot, "commands-plot")
-        if one.get("rmse"):
-            with widgets.details("What else came of it"):
-                widgets.items(following.shown(one))
-        else:
-            widgets.items(following.shown(one))
-            path = state.workspace.path("runs", f"{name}.csv")
-            take = partial(widgets.download, path)
-            mark(widgets.button("Download commands", take, "download"), "take")
+    found = [key for key in one.channels if key.partition("_")[0] in kinds and key not in known]
+    found = [key for key in found if np.ptp(one[key]) > 0]
+    return [key for key in found if key.startswith("command_")] or found

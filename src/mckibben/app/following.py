@@ -338,20 +338,25 @@ def plants(workspace: Workspace, name: str) -> dict[str, str]:
             return inputs <= {*there.inputs} and outputs <= {*there.outputs} and not driven
         return False
 
-    found = {f"model {x}": f"{x} (another model)" for x in workspace.models() if x != name}
+    models = workspace.models()
+    found = {f"model {x}": f"{x} (another model)" for x in models if x != name}
     found |= {f"rig {rig}": f"{rig} (virtual rig, another muscle)" for rig in rig_names()}
     found[f"model {name}"] = f"{name} (itself: proves nothing)"
-    fitting = {plant: words for plant, words in found.items() if fits(plant)}
-    return fitting | {"": "nothing: the commands alone, for your rig"}
+    key = f"plants {models} {workspace.channels()}"
+    fitting = of_model(workspace, name, key, lambda: [*filter(fits, found)])
+    last = {"": "nothing: the commands alone, for your rig"}
+    return {plant: found[plant] for plant in fitting} | last
 
 
 def laws(workspace: Workspace, name: str, plant: str) -> dict[str, str]:
     """Return the controllers that close a loop on a plant, in words."""
     from mckibben.control.laws import refusal
 
-    there, block = plant_of(workspace, plant), made(workspace, name, "inverse", {})
-    fitting = [law for law in registry.names("controllers") if not refusal(law, block, there)]
-    return {law: titled(law) for law in fitting}
+    def make() -> list[str]:
+        there, block = plant_of(workspace, plant), made(workspace, name, "inverse", {})
+        return [law for law in registry.names("controllers") if not refusal(law, block, there)]
+
+    return {law: titled(law) for law in of_model(workspace, name, f"laws {plant}", make)}
 
 
 def titled(law: str) -> str:

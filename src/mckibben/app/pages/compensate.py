@@ -59,6 +59,7 @@ def _prepare(state: State) -> None:
     with suppress(MckibbenError):
         if following.having(state.workspace, "inverse"):
             _wish(state)
+            following.plants(state.workspace, _able(state))
 
 
 @ui.refreshable

@@ -112,7 +112,9 @@ def force(state: State, names: list[str]) -> None:
     needed = {channel.name for channel in block.inputs}
     used = workspace.used()
     roles = {x.name: f"{x.name} ({x.role})" for x in workspace.entries() if x.name in used}
-    fitting = {key: words for key, words in roles.items() if needed <= {*used[key].channels}}
+    given = [channel.name for channel in block.outputs]  # recordings that have it come first
+    order = sorted(roles, key=lambda key: (given[0] not in used[key], "(test)" not in roles[key]))
+    fitting = {key: roles[key] for key in order if needed <= {*used[key].channels}}
     with widgets.card("Force from what is measured"):
         text = f"From {', '.join(sorted(needed))}. As JSON, C or FMU: under Take away."
         ui.label(text).classes("muted")

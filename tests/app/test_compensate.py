@@ -77,14 +77,15 @@ def test_motions_are_between_their_ends_and_what_is_none_is_refused() -> None:
 
 
 def test_what_a_model_is_used_as_and_reaches(workspace: Workspace) -> None:
-    assert following.having(workspace, following.compensator) == ["pi"]
-    assert {"inverse", "adaptive", "predictive"} <= following.kinds(workspace, "pi").keys()
+    assert following.having(workspace, "inverse") == ["pi"]
+    assert {"inverse", "adaptive", "predictive"} <= following.uses(workspace, "pi").keys()
     moved = np.concatenate([run["displacement"] for run in workspace.with_role("train")])
-    ((low, high),) = following.reach(workspace, "pi", {}).values()
+    ((low, high),) = following.reach(workspace, "pi").values()
     assert abs(low - moved.min()) < 0.2 * np.ptp(moved) > abs(high - moved.max())
-    assert [*following.twins(workspace, "pi")] == ["p2z", "pi"]  # itself last
-    assert "soft-arm" not in following.rigs(workspace, "pi")
-    assert following.laws(workspace, "pi", "p2z", "")["feedforward"] == ""
+    first, *plants = following.plants(workspace, "pi")
+    assert (first, plants[-2:]) == ("model p2z", ["model pi", ""])  # itself last
+    assert "rig soft-arm" not in plants
+    assert "feedforward" in following.laws(workspace, "pi", "model p2z")
 
 
 def test_a_loop_is_beside_no_compensation_and_commands_are_those_of_the_inverse(
@@ -94,35 +95,35 @@ def test_a_loop_is_beside_no_compensation_and_commands_are_those_of_the_inverse(
     given: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}, "reference": name}
     options = {"noise": 0.1, "approach": 5.0}
     following.loop(
-        workspace, silent, name="a", controller="feedforward-pid", plant="p2z", options=options,
-        **given,
+        workspace, silent, name="a",
+        asked=given | {"controller": "feedforward-pid", "plant": "model p2z", "options": options},
     )  # fmt: skip
     one = following.newest(workspace, "runs")["a"]
-    assert one["rmse"]["displacement"] < one["uncompensated"]["displacement"]
+    assert one["rmse"]["displacement"] < one["uncompensated"]["rmse"]["displacement"]
     assert {"reference_displacement", "uncompensated_displacement", "command_pressure"} <= {
-        *following.read_run(workspace, "a").channels
+        *following.read_run(workspace, "a.csv").channels
     }
-    following.commands(workspace, silent, name="b", **given)
+    following.commands(workspace, silent, name="b", asked=given)
     wanted = following.read_run(workspace, name)
-    found = following.read_run(workspace, "b")
+    found = following.read_run(workspace, "b.csv")
     again = workspace.model("pi").simulate(found.select(["pressure"]))
     np.testing.assert_allclose(again["displacement"], wanted["displacement"], atol=0.05)
 
 
 def test_a_log_is_reviewed_and_a_force_estimated(workspace: Workspace) -> None:
     given: dict[str, Any] = {"model": "pi", "form": "inverse", "settings": {}}
-    name = stored(workspace, "sine")
+    given["reference"] = stored(workspace, "sine")
     following.loop(
-        workspace, silent, name="c", controller="feedforward", plant="p2z", reference=name,
-        options={}, **given,
+        workspace, silent, name="c",
+        asked=given | {"controller": "feedforward", "plant": "model p2z", "options": {}},
     )  # fmt: skip
-    write(following.read_run(workspace, "c"), workspace.path("uploads", "log.csv"))
-    following.review(workspace, silent, name="log", log="log.csv", refit=False, **given)
+    write(following.read_run(workspace, "c.csv"), workspace.path("uploads", "log.csv"))
+    following.review(workspace, silent, name="log", asked=given | {"log": "log.csv"})
     one = following.newest(workspace, "reviews")["log"]
-    assert one["achieved"] == pytest.approx(
+    assert one["outputs"][0]["achieved"] == pytest.approx(
         following.newest(workspace, "runs")["c"]["rmse"]["displacement"], rel=0.3
     )
-    assert {curve["below"] for curve in one["curves"]} == {True, False}
+    assert {item.kind for item in following.shown(one)} == {"text", "figure"}
 
     time = np.arange(500) * 0.02
     force = PI.example().simulate(Recording({"pressure": 2 + np.sin(time)}, 0.02))["displacement"]
@@ -132,9 +133,9 @@ def test_a_log_is_reviewed_and_a_force_estimated(workspace: Workspace) -> None:
         "pi", [workspace.recording("isometric")], input=("pressure",), output=("force",)
     )
     fitted.model.save(workspace.path("models", "of-force.json"))
-    assert "of-force" in following.having(workspace, following.force_estimate)
-    following.estimate(workspace, silent, name="f", model="of-force", recording="isometric")
-    assert following.newest(workspace, "forces")["f"]["rmse"] < 0.2 * np.ptp(force)
+    assert "of-force" in following.having(workspace, "force")
+    found = following.estimate(workspace, "of-force", "isometric")
+    assert found.metrics["force"]["rmse"] < 0.2 * np.ptp(force)
     workspace.delete("models", "of-force")
     workspace.remove("isometric")
 
@@ -179,10 +180,10 @@ def test_a_motion_is_followed_in_chromium_and_the_commands_taken(
             "() => document.querySelectorAll('[data-testid=runs] tbody tr').length == 2",
             timeout=SLOW,
         )
-        seen(page, "commands-plot")
+        assert "command_pressure" in seen(page, "motion-plot").inner_text()
         made = following.newest(workspace, "runs")
         assert {one["controller"] for one in made.values()} == {"feedforward", "feedforward-pid"}
-        (reference,) = {one["reference"].removesuffix(".csv") for one in made.values()}
+        (reference,) = {one["reference"] for one in made.values()}
         wanted = following.read_run(workspace, reference)["displacement"]
         assert wanted.max() == pytest.approx(15.0, abs=0.1)
         page.reload()

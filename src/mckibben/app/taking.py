@@ -1,16 +1,22 @@
-"""Jobs that write what is taken away, into ``takeaway/``, and the script that does everything again."""
+"""What can be taken away, the jobs that write it into ``takeaway/``, and the script that repeats it.
+
+Every job is given its file, its options, and what all have in common: ``model``, ``use`` and
+``settings``, of which `following.made` makes a block, and ``inputs``, ``outputs`` and ``load``.
+"""
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterator
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from mckibben.app.following import made, pace
+from mckibben.app.following import Json, made, pace
 from mckibben.app.jobs import Tell
-from mckibben.app.workspace import Role, Workspace
+from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
+from mckibben.options import COptions, ExportOptions, FMUOptions, Option, StudyOptions
 
 FIGURES = {
     "loops": "Measured and modelled loops",
@@ -21,217 +27,194 @@ FIGURES = {
     "time": "Recordings over time",
 }
 
+C = ("name", "sample_time", "single", "check", "emulate", "link", "limits", "safe", "watchdog")
+"""Fields of `COptions` that are asked for."""
 
-def report(
-    workspace: Workspace,
-    tell: Tell,
-    *,
-    file: str,
-    models: list[str],
-    settings: dict[str, Any],
-    inputs: list[str],
-    outputs: list[str],
-    load: str,
-    heading: str,
-) -> str:
-    """Study the recordings with some models, and write the page."""
+FLAGS = {
+    "inverse": "",
+    "adaptive": ", adaptive=True",
+    "predictive": ", predictive=True",
+    "learned": ", learned=train",
+    "force": ', wanted="force"',
+}
+"""What makes a compensator of a model in a script."""
+
+
+@dataclass(frozen=True)
+class FigureOptions:
+    """Options of a figure."""
+
+    figure: Annotated[Literal["loops", "fit", "residuals", "weights", "loop", "time"],
+                      Option("What is drawn, of the test recordings.")] = "loops"  # fmt: skip
+    format: Annotated[Literal["pdf", "svg", "png"], Option("Of the file.")] = "pdf"
+
+
+@dataclass(frozen=True)
+class RecordingOptions:
+    """Options of recordings."""
+
+    format: Annotated[Literal["csv", "parquet"], Option("Of the files.")] = "csv"
+
+
+# -- jobs -------------------------------------------------------------------------------------------
+
+
+def report(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json) -> str:
+    """Study the recordings with the models that were fitted, and write the page."""
     from mckibben.report import write_report
     from mckibben.workflow import study
 
+    models, settings = fitted(workspace)
     if not models:
         raise DataError("no model is fitted to these recordings", remedy="fit one under Models")
-    sides: dict[str, Any] = {"inputs": inputs, "outputs": outputs, "load": load or None}
-    given: dict[str, Any] = {"models": models, "settings": settings, "title": heading}
+    given = {"inputs": of["inputs"], "outputs": of["outputs"], "load": of["load"] or None}
+    given |= {"models": models, "settings": settings, "jobs": 1, "allow_early": True} | options
     train, test = workspace.with_role("train"), workspace.with_role("test")
-    found = study(train, test, **sides, **given, jobs=1, allow_early=True, progress=tell)
-    write_report(found, workspace.path("takeaway", file), title=heading)
+    found = study(train, test, **given, progress=tell)
+    write_report(found, workspace.path("takeaway", file), title=options.get("title", ""))
     return f"{file} is written"
 
 
-def figure(
-    workspace: Workspace,
-    tell: Tell,
-    *,
-    file: str,
-    kind: str,
-    model: str,
-    inputs: list[str],
-    outputs: list[str],
-) -> str:
+def figure(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json) -> str:
     """Draw the test recordings, or else those for training, for print."""
     from mckibben.report.figures import write_figure
 
-    tell(0.1)
-    runs, path = workspace.with_role("test"), workspace.path("takeaway", file)
-    runs = runs or workspace.with_role("train")
+    runs = workspace.with_role("test") or workspace.with_role("train")
     if not runs:
         raise DataError("there is no recording to draw", remedy="add one under Data")
+    kind: str = options.get("figure", FigureOptions.figure)
+    draw = partial(write_figure, path=workspace.path("takeaway", file), kind=kind)
     if kind in ("loop", "time"):
-        write_figure(runs, path, kind, input=inputs[0], output=outputs[0])
-    elif kind == "weights":
-        write_figure(workspace.model(model), path, kind)
+        draw(runs, input=of["inputs"][0], output=of["outputs"][0])
     else:
-        write_figure(workspace.model(model), path, kind, recording=runs)
+        draw(workspace.model(of["model"]), recording=runs)
     return f"{file} is written"
 
 
-def block(
-    workspace: Workspace, tell: Tell, *, file: str, model: str, form: str, settings: dict[str, Any]
-) -> str:
-    """Write a model, or what is made of it, as JSON."""
-    tell(0.1)
-    made(workspace, model, form, settings).save(workspace.path("takeaway", file))
-    return f"{file} is written"
-
-
-def code(
-    workspace: Workspace,
-    tell: Tell,
-    *,
-    file: str,
-    model: str,
-    form: str,
-    settings: dict[str, Any],
-    target: Any,
-    options: dict[str, Any],
-) -> str:
-    """Export a model, or what is made of it, as code; a folder becomes a zip."""
+def code(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json) -> str:
+    """Write a model, or what is made of it, as JSON or code; a folder becomes a zip."""
     from mckibben.workflow import export
 
-    tell(0.1)
-    found = made(workspace, model, form, settings)
-    told = {key: value for key, value in options.items() if key != "sample_time"}
-    if found.rate_dependent:
-        told["sample_time"] = options.get("sample_time") or pace(workspace, model)[0]
+    found = made(workspace, of["model"], of["use"], of["settings"])
     path = workspace.path("takeaway", file)
-    name = options.get("name") or "".join(c if c.isalnum() else "_" for c in path.stem).strip("_")
-    told["name"] = name.lower() if target == "ros2" else name
+    if path.suffix == ".json":
+        found.save(path)
+        return f"{file} is written"
+    target: Any = next((x for x in ("c", "ros2") if file.endswith(f"-{x}.zip")), "fmu")
+    name = "".join(c if c.isalnum() else "_" for c in path.stem).strip("_")
+    given: Json = {"name": name.lower() if target == "ros2" else name, "force": True} | options
+    given.pop("sample_time", None)
+    if found.rate_dependent:
+        step = options.get("sample_time")
+        given["sample_time"] = step or pace(workspace, of["model"])[0]
     to = path if target == "fmu" else path.with_suffix("")
-    export(found, to, target, force=True, **told)
+    export(found, to, target, **given)
     if to != path:
-        _zip(workspace, file, {f"{to.name}/{p.relative_to(to).as_posix()}": p for p in _files(to)})
+        _zip(path, to.parent, to)
     return f"{file} is written"
 
 
-def recordings(workspace: Workspace, tell: Tell, *, file: str, ending: str) -> str:
+def recordings(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json) -> str:
     """Write the recordings in use as they are after their steps, by role, as a zip."""
     from mckibben.files import write
 
-    folder, found = workspace.path("takeaway", file).with_suffix(""), {}
+    path = workspace.path("takeaway", file)
+    folder, ending = path.with_suffix(""), options.get("format", RecordingOptions.format)
     for role in ("train", "test"):
         (folder / role).mkdir(parents=True, exist_ok=True)
         for run in workspace.with_role(role):
-            write(run, folder / role / f"{run.name}{ending}")
-            tell(0.5)
-    found = {p.relative_to(folder).as_posix(): p for p in _files(folder)}
-    if not found:
-        raise DataError("no recording is in use", remedy="add one under Data")
-    _zip(workspace, file, found)
+            write(run, folder / role / f"{run.name}.{ending}")
+    _zip(path, folder, folder)
     return f"{file} is written"
 
 
-def _files(folder: Path) -> list[Path]:
-    return [path for path in folder.rglob("*") if path.is_file() and not path.is_symlink()]
-
-
-def _zip(workspace: Workspace, file: str, found: dict[str, Path]) -> None:
+def _zip(path: Path, base: Path, folder: Path) -> None:
     from mckibben.export.folders import zipped
     from mckibben.system.atomic import replacing
 
-    content = zipped({name: path.read_bytes() for name, path in found.items()})
-    with replacing(workspace.path("takeaway", file)) as new:
-        new.write_bytes(content)
+    files = [p for p in folder.rglob("*") if p.is_file() and not p.is_symlink()]
+    if not files:
+        raise DataError("no recording is in use", remedy="add one under Data")
+    with replacing(path) as new:
+        new.write_bytes(zipped({p.relative_to(base).as_posix(): p.read_bytes() for p in files}))
 
 
-# -- scripts ----------------------------------------------------------------------------------------
+# -- the list ---------------------------------------------------------------------------------------
 
 
-def fitted(workspace: Workspace) -> tuple[list[str], dict[str, Any]]:
+@dataclass(frozen=True)
+class Thing:
+    """Something to take away: what it is and what for, the job, and its options that are asked for.
+
+    The name of its file has options in braces, and ``{stem}`` where it is of a model.
+    """
+
+    title: str
+    purpose: str
+    work: Callable[..., str]
+    file: str
+    kind: type | None = None
+    fields: tuple[str, ...] = ()
+
+
+THINGS = {
+    "report": Thing(
+        "Report",
+        "What the muscle does, the models, their test and inverse: one page that opens anywhere.",
+        *(report, "report.html", StudyOptions, ("title",)),
+    ),
+    "figure": Thing(
+        "Figure", "For print: measured and modelled.",
+        *(figure, "{stem}-{figure}.{format}", FigureOptions, ("figure", "format")),
+    ),
+    "json": Thing("JSON", "For this library again: mckibben.load(file).", code, "{stem}.json"),
+    "c": Thing(
+        "C99", "For a microcontroller or a PC: compiles as it is, with a self-test.",
+        *(code, "{stem}-c.zip", COptions, C),
+    ),
+    "fmu": Thing(
+        "FMU", "For Simulink and other tools; it is compiled here, up to a minute.",
+        *(code, "{stem}.fmu", FMUOptions, ("name", "sample_time", "platforms")),
+    ),
+    "ros2": Thing(
+        "ROS 2", "A controller of ros2_control, to be built by colcon.",
+        *(code, "{stem}-ros2.zip", ExportOptions, ("name", "sample_time")),
+    ),
+    "recordings": Thing(
+        "Recordings", "As they are after cuts and filters, by role, with units.",
+        *(recordings, "recordings.zip", RecordingOptions, ("format",)),
+    ),
+}  # fmt: skip
+
+
+# -- the script -------------------------------------------------------------------------------------
+
+
+def fitted(workspace: Workspace) -> tuple[list[str], Json]:
     """Return the kinds of models that were fitted to the recordings as they are, with settings."""
     rows = [row for row in workspace.results() if row["current"] and row.get("model")]
     settings = {row["model"]: row["settings"] for row in reversed(rows) if row.get("settings")}
     return list(dict.fromkeys(row["model"] for row in rows)), settings
 
 
-def python(
-    workspace: Workspace, inputs: list[str], outputs: list[str], load: str, model: str, form: str
-) -> str:
+def script(workspace: Workspace, of: Json) -> str:
     """Return a Python script: read, compare, save, invert, export."""
-    return "\n".join(_python(workspace, inputs, outputs, load, model, form))
-
-
-def _python(
-    workspace: Workspace, inputs: list[str], outputs: list[str], load: str, model: str, form: str
-) -> Iterator[str]:
-    yield from (
-        '"""What was done in the workbench; run it in its folder."""',
-        "",
-        "import mckibben",
-        "from mckibben import workflow",
-        "",
-    )
-    roles: tuple[Role, Role] = ("train", "test")
-    for role in roles:
-        yield f"{role} = ["
-        yield from (f"    {one.code()}," for one in workspace.entries() if one.role == role)
-        yield "]"
     models, settings = fitted(workspace)
-    told = f", settings={settings!r}" if settings else ""
-    told += f", load={load!r}" if load else ""
-    yield from ("board = mckibben.compare(", "    train,", "    test,")
-    yield from (
-        f"    inputs={inputs!r},",
-        f"    outputs={outputs!r},",
-        f"    models={models!r}{told},",
-    )
-    yield from (")", "print(board)")
-    chosen = next(
-        (r["model"] for r in workspace.results() if r["name"] == model), models[0] if models else ""
-    )
-    if not chosen:
-        return
-    yield f"model = next(row.block for row in board.rows if row.model == {chosen!r})"
-    yield f'model.save("{chosen}.json")'
-    flag = {
-        "adaptive": ", adaptive=True",
-        "predictive": ", predictive=True",
-        "learned": ", learned=train",
-    }
-    flag |= {"force": ', wanted="force"', "inverse": ""}
-    if form in flag:
-        yield f"inverse = workflow.invert(model{flag[form]})"
-        yield f'inverse.block.save("{chosen}-{form}.json")'
-        yield f'workflow.export(inverse, "{chosen}-{form}-c", "c")'
-
-
-def shell(
-    workspace: Workspace, inputs: list[str], outputs: list[str], load: str, model: str, form: str
-) -> str:
-    """Return the same as commands, on the recordings as they are taken away."""
-    models, settings = fitted(workspace)
-    sides = [*(f"--input {name}" for name in inputs), *(f"--output {name}" for name in outputs)]
-    told = " ".join(map(shlex.quote, " ".join(sides).split()))
-    sets = " ".join(
-        shlex.join(["--set", f"{of}.{key}={value}"])
-        for of, own in settings.items()
-        for key, value in own.items()
-    )
-    test = " ".join(
-        f"--test recordings/test/{one.name}.csv"
-        for one in workspace.entries()
-        if one.role == "test"
-    )
-    more = " ".join(part for part in (f"--load {load}" if load else "", sets, test) if part)
-    lines = ["# with recordings.zip (CSV) unpacked in the folder recordings"]
-    lines += [
-        f"mckibben compare recordings/train {more} {told} --models {','.join(models)} -o results"
-    ]
-    chosen = next((r["model"] for r in workspace.results() if r["name"] == model), "")
-    if chosen:
-        lines += [f"mckibben fit {chosen} recordings/train {told} -o {chosen}.json"]
-        flag = {"adaptive": " --adaptive", "predictive": " --predictive", "force": " --for force"}
-        flag |= {"inverse": "", "learned": " --learned recordings/train"}
-        if form in flag:
-            lines += [f"mckibben invert {chosen}.json{flag[form]} -o {chosen}-{form}.json"]
-            lines += [f"mckibben export c {chosen}-{form}.json -o {chosen}-{form}-c"]
-    return "\n".join(" ".join(line.split()) for line in lines) + "\n"
+    lines = ['"""What was done in the workbench; run it in its folder."""', ""]
+    lines += ["import mckibben", "from mckibben import workflow", ""]
+    for role in ("train", "test"):
+        runs = [f"    {one.code()}," for one in workspace.entries() if one.role == role]
+        lines += [f"{role} = [", *runs, "]"]
+    lines += ["board = mckibben.compare(", "    train,", "    test,"]
+    sides = {key: of[key] for key in ("inputs", "outputs", "load") if of[key]}
+    given = sides | {"models": models} | ({"settings": settings} if settings else {})
+    lines += [*(f"    {key}={value!r}," for key, value in given.items()), ")", "print(board)"]
+    rows = [row["model"] for row in workspace.results() if row["name"] == of["model"]]
+    for chosen in rows:
+        lines.append(f"model = next(row.block for row in board.rows if row.model == {chosen!r})")
+        lines.append(f'model.save("{chosen}.json")')
+        if (use := of["use"]) in FLAGS:
+            lines.append(f"inverse = workflow.invert(model{FLAGS[use]})")
+            lines.append(f'inverse.block.save("{chosen}-{use}.json")')
+            lines.append(f'workflow.export(inverse, "{chosen}-{use}-c", "c")')
+    return "\n".join(lines) + "\n"

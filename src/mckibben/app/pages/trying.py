@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
 from nicegui import events, run, ui
 
 from mckibben.app import following, widgets
+from mckibben.app.later import later
 from mckibben.app.state import State
-from mckibben.app.terms import said
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError
-from mckibben.numerals import number
-from mckibben.report import interactive
-from mckibben.report.drawing import Curve, Drawing, Panel, axis_label
+from mckibben.recording import Recording
+from mckibben.report.drawing import Curve, Drawing, Panel, axis_label, over_time
+
+Course = tuple[Any, Any, str, str, Any]
+"""Times, values, name, colour and style of a curve."""
 
 
-def choose(state: State, key: str, value: Any) -> None:
-    """Take a choice, and show what follows."""
-    if state.chosen.get(key) != value:
-        state.chosen[key] = value
-        state.changed()
+def drawing(panels: Sequence[tuple[str, Sequence[Course]]]) -> Drawing:
+    """Return curves over time in panels below each other; a name is in the legend once."""
+    drawn, named = [], set[str]()
+    for label, courses in panels:
+        curves = [
+            Curve(*over_time(time, y), name * (name not in named), colour, style)
+            for time, y, name, colour, style in courses
+        ]
+        named |= {course[2] for course in courses}
+        drawn.append(Panel("time [s]", label, tuple(curves)))
+    return Drawing(tuple(drawn), stacked=True)
 
 
 def model_of(state: State, names: Sequence[str]) -> str:
@@ -34,9 +41,7 @@ def model_of(state: State, names: Sequence[str]) -> str:
 def select_model(state: State, names: Sequence[str]) -> None:
     """Let one of some models be chosen."""
     first = next(iter(state.workspace.models()), "")
-    titles = {
-        name: f"{name} (first of the leaderboard)" * (name == first) or name for name in names
-    }
+    titles = {x: f"{x} (first of the leaderboard)" * (x == first) or x for x in names}
 
     def chosen(event: events.ValueChangeEventArguments[Any]) -> None:
         state.model = str(event.value)
@@ -46,19 +51,36 @@ def select_model(state: State, names: Sequence[str]) -> None:
     mark(field.props("dense outlined"), "model")
 
 
-def submit(state: State, work: Any, title: str, given: dict[str, Any]) -> None:
-    """Submit a job; what the same one gave before is replaced, and what failed is forgotten."""
-    name = ""
+def select(
+    state: State, key: str, options: dict[str, str], label: str, changed: Callable[[], Any]
+) -> str:
+    """Let one of some options be chosen, the first by default; return which is."""
+    key = f"compensate.{key}"
+    if state.chosen.get(key) not in options:
+        state.chosen[key] = next(iter(options), "")
+    field = ui.select(options, label=label).bind_value(state.chosen, key).props("dense outlined")
+    mark(field, key.partition(".")[2]).on_value_change(lambda _: changed())
+    return str(state.chosen[key])
+
+
+def submit(
+    state: State, work: Any, kind: str, title: str, asked: dict[str, Any], **more: Any
+) -> None:
+    """Submit a job that writes a result of a kind, in place of one of the same; forget failed ones."""
     for job in [job for job in state.jobs.jobs.values() if job.kind == work.__name__]:
-        same = {**job.given, "name": ""} == {**given, "name": ""}
-        if same and job.active:
+        if job.active and job.given["asked"] == asked:
             return
-        if same or job.state == "failed":
-            name = str(job.given["name"]) if same else name
+        if job.state == "failed":
             state.jobs.forget(job.name)
-    kind = {"review": "reviews", "estimate": "forces"}.get(work.__name__, "runs")
-    name = name or state.workspace.new_name(kind, title)
-    state.jobs.submit(work, title, **given, name=name)
+    before = following.newest(state.workspace, kind).items()
+    same = (
+        [name for name, one in before if all(one.get(key) == x for key, x in asked.items())]
+        if not more
+        else []
+    )
+    name = next(iter(same), "") or state.workspace.new_name(kind, title)
+    state.jobs.submit(work, title, name=name, asked=asked, **more)
+    state.changed()
 
 
 def going(state: State, kinds: Sequence[str]) -> None:
@@ -84,98 +106,72 @@ def going(state: State, kinds: Sequence[str]) -> None:
 
 
 def force(state: State, names: list[str]) -> None:
-    """Ask for a model that gives a force, and a recording."""
-    name = model_of(state, names)
-    needed = {channel.name for channel in following.force_estimate(state.workspace, name).inputs}
-    roles = {entry.name: entry.role for entry in state.workspace.entries()}
-    fitting = [key for key, one in state.workspace.used().items() if needed <= {*one.channels}]
-    fitting.sort(key=lambda key: roles[key] != "test")
-    titles = {key: f"{key} ({roles[key]})" for key in fitting}
+    """Ask for a model that gives a force, and for a recording."""
+    workspace, name = state.workspace, model_of(state, names)
+    block = following.made(workspace, name, "force", {})
+    needed = {channel.name for channel in block.inputs}
+    used = workspace.used()
+    roles = {x.name: f"{x.name} ({x.role})" for x in workspace.entries() if x.name in used}
+    given = [channel.name for channel in block.outputs]  # recordings that have it come first
+    order = sorted(roles, key=lambda key: (given[0] not in used[key], "(test)" not in roles[key]))
+    fitting = {key: roles[key] for key in order if needed <= {*used[key].channels}}
     with widgets.card("Force from what is measured"):
-        ui.label(f"From {', '.join(sorted(needed))}.").classes("muted")
+        text = f"From {', '.join(sorted(needed))}. As JSON, C or FMU: under Take away."
+        ui.label(text).classes("muted")
         with widgets.row(classes="fields"):
             select_model(state, names)
-            if state.chosen.get("compensate.recording") not in titles:
-                state.chosen["compensate.recording"] = next(iter(titles), None)
-            field = ui.select(titles, label="Recording").props("dense outlined")
-            mark(field.bind_value(state.chosen, "compensate.recording"), "recording")
-
-        def start() -> None:
-            recording = state.chosen["compensate.recording"]
-            if not recording:
-                raise DataError("no recording has what it needs", remedy="add one under Data")
-            given = {"model": name, "recording": recording}
-            submit(state, following.estimate, f"{name} {recording}", given)
-            state.changed()
-
-        with widgets.row(classes="spread"):
-            ui.label("As JSON, C or FMU: under Take away.").classes("muted")
-            mark(widgets.primary("Estimate", start, "play_arrow"), "estimate")
+            select(state, "recording", fitting, "Recording", state.changed)
 
 
 def estimated(state: State) -> None:
-    """Show an estimate of force beside what was measured."""
-    found = following.newest(state.workspace, "forces")
+    """Show a force that is estimated over a recording, beside what was measured."""
+    from mckibben.report import results
+
+    workspace = state.workspace
+    name = model_of(state, following.having(workspace, "force"))
+    recording = str(state.chosen.get("compensate.recording") or "")
+
+    def show(found: Any) -> None:
+        widgets.items(results.simulation(found))
+        run, block = found.recording, following.made(workspace, name, "force", {})
+        for key, unit in {channel.name: channel.unit for channel in block.outputs}.items():
+            values = run[f"{key}_model"]
+            courses: list[Course] = [(run.time, values, "estimated", "series-1", "line")]
+            panels = [(axis_label(key, unit), courses)]
+            if key in run:
+                courses.insert(0, (run.time, run[key], "measured", "measured", "broad"))
+                error = (run.time, run[key] - values, "error", "series-2", "line")
+                panels.append((axis_label("error", unit), [error]))
+            (plot,) = widgets.plot(drawing(panels), height=420)
+            mark(plot, "force-plot")
+
     with widgets.card("Estimated force"):
-        going(state, ("estimate",))
-        if not found:
-            text = "Choose a recording and press Estimate: it is drawn beside what was measured."
+        if recording:
+            version = workspace.path("models", f"{name}.json").stat().st_mtime_ns
+            later(
+                ("force", name, version, recording, workspace.digest()),
+                lambda: following.estimate(workspace, name, recording),
+                show,
+                height=420,
+            )
+        else:
+            text = (
+                "A recording with all that it is made from is drawn here, beside what was measured."
+            )
             widgets.empty("speed", "A force without a load cell", text)
-            return
-        one = found[_newest_of(state, found, "force")]
-        if one.get("rmse") is not None:
-            share = f", {100 * one['rmse'] / one['span']:.1f} % of the range" if one["span"] else ""
-            rmse, largest = (f"{number(one[key], 3)} {one['unit']}" for key in ("rmse", "largest"))
-            text = f"RMSE {rmse}{share}; largest {largest}."
-            mark(ui.label(text), "force-error")
-        for note in one.get("notes", []):
-            ui.label(said(note)).classes("muted")
-        _curves(one, "force-plot")
-
-
-def _newest_of(state: State, found: Mapping[str, Mapping[str, Any]], kind: str) -> str:
-    """Let one of several results be chosen, the newest first; return which."""
-    key = f"compensate.shown-{kind}"
-    if state.chosen.get(key) not in found or state.chosen.get(f"{key}-of") != [*found]:
-        state.chosen[key], state.chosen[f"{key}-of"] = next(iter(found)), [*found]
-    if len(found) > 1:
-        field = ui.select([*found], value=state.chosen[key], label="Result").props("dense outlined")
-        field.on_value_change(lambda event: choose(state, key, event.value))
-    return str(state.chosen[key])
-
-
-def _curves(one: Mapping[str, Any], name: str) -> None:
-    """Draw stored curves: values, and errors below them."""
-    labels = (axis_label(one["output"], one["unit"]), axis_label("error", one["unit"]))
-    panels = []
-    for below, label in zip((False, True), labels, strict=True):
-        curves = [
-            Curve(np.array(c["x"], float), np.array(c["y"], float), c["name"], c["colour"])
-            for c in one["curves"] if c["below"] == below
-        ]  # fmt: skip
-        if curves:
-            panels.append(Panel("time [s]", label, tuple(curves)))
-    (figure,) = interactive.plots(Drawing(tuple(panels), stacked=True))
-    mark(widgets.plot_of(figure, height=420), name)
 
 
 def log(state: State, names: list[str]) -> None:
     """Ask for the log of a loop, and what ran."""
     name = model_of(state, names)
-    kinds = following.kinds(state.workspace, name)
-    if state.chosen.get("compensate.form") not in kinds:
-        state.chosen["compensate.form"] = next(iter(kinds))
 
     async def loaded(event: events.UploadEventArguments) -> None:
-        from mckibben.files import read
-
-        with state.workspace.receiving(event.file.name, event.file.size()) as (part, path):
-            await event.file.save(part)
-        found = await run.io_bound(lambda: read(path, informative=False))
-        if not any(key.startswith("reference_") for one in found or [] for key in one.channels):
+        path, found = await received(state, event)
+        if not any(key.startswith("reference_") for key in found.channels):
             problem, remedy = "it has no reference", "name a column reference_displacement_mm"
             raise DataError(problem, file=path, remedy=remedy)
-        _look_back(state, path.name, name, state.chosen["compensate.form"], refit=False)
+        asked = {"log": path.name, "model": name, "form": state.chosen["compensate.form"]}
+        submit(state, following.review, "reviews", path.stem, asked)
 
     with widgets.card("Back from the rig"):
         ui.label(
@@ -184,17 +180,23 @@ def log(state: State, names: list[str]) -> None:
         ).classes("muted")
         with widgets.row(classes="fields"):
             select_model(state, names)
-            field = ui.select(kinds, label="Ran as").props("dense outlined")
-            field.bind_value(state.chosen, "compensate.form")
+            uses = following.uses(state.workspace, name)
+            forms = {form: words for form, words in following.KINDS.items() if form in uses}
+            select(state, "form", forms, "Ran as", state.changed)
         endings = ".csv,.tsv,.txt,.parquet,.xlsx,.mat,.h5,.tdms"
         mark(widgets.upload("Drop the log here", loaded, endings), "log-file")
 
 
-def _look_back(state: State, log: str, model: str, form: str, *, refit: bool) -> None:
-    given = {"log": log, "model": model, "form": form, "refit": refit, "settings": {}}
-    title = log.rpartition(".")[0] + " with refit" * refit
-    submit(state, following.review, title, given)
-    state.changed()
+async def received(state: State, event: events.UploadEventArguments) -> tuple[Any, Recording]:
+    """Return where an uploaded file is, and its first recording."""
+    from mckibben.files import read
+
+    with state.workspace.receiving(event.file.name, event.file.size()) as (part, path):
+        await event.file.save(part)
+    found = await run.io_bound(lambda: read(path, informative=False))
+    if not found:
+        raise DataError("it has no recording", file=path, remedy="give another file")
+    return path, found[0]
 
 
 def reviewed(state: State) -> None:
@@ -209,34 +211,26 @@ def reviewed(state: State) -> None:
             )
             widgets.empty("fact_check", "How did it go on the rig?", text)
             return
-        name = _newest_of(state, found, "log")
+        known = {name: name for name in found}  # a new one is chosen, as nothing is of that many
+        name = select(state, f"review-of-{len(found)}", known, "Review", state.changed)
         one = found[name]
-        sizes = {
-            "Achieved": one["achieved"],
-            "Predicted for the commands": one.get("predicted"),
-            "Of pressures beside the commands": one.get("pressure"),
-            "Residual of the model": one.get("residual"),
-        }
-        rows = [[k, f"{number(v, 3)} {one['unit']}"] for k, v in sizes.items() if v is not None]
-        mark(widgets.table(["Error", "RMS"], rows), "review")
-        _curves(one, "review-plot")
-        with widgets.row():
-            if one.get("refitted"):
-                widgets.button("Take the refit as a model", partial(_take_refit, state, name, one))
-            else:
-                log = str(one["log"]), str(one["model"]), str(one.get("form", "inverse"))
-                again = partial(_look_back, state, *log, refit=True)
-                mark(widgets.button("Try a refit with the log", again), "refit")
-        with widgets.details("What it says"):
-            for sentence in one["sentences"]:
-                ui.label(said(sentence))
+        with mark(ui.element("div").classes("stack"), "review"):
+            widgets.items(following.shown(one))
+        if one.get("refitted"):
+            widgets.button("Take the refit as a model", partial(_take_refit, state, name, one))
+            return
+
+        def again() -> None:
+            asked = {key: str(one.get(key, "inverse")) for key in ("log", "model", "form")}
+            submit(state, following.review, "reviews", f"{name} refit", asked, refit=True)
+
+        mark(widgets.button("Try a refit with the log", again), "refit")
 
 
-def _take_refit(state: State, name: str, one: Mapping[str, Any]) -> None:
+def _take_refit(state: State, name: str, one: dict[str, Any]) -> None:
     from mckibben.blocks.saving import load
 
     block = load(state.workspace.path("reviews", f"{name}-refit.json"))
-    new = state.workspace.new_name("models", f"{one['model']}-refit")
-    block.save(state.workspace.path("models", f"{new}.json"))
-    state.model = new
+    state.model = state.workspace.new_name("models", f"{one['model']}-refit")
+    block.save(state.workspace.path("models", f"{state.model}.json"))
     state.changed()

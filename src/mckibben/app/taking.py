@@ -201,6 +201,8 @@ def script(workspace: Workspace, of: Json) -> str:
     """Return a Python script: read, compare, save, invert, export."""
     models, settings = fitted(workspace)
     lines = ['"""What was done in the workbench; run it in its folder."""', ""]
+    if any(one.way.amends for one in workspace.entries()):
+        lines += ["from pathlib import Path", "", "from mckibben.app import steps", ""]
     lines += ["import mckibben", "from mckibben import workflow", ""]
     for role in ("train", "test"):
         runs = [f"    {one.code()}," for one in workspace.entries() if one.role == role]
@@ -216,5 +218,6 @@ def script(workspace: Workspace, of: Json) -> str:
         if (use := of["use"]) in FLAGS:
             lines.append(f"inverse = workflow.invert(model{FLAGS[use]})")
             lines.append(f'inverse.block.save("{chosen}-{use}.json")')
-            lines.append(f'workflow.export(inverse, "{chosen}-{use}-c", "c")')
+            step = ", sample_time=train[0].sample_time"
+            lines.append(f'workflow.export(inverse, "{chosen}-{use}-c", "c"{step})')
     return "\n".join(lines) + "\n"

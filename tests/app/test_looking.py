@@ -45,7 +45,7 @@ def test_several_muscles_are_looked_at_and_a_next_recording_is_planned(
         page.locator(".legendtext", has_text="0 to").first.wait_for(timeout=SLOW)
         page.get_by_role("button", name="Over time").click()
         seen(page, "look-time")
-        seen(page, "numbers").click()
+        seen(page, "words").get_by_text("Characterization").click()
         page.get_by_text("reversals", exact=True).first.wait_for(timeout=SLOW)
         seen(page, "plan").click()
         seen(page, "minutes").fill("1")
@@ -78,5 +78,5 @@ def test_an_empty_folder_says_what_to_do_and_a_narrow_page_fits(
         seen(page, "example").click()
         seen(other, "look-loop")  # the other window shows it without a click
         seen(other, "gaps")
-        seen(other, "numbers")
+        seen(other, "words").get_by_text("Characterization").wait_for(timeout=SLOW)
         assert other.evaluate("document.documentElement.scrollWidth") <= 400

@@ -265,4 +265,7 @@ def restored(found: Mapping[str, Any] | None) -> list[Item]:
     if "items" not in known:
         said = known.get("sentences", ())
         return [Text([str(known.get("verdict", "")), *map(str, said)])] if said else []
-    return [KINDS[one["kind"]](**one) for one in known["items"]]
+    try:
+        return [KINDS[one["kind"]](**one) for one in known["items"]]
+    except (KeyError, TypeError):
+        raise DataError("its file is damaged", remedy="do it again") from None

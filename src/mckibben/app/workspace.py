@@ -394,12 +394,13 @@ class Workspace:
 
     def used(self) -> dict[str, Recording]:
         """Return the recordings in use that can be read, by name."""
-        found = {}
+        return {entry.name: recording for entry, recording in self._readable()}
+
+    def _readable(self) -> Iterator[tuple[Entry, Recording]]:
         for entry in self.entries():
             with suppress(MckibbenError):
                 if entry.role != "unused":
-                    found[entry.name] = self.recording(entry.name)
-        return found
+                    yield entry, self.recording(entry.name)
 
     def channels(self) -> list[str]:
         """Return the channels that all recordings in use have."""
@@ -409,12 +410,10 @@ class Workspace:
 
     def digest(self) -> str:
         """Return what changes whenever what is trained or tested on does; see `results`."""
-        told = []
-        for entry in self.entries():
-            if entry.role != "unused":
-                with suppress(MckibbenError):
-                    made = partial(_digest, self.recording(entry.name))
-                    told.append(f"{entry.role} {self._of(entry, 'digest', made)}")
+        told = [
+            f"{entry.role} {self._of(entry, 'digest', partial(_digest, recording))}"
+            for entry, recording in self._readable()
+        ]
         return hashlib.sha256("\n".join(sorted(told)).encode()).hexdigest()[:16]
 
     # -- models and what came of them ------------------------------------------------------------
@@ -439,6 +438,7 @@ class Workspace:
         ``result`` also has ``input``, ``output``, ``unit`` and ``data``, the `digest` at its start.
         """
         model.save(self.path("models", f"{name}.json"))
+        self.delete("banded", name)
         if banded is not None:
             banded.save(self.path("banded", f"{name}.json"))
         self.write("results", name, result)

@@ -226,6 +226,7 @@ def _planned(state: State, inputs: tuple[str, ...]) -> None:
     elif made:
         items = restored(made[0])
         with mark(ui.element("div").classes("stack"), "planned"):
+            ui.label("Planned").classes("subtitle")
             widgets.items([one for one in items if isinstance(one, Text)])
             with widgets.details("Its steps, and what they tell"):
                 widgets.items([one for one in items if not isinstance(one, Text)])

@@ -27,7 +27,7 @@ from mckibben.estimators.catalogue import caution, full_name
 from mckibben.numerals import number, typeset, typeset_within
 from mckibben.recording import Recording
 from mckibben.report import interactive, results, subjects
-from mckibben.report.builder import Table
+from mckibben.report.builder import Figure, Table
 from mckibben.report.columns import Column, columns_of
 from mckibben.report.drawing import POINTS, over_time
 from mckibben.report.words import CAREFUL
@@ -436,8 +436,12 @@ def _check(state: State, row: Json) -> None:
     if not found:
         _work(state, modelling.check, "Check it", "fact_check", CHECK)
         return
+    items = modelling.restored(found)
     with mark(ui.element("div").classes("stack"), "verdict"):
-        widgets.items(modelling.restored(found))
+        widgets.items([one for one in items if not isinstance(one, Figure)])
+    if drawn := [one for one in items if isinstance(one, Figure)]:
+        with widgets.details("What the residual follows"):
+            widgets.items(drawn)
     on = "the test recordings" if found["on"] == "test" else "its training recordings"
     old = "" if found["data"] == state.workspace.digest() else ", as they were"
     ui.label(f"Checked on {on}{old}.").classes("muted")

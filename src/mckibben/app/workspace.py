@@ -450,19 +450,15 @@ class Workspace:
         """
         from mckibben.comparison.choosing import order
 
-        now, found = self.digest(), []
-        for name in self.names("results"):
-            row = self.read("results", name) or {}
-            if row.get("status") == "ok" and (self.folder / "models" / f"{name}.json").is_file():
-                found.append(row | {"name": name, "current": row.get("data", "") in ("", now)})
-
         def place(row: dict[str, Any]) -> tuple[Any, ...]:
-            fitted = (row.get("train") or {}).get("rmse")
-            ranks = order(
-                row.get("model", ""), row.get("validation_rmse"), fitted, row.get("skill_least")
-            )
-            return (not row["current"], *ranks)
+            errors = row.get("validation_rmse"), (row.get("train") or {}).get("rmse")
+            return (not row["current"], *order(row["model"], *errors, row.get("skill_least")))
 
+        now, found, known = self.digest(), [], self.names("models")
+        for name in self.names("results"):
+            row = {"model": ""} | (self.read("results", name) or {})
+            if row.get("status") == "ok" and name in known:
+                found.append(row | {"name": name, "current": row.get("data", "") in ("", now)})
         return sorted(found, key=place)
 
     def cached(self, path: Path, key: str, make: Callable[[], Any]) -> Any:

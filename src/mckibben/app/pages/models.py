@@ -189,7 +189,11 @@ def board(state: State) -> None:
         mark(card, "leaderboard")
         if rows:
             shown = [one for one in _columns(rows) if one.key in FIRST]
-            lines = [[partial(_title, row), *(_error(one, row) for one in shown)] for row in rows]
+            lines = []
+            for row in rows:
+                errors = [(one.flag(row), one.value(row)) for one in shown]
+                texts = [flag or ("–" if value is None else value) for flag, value in errors]
+                lines.append([partial(_title, row), *texts])
             _choosable(state, ["Model", *(one.label for one in shown)], lines, compared)
             _remarks(rows, shown)
         else:
@@ -216,11 +220,6 @@ def _title(row: Json) -> None:
     with ui.element("div"):
         ui.label(full_name(row["model"]) + "*" * bool(caution(row["model"])))
         ui.label(row["name"] + " · other data" * (not row["current"])).classes("muted")
-
-
-def _error(column: Column, row: Json) -> float | str:
-    value = column.value(row)
-    return column.flag(row) or ("–" if value is None else float(value))
 
 
 def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:

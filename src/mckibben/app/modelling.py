@@ -224,22 +224,12 @@ def _add(workspace: Workspace, name: str, what: str, items: Sequence[Item], on: 
     return next(one.sentences[0] for one in items if isinstance(one, Text))
 
 
-def plan(
-    workspace: Workspace,
-    tell: Tell,
-    *,
-    minutes: float = 3.0,
-    limits: dict[str, list[float | None]] | None = None,
-    seed: int = 0,
-) -> str:
+def plan(workspace: Workspace, tell: Tell, **given: Any) -> str:
     """Plan what to record next, and write its commands as a file of inputs over time."""
     train, test = workspace.train_and_test()
-    own = {name: tuple(ends) for name, ends in (limits or {}).items()}
     out = workspace.path("takeaway", f"{PLAN}.csv")
-    found = workflow.plan(
-        [*train, *test], out=out, force=True, minutes=minutes, limits=own, seed=seed
-    )
-    workspace.write("takeaway", PLAN, {"items": stored(results.plan(found)), "minutes": minutes})
+    found = workflow.plan([*train, *test], out=out, force=True, **given)
+    workspace.write("takeaway", PLAN, {"items": stored(results.plan(found))})
     return words.plan_sentences(found)[0]
 
 

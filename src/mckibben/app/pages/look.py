@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from mckibben.app import widgets
+from mckibben.app import forms, widgets
 from mckibben.app.later import later
 from mckibben.app.modelling import last_plan, plan, restored, sides_of
 from mckibben.app.state import State, view
@@ -19,6 +19,7 @@ from mckibben.diagnosis.characterization import characterize
 from mckibben.diagnosis.coupling import coupling
 from mckibben.diagnosis.data_gaps import Gap, data_gaps
 from mckibben.numerals import number
+from mckibben.options import PlanOptions
 from mckibben.recording import Recording
 from mckibben.report import results
 from mckibben.report.builder import Text
@@ -204,10 +205,10 @@ def _gaps(state: State, sides: Channels, pair: Pair) -> None:
         key = "gaps", state.workspace.digest(), inputs, sides.outputs
         make = partial(data_gaps, train or test, inputs, sides.outputs, tests=test if train else ())
         later(key, make, show)
-        _planned(state, inputs)
+        _planned(state)
 
 
-def _planned(state: State, inputs: tuple[str, ...]) -> None:
+def _planned(state: State) -> None:
     jobs = [job for job in state.jobs.jobs.values() if job.kind == "plan"]
     made = last_plan(state.workspace)
     if running := next((job for job in jobs if job.active), None):
@@ -232,37 +233,26 @@ def _planned(state: State, inputs: tuple[str, ...]) -> None:
                 widgets.items([one for one in items if not isinstance(one, Text)])
     with widgets.row():
         text = "Plan another" if made else "Plan the next recording"
-        mark(widgets.button(text, partial(_ask, state, inputs), "edit_calendar"), "plan")
+        mark(widgets.button(text, partial(_ask, state), "edit_calendar"), "plan")
         if made:
             download = partial(widgets.download, made[1])
             mark(widgets.button("Download its commands (CSV)", download, "download"), "commands")
 
 
-def _ask(state: State, inputs: tuple[str, ...]) -> None:
-    used = list(state.workspace.used().values())
-    fields: dict[str, list[Any]] = {}
+def _ask(state: State) -> None:
+    values: dict[str, Any] = {}
 
     def submit() -> None:
-        limits = {name: [one.value for one in two] for name, two in fields.items()}
-        limits = {name: two for name, two in limits.items() if two != [None, None]}
         state.jobs.forget_ended("plan")
-        minutes = float(field.value or 3)
-        state.jobs.submit(plan, "next recording", minutes=minutes, limits=limits)
+        state.jobs.submit(plan, "next recording", **forms.given(PlanOptions, values))
         dialog.close()
         state.changed()
 
     with widgets.dialog("Plan the next recording") as dialog:
-        ui.label("Random motion within limits, and what closes the gaps.").classes("muted")
-        field = mark(ui.number("Minutes", value=3, min=0.5, max=60), "minutes")
-        with widgets.details("Limits, where they are not those recorded"):
-            for name in inputs:
-                ends = min(run[name].min() for run in used), max(run[name].max() for run in used)
-                labels = (
-                    f"{which} {name} [{used[0].units[name]}]" for which in ("Lowest", "Highest")
-                )
-                with widgets.row():
-                    fields[name] = [
-                        ui.number(label, placeholder=f"{end:.3g}")
-                        for label, end in zip(labels, ends, strict=True)
-                    ]
+        ui.label(
+            "Random motion within the limits recorded, and what closes the gaps. "
+            f"Other limits are written as {state.inputs[0]}=1:5."
+        ).classes("muted")
+        with widgets.row(classes="fields"):
+            forms.fields(PlanOptions, ("minutes", "limits"), values)
         mark(widgets.primary("Plan it", submit), "plan-it")

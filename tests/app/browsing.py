@@ -22,11 +22,14 @@ START = "from mckibben.app.main import serve; import sys; serve(sys.argv[1], por
 
 
 @contextmanager
-def workbench(folder: Path) -> Iterator[Workbench]:
-    """Start a workbench over a folder on a free port, and end it."""
+def workbench(folder: Path, before: str = "") -> Iterator[Workbench]:
+    """Start a workbench over a folder on a free port, after some Python, and end it."""
     plain = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
     process = subprocess.Popen(
-        [sys.executable, "-c", START, str(folder)], stdout=subprocess.PIPE, text=True, env=plain
+        [sys.executable, "-c", before + START, str(folder)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=plain,
     )
     try:
         yield Workbench(process)

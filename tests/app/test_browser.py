@@ -120,3 +120,21 @@ def test_errors_are_said_and_keys_suffice(browser: Any, bench: Workbench) -> Non
         row.focus()
         page.keyboard.press("Enter")
         assert page.locator("tr.chosen").count() == 1
+
+
+SLOW_READING = """
+import time
+from mckibben.app import workspace
+read = workspace.read_file
+workspace.read_file = lambda *given: time.sleep(5) or read(*given)
+"""
+
+
+def test_the_page_is_there_while_a_folder_is_read(browser: Any, folder: Path) -> None:
+    workspace = Workspace(folder)
+    with workspace.receiving("a.csv", len(table())) as (part, _):
+        part.write_bytes(table().replace(b"p1", b"p1 [kPa]"))
+    workspace.add("a.csv")
+    with workbench(folder, SLOW_READING) as bench, visited(browser, bench) as page:
+        assert page.get_by_test_id("over-time").count() == 0
+        seen(page, "over-time")

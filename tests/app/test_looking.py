@@ -45,18 +45,20 @@ def test_several_muscles_are_looked_at_and_a_next_recording_is_planned(
         page.locator(".legendtext", has_text="0 to").first.wait_for(timeout=SLOW)
         page.get_by_role("button", name="Over time").click()
         seen(page, "look-time")
-        seen(page, "numbers").click()
+        seen(page, "words").get_by_text("Characterization").click()
         page.get_by_text("reversals", exact=True).first.wait_for(timeout=SLOW)
         seen(page, "plan").click()
-        seen(page, "minutes").fill("1")
+        seen(page, "option-minutes").fill("1")
+        seen(page, "option-limits").fill("pressure_1=1:2.5")
         seen(page, "plan-it").click()
         seen(page, "planned")
         with page.expect_download() as download:
             seen(page, "commands").click()
         table = download.value.path().read_text().splitlines()
-        assert "pressure_1" in table[0]
+        at = next(k for k, name in enumerate(table[0].split(",")) if "pressure_1" in name)
         assert "pressure_2" in table[0]
         assert len(table) == pytest.approx(60 / 0.05, rel=0.1)
+        assert max(float(line.split(",")[at]) for line in table[1:]) <= 2.5
         assert workspace.read("takeaway", "next-recording")
         seen(page, "choose-models").click()
         seen(page, "page-models")
@@ -78,5 +80,5 @@ def test_an_empty_folder_says_what_to_do_and_a_narrow_page_fits(
         seen(page, "example").click()
         seen(other, "look-loop")  # the other window shows it without a click
         seen(other, "gaps")
-        seen(other, "numbers")
+        seen(other, "words").get_by_text("Characterization").wait_for(timeout=SLOW)
         assert other.evaluate("document.documentElement.scrollWidth") <= 400

@@ -33,6 +33,9 @@ KINDNESS = 5
 SPACING = 0.2
 """Least time between two reports of progress [s]."""
 
+PRELOADED = "mckibben.app.preloaded"
+"""What jobs need, loaded once for all."""
+
 Tell = Callable[..., None]
 """Called with the share done, and words or the least cost so far."""
 
@@ -109,10 +112,8 @@ class Jobs:
                 title = str(note.given.get("title") or note.given.get("name") or note.kind)
                 job = Job(name, note.kind, title, note.given, note.state, note.message)
                 if job.active:
-                    job.state, job.message = (
-                        INTERRUPTED,
-                        "the workbench was closed before it was done",
-                    )
+                    job.state = INTERRUPTED
+                    job.message = "the workbench was closed before it was done"
                     _write(workspace, job)
                 self.jobs[name] = job
 
@@ -140,20 +141,15 @@ class Jobs:
 
     def poll(self) -> bool:
         """Hear what jobs report, and start what can be started; return whether any began or ended."""
-        changed = False
-        for job in self.active():
-            if job.state == RUNNING and self._hear(job):
-                changed = True
+        ended = [self._hear(job) for job in self.active() if job.state == RUNNING]
         free = self.at_once - sum(job.state == RUNNING for job in self.active())
-        for job in [job for job in self.active() if job.state == WAITING][: max(free, 0)]:
+        begun = [job for job in self.active() if job.state == WAITING][: max(free, 0)]
+        for job in begun:
             self._start(job)
-            changed = True
-        return changed
+        return any(ended) or bool(begun)
 
     def _hear(self, job: Job) -> bool:
-        ended = (
-            not job.process.is_alive()
-        )  # before the last words are heard, so that none is missed
+        ended = not job.process.is_alive()  # before the last words, so that none is missed
         with suppress(EOFError, OSError):
             while job.pipe.poll():
                 job.progress.append(job.pipe.recv())
@@ -168,10 +164,10 @@ class Jobs:
         return ended
 
     def _start(self, job: Job) -> None:
-        prepare()
-        job.pipe, there = context().Pipe(duplex=False)
+        prepare(PRELOADED)
+        job.pipe, there = context(PRELOADED).Pipe(duplex=False)
         arguments = (str(self.workspace.folder), job.name, job.title, job.work, job.given, there)
-        job.process = context().Process(target=_run, args=arguments, daemon=True)
+        job.process = context(PRELOADED).Process(target=_run, args=arguments, daemon=True)
         job.process.start()
         there.close()
         job.state = RUNNING
@@ -198,6 +194,11 @@ class Jobs:
             del self.jobs[name]
             self.workspace.delete("jobs", name)
 
+    def forget_ended(self, kind: str) -> None:
+        """Take all ended jobs of a kind off the list."""
+        for job in [job for job in self.jobs.values() if job.kind == kind]:
+            self.forget(job.name)
+
     def close(self) -> None:
         """End all jobs."""
         for job in self.active():
@@ -207,8 +208,8 @@ class Jobs:
 
 def warm() -> None:
     """Load what jobs will need, so that the first one starts at once; it takes seconds."""
-    prepare()
-    first = context().Process(target=int, daemon=True)
+    prepare(PRELOADED)
+    first = context(PRELOADED).Process(target=int, daemon=True)
     first.start()
     first.join()
 

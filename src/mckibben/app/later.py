@@ -34,33 +34,30 @@ def later(
     height : int
         Room that is left for it meanwhile [px].
     """
-    place = ui.element("div").classes("stack")
-    if key in _made:
+
+    def shown() -> None:
+        found = _made[key] = _made.pop(key)  # the last used goes last
         with place:
-            _shown(key, show)
-        return
-    with place, ui.element("div").classes("empty").style(f"min-height: {height}px"):
-        ui.spinner()
+            if isinstance(found, MckibbenError):
+                widgets.error_box(found)
+            else:
+                show(found)
 
     async def fill() -> None:
         try:
-            found: Any = await run.io_bound(make)
+            _made[key] = await run.io_bound(make)
         except MckibbenError as error:
-            found = error
-        _made[key] = found
+            _made[key] = error
         while len(_made) > MOST:
             del _made[next(iter(_made))]
         if not place.is_deleted:
             place.clear()
-            with place:
-                _shown(key, show)
+            shown()
 
+    place = ui.element("div").classes("stack")
+    if key in _made:
+        shown()
+        return
+    with place, ui.element("div").classes("empty").style(f"min-height: {height}px"):
+        ui.spinner()
     ui.timer(0.01, fill, once=True)
-
-
-def _shown(key: Hashable, show: Callable[[Any], Any]) -> None:
-    found = _made[key] = _made.pop(key)  # the last used goes last
-    if isinstance(found, MckibbenError):
-        widgets.error_box(found)
-    else:
-        show(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import field
 from functools import wraps
@@ -12,21 +13,30 @@ from nicegui import binding, ui
 from mckibben.app.jobs import Jobs
 from mckibben.app.widgets import error_box
 from mckibben.app.workspace import Workspace
+from mckibben.comparison.channels import channels_of
 from mckibben.errors import DataError, MckibbenError
 
 _VIEWS: list[Any] = []
+
+PATIENCE = 1.0
+"""How long a page waits until the folder is read; after that it comes without [s]."""
 
 
 def view(build: Callable[..., None]) -> Any:
     """Make a function a `ui.refreshable` that `State.changed` builds again, in every window.
 
-    What cannot be shown, such as a damaged model, is an error in its place.
+    It is empty while the folder is read for the first time. What cannot be shown, such as a damaged
+    model, is an error in its place.
     """
 
     @wraps(build)
-    def built(*given: Any) -> None:
+    def built(state: State) -> None:
+        if not state.ready.is_set():
+            ui.spinner()
+            ui.timer(0.1, lambda: made.refresh() if state.ready.is_set() else None)
+            return
         try:
-            build(*given)
+            build(state)
         except MckibbenError as error:
             error_box(error)
 
@@ -64,10 +74,31 @@ class State:
     model: str = ""
     chosen: dict[str, Any] = field(default_factory=dict)
 
-    def settle(self) -> None:
-        """Choose what is not chosen, or not there any more."""
-        from mckibben.comparison.channels import channels_of
+    def __post_init__(self) -> None:
+        self.ready = threading.Event()
+        self._reading: threading.Thread | None = None
 
+    def settle(self) -> None:
+        """Choose what is not chosen, or not there any more.
+
+        Of a folder that is long to read at first, it goes on in the background; see `view`.
+        """
+        if self.ready.is_set():
+            self._settle()
+            return
+        if self._reading is None:
+            self._reading = threading.Thread(target=self._begin, daemon=True)
+            self._reading.start()
+        self.ready.wait(PATIENCE)
+
+    def _begin(self) -> None:
+        try:
+            self._settle()
+            self.workspace.digest()
+        finally:
+            self.ready.set()
+
+    def _settle(self) -> None:
         names = [entry.name for entry in self.workspace.entries()]
         if self.recording not in names:
             self.recording = next(iter(names), "")
@@ -87,6 +118,7 @@ class State:
 
     def changed(self) -> None:
         """Build every `view` again, in all windows; call it after the folder or a choice has changed."""
-        self.settle()
+        if self.ready.is_set() or self._reading is None:
+            self.settle()
         for one in _VIEWS:
             one.refresh()

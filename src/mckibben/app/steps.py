@@ -13,7 +13,6 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from mckibben import signals
 from mckibben.errors import DataError, TooLargeError
-from mckibben.files import read
 from mckibben.files.choosing import Seen
 from mckibben.files.reading import columns_of, look
 from mckibben.recording import Recording
@@ -81,6 +80,19 @@ class Reading(Plain):
         return bool(self.header > 1 or self.skip or self.encoding)
 
 
+TAKES = {
+    "slice": ("start", "stop"),
+    "low_pass": ("cutoff", "channels"),
+    "detrend": ("channels",),
+    "resample": ("sample_time",),
+    "zero": ("channels", "over"),
+}
+"""What steps take."""
+
+CALLED = {"zero": "zeroed"}
+"""Functions of `mckibben.signals` that are called otherwise than their steps."""
+
+
 class Step(Plain):
     """What is done to a recording after it was read: a function of `mckibben.signals`, or a cut."""
 
@@ -92,39 +104,30 @@ class Step(Plain):
     over: Text | None = None
     channels: list[Text] | None = None
 
+    @property
+    def arguments(self) -> list[Any]:
+        """What the function takes after the recording."""
+        return [value for name in TAKES[self.do] if (value := getattr(self, name)) is not None]
+
     def apply(self, recording: Recording) -> Recording:
         """Return a recording after it; errors are those of the function."""
+        for name in TAKES[self.do]:
+            if getattr(self, name) is None and (name != "channels" or self.do == "zero"):
+                raise DataError(f"{self.do} needs a value", parameter=name, remedy="give one")
         if self.do == "slice":
-            return recording.slice(self.start, self.stop)
-        if self.do == "detrend":
-            return signals.detrend(recording, self.channels)
-        (name, value), *_ = self.arguments().items() or (("", None),)
-        if value is None:
-            raise DataError(f"{self.do} needs a value", parameter=name, remedy="give one")
-        if self.do == "low_pass":
-            return signals.low_pass(recording, value, self.channels)
-        if self.do == "resample":
-            return signals.resample(recording, value)
-        return signals.zeroed(recording, value, self.over or "")
-
-    def arguments(self) -> dict[str, Any]:
-        """Return what the function takes, in its order."""
-        names = {
-            "slice": ("start", "stop"),
-            "low_pass": ("cutoff", "channels"),
-            "detrend": ("channels",),
-            "resample": ("sample_time",),
-            "zero": ("channels", "over"),
-        }
-        return {name: getattr(self, name) for name in names[self.do]}
+            return recording.slice(*self.arguments)
+        found: Recording = getattr(signals, CALLED.get(self.do, self.do))(
+            recording, *self.arguments
+        )
+        return found
 
     def code(self, recording: str) -> str:
         """Return the Python that does it to an expression."""
-        values = ", ".join(repr(one) for one in self.arguments().values() if one is not None)
+        values = [repr(one) for one in self.arguments]
         if self.do == "slice":
-            return f"{recording}.slice({values})"
-        name = {"zero": "zeroed"}.get(self.do, self.do)
-        return f"mckibben.signals.{name}({', '.join(filter(None, (recording, values)))})"
+            return f"{recording}.slice({', '.join(values)})"
+        name = CALLED.get(self.do, self.do)
+        return f"mckibben.signals.{name}({', '.join([recording, *values])})"
 
     def __str__(self) -> str:
         of = f" of {', '.join(self.channels)}" if self.channels else ""
@@ -215,11 +218,3 @@ def amend(path: Path, reading: Reading) -> bytes:
     header = max(reading.header, 1)
     out = {*range(header - 1), *range(header, header + reading.skip)}
     return "\n".join("" if at in out else line for at, line in enumerate(lines)).encode()
-
-
-def read_again(path: Path) -> Recording:
-    """Return the one recording of a file that this package wrote."""
-    found = read(path, informative=False)
-    if len(found) != 1:
-        raise DataError("it holds several recordings", file=path, remedy="import it again")
-    return found[0]

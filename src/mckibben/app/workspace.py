@@ -39,7 +39,6 @@ from mckibben.app.steps import (
     Step,
     Text,
     applied,
-    read_again,
     read_file,
 )
 from mckibben.errors import DataError, MckibbenError
@@ -233,7 +232,7 @@ class Workspace:
             )
         if not 0 < size <= LARGEST:
             problem = f"{given!r:.80} is empty, or has more than {LARGEST // 2**20} MiB"
-            raise DataError(problem, remedy="give another file, or use the command line")
+            raise DataError(problem, remedy="give another file")
         path = self.path("uploads", self.new_name("uploads", Path(given).stem, ending) + ending)
         try:
             with replacing(path) as new:
@@ -269,48 +268,44 @@ class Workspace:
 
     def raw_path(self, entry: Entry) -> Path:
         """Return the raw file of a recording."""
-        if entry.base:
-            return self.path("recordings", entry.base)
-        return self.path("uploads", entry.upload)
+        kind = "recordings" if entry.base else "uploads"
+        return self.path(kind, entry.base or entry.upload)
 
     def raw(self, entry: Entry) -> Recording:
         """Return a recording as it was read, before its steps."""
         path = self.raw_path(entry)
-        if entry.base:
-            return self.cached(path, "", lambda: read_again(path))
-        key = entry.way.model_dump_json()
-        parts: list[Recording] = self.cached(path, key, lambda: read_file(path, entry.way))
-        if entry.part >= len(parts):
-            problem = f"the file has {len(parts)} recording(s), and this is number {entry.part + 1}"
+        way, part = (Reading(), 0) if entry.base else (entry.way, entry.part)
+        parts = self._read(path, way)
+        if part >= len(parts):
+            problem = f"the file has {len(parts)} recording(s), and this is number {part + 1}"
             raise DataError(problem, file=path, remedy="remove this recording")
-        return parts[entry.part]
+        return parts[part]
+
+    def _read(self, path: Path, way: Reading) -> list[Recording]:
+        return self.cached(path, way.model_dump_json(), lambda: read_file(path, way))
 
     def recording(self, name: str) -> Recording:
         """Return a recording after its steps; it is read once. Errors are those of reading."""
         entry = self.entry(name)
+        return self._of(
+            entry, "", lambda: applied(self.raw(entry), entry.steps).with_meta(name=name)
+        )
 
-        def make() -> Recording:
-            return applied(self.raw(entry), entry.steps).with_meta(name=name)
-
-        return self.cached(self.raw_path(entry), self._key(entry), make)
-
-    def _key(self, entry: Entry) -> str:
-        return entry.model_dump_json(include={"name", "reading", "part", "steps"})
+    def _of(self, entry: Entry, what: str, make: Callable[[], Any]) -> Any:
+        """Return what is made of a recording, until its raw file, reading or steps change."""
+        key = what + entry.model_dump_json(include={"name", "reading", "part", "steps"})
+        return self.cached(self.raw_path(entry), key, make)
 
     def add(
         self, upload: str, *, name: str = "", role: Role = "train", reading: Reading | None = None
     ) -> list[str]:
         """Add the recordings of an uploaded file, and return their names."""
-        way = reading or Reading()
-        path = self.path("uploads", upload)
-        found = self.cached(path, way.model_dump_json(), lambda: read_file(path, way))
-        names = []
-        for part, one in enumerate(found):
+        way, path, names = reading or Reading(), self.path("uploads", upload), []
+        for part, one in enumerate(found := self._read(path, way)):
             chosen = self.new_name("recordings", name or one.name or path.stem)
-            origin = f"file {upload}" + (f", part {part + 1}" if len(found) > 1 else "")
-            self.put(
-                Entry(name=chosen, role=role, origin=origin, upload=upload, part=part, reading=way)
-            )
+            origin = f"file {upload}" + f", part {part + 1}" * (len(found) > 1)
+            made = Entry(name=chosen, role=role, origin=origin, upload=upload)
+            self.put(made.model_copy(update={"part": part, "reading": way}))
             names.append(chosen)
         return names
 
@@ -393,31 +388,32 @@ class Workspace:
         """Return the recordings of a role."""
         return [self.recording(one.name) for one in self.entries() if one.role == role]
 
+    def train_and_test(self) -> tuple[list[Recording], list[Recording]]:
+        """Return the recordings to fit to, and those to test on."""
+        return self.with_role("train"), self.with_role("test")
+
     def used(self) -> dict[str, Recording]:
         """Return the recordings in use that can be read, by name."""
-        found = {}
+        return {entry.name: recording for entry, recording in self._readable()}
+
+    def _readable(self) -> Iterator[tuple[Entry, Recording]]:
         for entry in self.entries():
             with suppress(MckibbenError):
                 if entry.role != "unused":
-                    found[entry.name] = self.recording(entry.name)
-        return found
+                    yield entry, self.recording(entry.name)
 
     def channels(self) -> list[str]:
         """Return the channels that all recordings in use have."""
         used = list(self.used().values())
-        return (
-            [name for name in used[0].channels if all(name in one for one in used)] if used else []
-        )
+        every = used[0].channels if used else ()
+        return [name for name in every if all(name in one for one in used)]
 
     def digest(self) -> str:
         """Return what changes whenever what is trained or tested on does; see `results`."""
-        told = []
-        for entry in self.entries():
-            if entry.role != "unused":
-                with suppress(MckibbenError):
-                    key = f"digest {self._key(entry)}"
-                    made = partial(_digest, self.recording(entry.name))
-                    told.append(f"{entry.role} {self.cached(self.raw_path(entry), key, made)}")
+        told = [
+            f"{entry.role} {self._of(entry, 'digest', partial(_digest, recording))}"
+            for entry, recording in self._readable()
+        ]
         return hashlib.sha256("\n".join(sorted(told)).encode()).hexdigest()[:16]
 
     # -- models and what came of them ------------------------------------------------------------
@@ -442,6 +438,7 @@ class Workspace:
         ``result`` also has ``input``, ``output``, ``unit`` and ``data``, the `digest` at its start.
         """
         model.save(self.path("models", f"{name}.json"))
+        self.delete("banded", name)
         if banded is not None:
             banded.save(self.path("banded", f"{name}.json"))
         self.write("results", name, result)
@@ -453,19 +450,15 @@ class Workspace:
         """
         from mckibben.comparison.choosing import order
 
-        now, found = self.digest(), []
-        for name in self.names("results"):
-            row = self.read("results", name) or {}
-            if row.get("status") == "ok" and (self.folder / "models" / f"{name}.json").is_file():
-                found.append(row | {"name": name, "current": row.get("data", "") in ("", now)})
-
         def place(row: dict[str, Any]) -> tuple[Any, ...]:
-            fitted = (row.get("train") or {}).get("rmse")
-            ranks = order(
-                row.get("model", ""), row.get("validation_rmse"), fitted, row.get("skill_least")
-            )
-            return (not row["current"], *ranks)
+            errors = row.get("validation_rmse"), (row.get("train") or {}).get("rmse")
+            return (not row["current"], *order(row["model"], *errors, row.get("skill_least")))
 
+        now, found, known = self.digest(), [], self.names("models")
+        for name in self.names("results"):
+            row = {"model": ""} | (self.read("results", name) or {})
+            if row.get("status") == "ok" and name in known:
+                found.append(row | {"name": name, "current": row.get("data", "") in ("", now)})
         return sorted(found, key=place)
 
     def cached(self, path: Path, key: str, make: Callable[[], Any]) -> Any:

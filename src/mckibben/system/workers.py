@@ -223,9 +223,12 @@ def leave(code: int) -> NoReturn:
     os._exit(code)
 
 
-def prepare() -> None:
-    """Start loading what processes will need, in the background; call it as early as can be."""
-    if context().get_start_method() != "forkserver":
+def prepare(*more: str) -> None:
+    """Start loading what processes will need, in the background; call it as early as can be.
+
+    ``more`` are modules besides `PRELOADED`.
+    """
+    if context(*more).get_start_method() != "forkserver":
         return
     with _starting:
         resource_tracker.ensure_running()  # which else unblocks signals
@@ -252,7 +255,7 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_forget_the_server)
 
 
-def context() -> Any:
+def context(*more: str) -> Any:
     """Return how processes start: from a server that has loaded the library, or else spawned.
 
     They are spawned where the caller set multiprocessing to that, or the system can do nothing else.
@@ -261,7 +264,7 @@ def context() -> Any:
     if spawned or "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     found = multiprocessing.get_context("forkserver")
-    found.set_forkserver_preload(list(PRELOADED))
+    found.set_forkserver_preload([*PRELOADED, *more])
     return found
 
 

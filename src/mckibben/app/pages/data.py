@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 from nicegui import events, ui
 
+from mckibben import example, registry
 from mckibben.app import widgets
 from mckibben.app.pages import importing
 from mckibben.app.state import State, view
@@ -18,8 +20,11 @@ from mckibben.app.virtual import FIRST, TITLES, record
 from mckibben.app.widgets import mark
 from mckibben.app.workspace import Entry
 from mckibben.errors import DataError, MckibbenError, TooLargeError
+from mckibben.files import read
 from mckibben.files.formats import READERS
 from mckibben.recording import Recording
+from mckibben.report.figures import draw
+from mckibben.signals.protocol import protocol
 
 TITLE = "Data"
 ICON = "folder_open"
@@ -55,10 +60,8 @@ def build(state: State) -> None:
 
 
 def _upload(state: State) -> Any:
-    endings = ",".join(READERS)
-    return mark(
-        widgets.upload("Drop files here", lambda event: _received(state, event), endings), "upload"
-    )
+    found = widgets.upload("Drop files here", partial(_received, state), ",".join(READERS))
+    return mark(found, "upload")
 
 
 def _is_empty(state: State) -> bool:
@@ -69,8 +72,19 @@ def _is_empty(state: State) -> bool:
 @view
 def start(state: State) -> None:
     """Show what to do while there are no recordings."""
-    if _is_empty(state):
-        _empty(state)
+    if not _is_empty(state):
+        return
+    text = (
+        "A file with columns such as time, pressure and displacement: CSV, Excel, MATLAB, HDF5, TDMS, "
+        "LabVIEW, Parquet or a ROS bag. Names and units of columns are recognised, and can be corrected."
+    )
+    with widgets.card():
+        title = "Start with a recording of your muscle"
+        with widgets.empty("show_chart", title, text), widgets.row():
+            button = widgets.button("Open the example", partial(_example, state), "science")
+            mark(button, "example")
+            _virtual(state)
+        _upload(state)
 
 
 @view
@@ -88,60 +102,31 @@ def shown(state: State) -> None:
     for entry in entries:
         if entry.name == state.recording:
             _recording(state, entry)
-    _next(entries)
-
-
-def _next(entries: list[Entry]) -> None:
-    from mckibben.app.main import pages
-
-    following = [(page.TITLE, path) for path, page in pages().items()][1:]
-    if following and any(one.role == "train" for one in entries):
+    if any(one.role == "train" for one in entries):
         text = "Channels and roles are right? See what the muscle does."
-        widgets.next_step(text, *following[0])
-
-
-def _empty(state: State) -> None:
-    with widgets.card():
-        with (
-            widgets.empty(
-                "show_chart",
-                "Start with a recording of your muscle",
-                "A file with columns such as time, pressure and displacement: CSV, Excel, MATLAB, "
-                "HDF5, TDMS, LabVIEW, Parquet or a ROS bag. Names and units of columns are "
-                "recognised, and can be corrected.",
-            ),
-            widgets.row(),
-        ):
-            example = widgets.button("Open the example", lambda: _example(state), "science")
-            mark(example, "example")
-            _virtual(state)
-        _upload(state)
+        widgets.next_step(text, "Look", "/look")
 
 
 def _virtual(state: State) -> None:
     """Offer to record a virtual muscle, of which there are runs to choose."""
-    from mckibben import registry
-    from mckibben.signals.protocol import protocol
 
     def ask() -> None:
+        def listed() -> None:
+            found = {one.name: f"{one.name} ({one.role})" for one in protocol(str(rig.value)).runs}
+            runs.set_options(found, value=list(found)[:2])
+
+        def start() -> None:
+            if not runs.value:
+                raise DataError("no run is chosen", remedy="choose one under Runs")
+            title = TITLES.get(rig.value, rig.value)
+            state.jobs.submit(record, title, protocol=rig.value, runs=list(runs.value))
+            shown.close()
+
         with widgets.dialog("Record a virtual muscle") as shown:
             names = {name: TITLES.get(name, name) for name in registry.names("protocols")}
             rig = mark(ui.select(names, value=FIRST, label="Rig"), "rig").props("dense outlined")
             runs = ui.select([], multiple=True, with_input=True, label="Runs")
             runs.props("dense outlined use-chips")
-
-            def listed() -> None:
-                plan = protocol(str(rig.value))
-                found = {run.name: f"{run.name} ({run.role})" for run in plan.runs}
-                runs.set_options(found, value=list(found)[:2])
-
-            def start() -> None:
-                if not runs.value:
-                    raise DataError("no run is chosen", remedy="choose one under Runs")
-                chosen = {"protocol": rig.value, "runs": list(runs.value)}
-                state.jobs.submit(record, TITLES.get(rig.value, rig.value), **chosen)
-                shown.close()
-
             rig.on_value_change(listed)
             listed()
             mark(widgets.primary("Record", start), "record")
@@ -150,16 +135,12 @@ def _virtual(state: State) -> None:
 
 
 async def _example(state: State) -> None:
-    def add() -> list[str]:
-        from mckibben import example
-        from mckibben.files import read
+    def add() -> None:
+        for file, role in ((example.TRAIN, "train"), (example.TEST, "test")):
+            (run,) = read(file)
+            state.workspace.add_recording(run, name=run.name, role=role)  # type: ignore[arg-type]
 
-        runs = {"train": read(example.TRAIN), "test": read(example.TEST)}
-        put = state.workspace.add_recording
-        return [put(run, name=run.name, role=role) for role, (run,) in runs.items()]  # type: ignore[arg-type]
-
-    state.recording = (await asyncio.to_thread(add))[0]
-    state.changed()
+    await _changed(state, add)
 
 
 # -- files ------------------------------------------------------------------------------------------
@@ -177,18 +158,15 @@ async def _received(state: State, event: events.UploadEventArguments) -> None:
         await event.file.save(part)
     upload = path.name
     try:
-        names = await asyncio.to_thread(state.workspace.add, upload)
+        state.recording, *_ = await asyncio.to_thread(state.workspace.add, upload)
     except TooLargeError:
-        state.workspace.path("uploads", upload).unlink(missing_ok=True)
+        path.unlink(missing_ok=True)
         raise
     except MckibbenError as error:
         _unread(state)[upload] = error
-        state.changed()
-        if len(_unread(state)) == 1:
-            await _ask(state, upload)
-        return
-    state.recording = names[0]
     state.changed()
+    if [*_unread(state)] == [upload]:
+        await _ask(state, upload)
 
 
 async def _ask(state: State, upload: str) -> None:
@@ -196,15 +174,15 @@ async def _ask(state: State, upload: str) -> None:
     workspace, unread = state.workspace, _unread(state)
 
     async def take(reading: Reading, others: bool) -> None:
-        names = await asyncio.to_thread(partial(workspace.add, upload, reading=reading))
-        unread.pop(upload, None)
-        for other in list(unread) if others else []:
+        for one in [upload, *(other for other in [*unread] if others and other != upload)]:
             try:
-                await asyncio.to_thread(partial(workspace.add, other, reading=reading))
-                unread.pop(other, None)
+                first, *_ = await asyncio.to_thread(partial(workspace.add, one, reading=reading))
+                unread.pop(one, None)
+                state.recording = first if one == upload else state.recording
             except MckibbenError as error:
-                unread[other] = error
-        state.recording = names[0]
+                if one == upload:
+                    raise
+                unread[one] = error
         state.changed()
 
     path = workspace.path("uploads", upload)
@@ -214,76 +192,66 @@ async def _ask(state: State, upload: str) -> None:
 async def _correct(state: State, entry: Entry) -> None:
     """Ask how a recording is to be read instead, and those that are read like it."""
     workspace = state.workspace
-    channels = _channels(state, entry.name)
-    alike = [
-        one.name
-        for one in workspace.entries()
-        if one.name != entry.name
-        and one.way == entry.way
-        and _channels(state, one.name) == channels
-    ]
 
-    async def take(reading: Reading, others: bool) -> None:
-        for name in [entry.name, *(alike if others else ())]:
+    def channels(name: str) -> list[str] | None:
+        try:
+            return list(workspace.recording(name).channels)
+        except MckibbenError:
+            return None
+
+    own = channels(entry.name)
+    others = [one for one in workspace.entries() if one.name != entry.name and one.way == entry.way]
+    alike = [one.name for one in others if channels(one.name) == own]
+
+    async def take(reading: Reading, all_so: bool) -> None:
+        for name in [entry.name, *(alike if all_so else ())]:
             await asyncio.to_thread(workspace.read_again, name, reading)
         state.changed()
 
     path = workspace.path("uploads", entry.upload) if entry.upload else workspace.raw_path(entry)
-    others = f"The {len(alike)} others like it, too" if alike else ""
-    await importing.ask(path, entry.way, take, others=others, verb="Read it so")
-
-
-def _channels(state: State, name: str) -> list[str] | None:
-    try:
-        return list(state.workspace.recording(name).channels)
-    except MckibbenError:
-        return None
-
-
-def _discard(state: State, upload: str) -> None:
-    _unread(state).pop(upload, None)
-    state.workspace.path("uploads", upload).unlink(missing_ok=True)
-    state.changed()
+    text = f"The {len(alike)} others like it, too" if alike else ""
+    await importing.ask(path, entry.way, take, others=text, verb="Read it so")
 
 
 # -- the list ---------------------------------------------------------------------------------------
 
 
 def _recordings(state: State, entries: list[Entry]) -> None:
+    names = [one.name for one in entries]
+
+    def discard(upload: str) -> None:
+        _unread(state).pop(upload, None)
+        state.workspace.path("uploads", upload).unlink(missing_ok=True)
+        state.changed()
+
+    def restore() -> None:
+        state.workspace.restore(state.chosen.pop("data.removed"))
+        state.changed()
+
+    def choose(at: int) -> None:
+        if state.recording != names[at]:
+            state.recording = names[at]
+            listed.refresh()
+            shown.refresh()
+
     with widgets.card("Recordings"):
         for upload, error in _unread(state).items():
             widgets.error_box(error)
             with widgets.row():
-                widgets.button("How is it read?", lambda upload=upload: _ask(state, upload))
-                widgets.button("Discard", lambda upload=upload: _discard(state, upload))
-
-        def choose(at: int) -> None:
-            if state.recording != entries[at].name:
-                state.recording = entries[at].name
-                listed.refresh()
-                shown.refresh()
-
+                widgets.button("How is it read?", partial(_ask, state, upload))
+                widgets.button("Discard", partial(discard, upload))
         if removed := state.chosen.get("data.removed"):
-
-            def restore() -> None:
-                state.workspace.restore(state.chosen.pop("data.removed"))
-                state.changed()
-
             with widgets.row():
                 ui.label(f"{removed} was removed.").classes("muted")
                 mark(widgets.button("Bring it back", restore, "undo"), "restore")
-
-        names = [one.name for one in entries]
-        chosen = names.index(state.recording) if state.recording in names else None
-        rows = [_line(state, one) for one in entries]
-        if rows:
-            mark(
-                widgets.table(
-                    ["Name", "Role", "Samples", "Channels"], rows, chosen=chosen, on_choose=choose
-                ),
-                "recordings",
+        if entries:
+            chosen = names.index(state.recording) if state.recording in names else None
+            heads, rows = (
+                ["Name", "Role", "Samples", "Channels"],
+                [_line(state, e) for e in entries],
             )
-        if not any(one.role == "test" for one in entries) and entries:
+            mark(widgets.table(heads, rows, chosen=chosen, on_choose=choose), "recordings")
+        if entries and not any(one.role == "test" for one in entries):
             ui.label(
                 "None is for testing: add another recording, or split this one in two. Without, models "
                 "are judged by cross-validation alone."
@@ -306,136 +274,128 @@ def _line(state: State, entry: Entry) -> list[Any]:
 def _sides(state: State) -> None:
     """Let inputs, outputs and the load be chosen, of channels that all recordings have."""
     known = state.workspace.channels()
-    if not known:
-        if state.workspace.used():
-            with widgets.card("What drives, what moves"):
-                widgets.error_box(
-                    "The recordings in use have no channel in common. Set one of them to unused, or "
-                    "correct how it is read"
-                )
+    if not state.workspace.used():
         return
+
+    def choose(side: str, event: Any) -> None:
+        if side == "load" or event.value:
+            setattr(state, side, event.value or "")
+            state.changed()
+
     with widgets.card("What drives, what moves"):
-        for side in ("inputs", "outputs"):
-
-            def chosen(event: events.ValueChangeEventArguments[Any], side: str = side) -> None:
-                if event.value and event.value != getattr(state, side):
-                    setattr(state, side, list(event.value))
-                    state.changed()
-
-            value = [name for name in getattr(state, side) if name in known]
-            field = ui.select(
-                known, value=value, multiple=True, label=side.capitalize(), on_change=chosen
+        if not known:
+            widgets.error_box(
+                "The recordings in use have no channel in common. Set one of them to unused, or "
+                "correct how it is read"
+            )
+            return
+        rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
+        loads = {"": "None, or as found", **{name: name for name in rest}}
+        for side, options in (("inputs", known), ("outputs", known), ("load", loads)):
+            value = getattr(state, side)
+            if side == "load":
+                value = value if value in rest else ""
+            else:
+                value = [name for name in value if name in known]
+            field: Any = ui.select(
+                options, value=value, multiple=side != "load", label=side.capitalize()
+            )
+            field.on_value_change(partial(choose, side)).set_visibility(
+                side != "load" or bool(rest)
             )
             mark(field.props("dense outlined"), side)
-        rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
-        if rest:
-
-            def load(event: events.ValueChangeEventArguments[Any]) -> None:
-                state.load = event.value or ""
-                state.changed()
-
-            given = state.load if state.load in rest else ""
-            options = {"": "None, or as found", **{name: name for name in rest}}
-            ui.select(options, value=given, label="Load", on_change=load).props("dense outlined")
 
 
 # -- one recording ----------------------------------------------------------------------------------
 
 
 def _recording(state: State, entry: Entry) -> None:
-    name, workspace = entry.name, state.workspace
     with widgets.card():
         with widgets.row(classes="spread"):
-            ui.label(name).classes("subtitle").props('role=heading aria-level="3"')
+            ui.label(entry.name).classes("subtitle").props('role=heading aria-level="3"')
             with widgets.row():
                 _actions(state, entry)
         try:
-            recording = workspace.recording(name)
+            recording = state.workspace.recording(entry.name)
         except MckibbenError as error:
             widgets.error_box(error)
             return
         ui.label(importing.summary(recording)).classes("muted")
         _part(state, entry, recording)
-        _steps(state, entry)
-        _process(state, entry, recording)
-        if recording.notes or entry.notes:
+        _steps(state, entry, recording)
+        if notes := dict.fromkeys([*recording.notes, *entry.notes]):
             with widgets.details("Notes of the reading"):
-                for note in dict.fromkeys([*recording.notes, *entry.notes]):
+                for note in notes:
                     ui.label(said(note)).classes("muted")
 
 
 def _actions(state: State, entry: Entry) -> None:
-    def role(event: events.ValueChangeEventArguments[Any]) -> None:
-        state.workspace.change(entry.name, role=event.value)
+    name, workspace = entry.name, state.workspace
+
+    def role(event: Any) -> None:
+        workspace.change(name, role=event.value)
         state.changed()
 
     def remove() -> None:
-        state.workspace.remove(entry.name)
-        state.chosen["data.removed"] = entry.name
+        workspace.remove(name)
+        state.chosen["data.removed"] = name
         state.changed()
+
+    def rename() -> None:
+        def done() -> None:
+            state.recording = workspace.rename(name, field.value)
+            shown.close()
+            state.changed()
+
+        with widgets.dialog(f"Rename {name}") as shown:
+            field = ui.input("Name", value=name).props("outlined dense autofocus")
+            field.on("keydown.enter", widgets.guarded(done), [])
+            widgets.primary("Rename", done)
 
     picked = ui.toggle(ROLES, value=entry.role, on_change=widgets.guarded(role))
     mark(picked.props("dense no-caps unelevated toggle-color=primary"), "role")
     mark(widgets.button("How it is read", lambda: _correct(state, entry), "tune"), "correct")
-    widgets.icon_button("edit", "Rename", lambda: _rename(state, entry))
+    widgets.icon_button("edit", "Rename", rename)
     mark(widgets.icon_button("delete_outline", "Remove", remove), "remove")
-
-
-def _rename(state: State, entry: Entry) -> None:
-    with widgets.dialog(f"Rename {entry.name}") as shown:
-        field = ui.input("Name", value=entry.name).props("outlined dense autofocus")
-
-        def rename() -> None:
-            state.recording = state.workspace.rename(entry.name, field.value)
-            shown.close()
-            state.changed()
-
-        field.on("keydown.enter", widgets.guarded(rename), [])
-        widgets.primary("Rename", rename)
 
 
 def _part(state: State, entry: Entry, recording: Recording) -> None:
     """Draw a recording over time, and let a part be kept or split off."""
-    from mckibben.report.figures import draw
-
     sides = [name for name in (*state.inputs, *state.outputs) if name in recording]
     channels = list(dict.fromkeys([*sides, *recording.channels]))[: max(MOST_DRAWN, len(sides))]
     drawing = draw(recording, "time", channels=channels)
     height = min(160 * len(channels) + 60, 420)
-    unit = "s" if recording.sample_time is not None else "sample"
     for figure in widgets.plot(drawing, height=height, dragged="select"):
         figure.figure["layout"]["selectdirection"] = "h"
         mark(figure, "over-time")
         figure.on("plotly_selected", lambda event: pick(event.args), js_handler=PICKED)
 
-    def pick(ends: Any) -> None:
-        low, high = sorted(map(float, ends))
-        start.value, stop.value = float(f"{low:.6g}"), float(f"{high:.6g}")
+    def pick(range_: Any) -> None:
+        for field, end in zip(ends, sorted(map(float, range_)), strict=True):
+            field.value = float(f"{end:.6g}")
 
     def samples() -> tuple[int, int]:
-        time, low, high = recording.time, start.value, stop.value
+        low, high = (field.value for field in ends)
         if low is None and high is None:
-            raise DataError(
-                "no part is selected", remedy="drag across the plot, or give From and To"
-            )
-        low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
+            remedy = "drag across the plot, or give From and To"
+            raise DataError("no part is selected", remedy=remedy)
         half = 0.5 * (recording.sample_time or 1.0)
-        first, last = np.searchsorted(time, (low - half, high + half))
+        low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
+        first, last = np.searchsorted(recording.time, (low - half, high + half))
         return int(first), int(last)
 
     async def keep() -> None:
         first, last = samples()
-        await _do(state, entry.name, Step(do="slice", start=first, stop=last))
+        await _changed(
+            state, state.workspace.do, entry.name, Step(do="slice", start=first, stop=last)
+        )
 
     async def split() -> None:
-        await asyncio.to_thread(state.workspace.split, entry.name, samples()[0])
-        state.changed()
+        await _changed(state, state.workspace.split, entry.name, samples()[0])
 
+    unit = "s" if recording.sample_time is not None else "sample"
     with widgets.row():
-        start = mark(
-            ui.number(f"From [{unit}]").props("dense outlined").style("width: 120px"), "from"
-        )
-        stop = mark(ui.number(f"To [{unit}]").props("dense outlined").style("width: 120px"), "to")
+        ends = [mark(_number(f"{name} [{unit}]"), name.lower()) for name in ("From", "To")]
         mark(widgets.button("Keep this part", keep, "content_cut"), "keep")
         mark(widgets.button("Split at From", split, "call_split"), "split").tooltip(
             "What comes after becomes a recording for testing"
@@ -443,62 +403,44 @@ def _part(state: State, entry: Entry, recording: Recording) -> None:
     ui.label("Drag across the plot to select a part.").classes("muted")
 
 
-def _steps(state: State, entry: Entry) -> None:
-    """List what was done, and let the last be undone."""
-    if not entry.steps:
-        return
-
-    async def undo() -> None:
-        await asyncio.to_thread(state.workspace.undo, entry.name)
-        state.changed()
-
-    with widgets.row():
-        ui.label("Done:").classes("muted")
-        for step in entry.steps:
-            ui.label(str(step)).classes("chip")
-        mark(widgets.button("Undo", undo, "undo"), "undo")
+def _number(label: str, value: float | None = None) -> Any:
+    return ui.number(label, value=value).props("dense outlined").style("width: 140px")
 
 
-def _process(state: State, entry: Entry, recording: Recording) -> None:
-    """Offer what can be done to all samples."""
-    rate = None if recording.sample_time is None else 1 / recording.sample_time
-    driving = next(
-        (name for name in state.inputs if name in recording), next(iter(recording.channels))
-    )
+def _steps(state: State, entry: Entry, recording: Recording) -> None:
+    """List what was done, let the last be undone, and offer what can be done to all samples."""
+    if entry.steps:
+        undo = partial(_changed, state, state.workspace.undo, entry.name)
+        with widgets.row():
+            ui.label("Done:").classes("muted")
+            for step in entry.steps:
+                ui.label(str(step)).classes("chip")
+            mark(widgets.button("Undo", undo, "undo"), "undo")
+    driving = next((n for n in state.inputs if n in recording), next(iter(recording.channels)))
+    others = [name for name in recording.channels if name != driving]
+
+    def offer(text: str, do: Any, values: Callable[[], dict[str, Any]]) -> None:
+        async def act() -> None:
+            await _changed(state, state.workspace.do, entry.name, Step(do=do, **values()))
+
+        mark(widgets.button(text, act), do)
+
     with widgets.details("Filter, resample, zero"), widgets.row():
-        if rate is not None:
-            cutoff = ui.number("Cutoff [Hz]", value=float(f"{rate / 10:.3g}"), min=0)
-            cutoff.props("dense outlined").style("width: 120px")
-            widgets.button(
-                "Low-pass", lambda: _do(state, entry.name, Step(do="low_pass", cutoff=cutoff.value))
-            )
-            step = ui.number("Sample time [s]", value=recording.sample_time, min=0)
-            step.props("dense outlined").style("width: 140px")
-            mark(
-                widgets.button(
-                    "Resample",
-                    lambda: _do(state, entry.name, Step(do="resample", sample_time=step.value)),
-                ),
-                "resample",
-            )
-        others = [name for name in recording.channels if name != driving]
-        zeroed = ui.select(others, value=others[:1], multiple=True, label="Channels")
-        zeroed.props("dense outlined")
-        mark(
-            widgets.button(
-                f"Zero where {driving} is lowest",
-                lambda: _do(
-                    state, entry.name, Step(do="zero", channels=list(zeroed.value), over=driving)
-                ),
-            ),
+        if recording.sample_time is not None:
+            cutoff = _number("Cutoff [Hz]", float(f"{0.1 / recording.sample_time:.3g}"))
+            offer("Low-pass", "low_pass", lambda: {"cutoff": cutoff.value})
+            step = _number("Sample time [s]", recording.sample_time)
+            offer("Resample", "resample", lambda: {"sample_time": step.value})
+        of = ui.select(others, value=others[:1], multiple=True, label="Channels")
+        of.props("dense outlined")
+        offer(
+            f"Zero where {driving} is lowest",
             "zero",
+            lambda: {"channels": of.value, "over": driving},
         )
-        widgets.button(
-            "Remove drift",
-            lambda: _do(state, entry.name, Step(do="detrend", channels=list(zeroed.value))),
-        )
+        offer("Remove drift", "detrend", lambda: {"channels": of.value})
 
 
-async def _do(state: State, name: str, step: Step) -> None:
-    await asyncio.to_thread(state.workspace.do, name, step)
+async def _changed(state: State, change: Callable[..., Any], *given: Any) -> None:
+    await asyncio.to_thread(change, *given)
     state.changed()

@@ -17,9 +17,10 @@ from mckibben.app.terms import GAPS, said
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files.choosing import Seen
+from mckibben.options import constant
 from mckibben.recording import Recording
 
-CHANNELS = [
+CHANNELS = (
     "time",
     "pressure",
     "displacement",
@@ -28,16 +29,18 @@ CHANNELS = [
     "contraction",
     "angle",
     "voltage",
-]
+)
 """Channels that are offered; any other name can be typed."""
 
-ENCODINGS = {
-    "": "As found",
-    **{e: e for e in ("utf-8", "cp1252", "utf-16", "cp932", "gb18030", "cp949")},
-}
+ENCODINGS = ("utf-8", "cp1252", "utf-16", "cp932", "gb18030", "cp949")
 
 FIRST_LINES = 8
 """Of a text that are shown."""
+
+LAYOUT = ("header", "skip", "encoding")
+"""What the columns depend on."""
+
+FIELD = "dense outlined debounce=600"
 
 
 @dataclass
@@ -50,42 +53,37 @@ class Column:
     gain: float | None = 1.0
     offset: float | None = 0.0
 
+    @property
+    def line(self) -> tuple[float, float]:
+        """Gain and offset."""
+        return self.gain or 1.0, self.offset or 0.0
+
     def turn(self) -> None:
         """Turn the sign."""
-        self.gain, self.offset = -(self.gain or 1.0), -(self.offset or 0.0)
+        self.gain, self.offset = (-one for one in self.line)
 
 
 @dataclass
 class Form:
-    """What a person says about a file; its fields are bound to controls.
-
-    Parameters
-    ----------
-    path : Path
-    reading : Reading
-        How it is read at first.
-    """
+    """What a person says about a file; its columns and values are bound to controls."""
 
     path: Path
     reading: Reading
     columns: list[Column] = field(default_factory=list)
+    values: dict[str, Any] = field(default_factory=dict)
     recordings: list[Recording] = field(default_factory=list)
     error: MckibbenError | None = None
-    rate: float | None = None
-    rest_length: float | None = None
-    gaps: str = "error"
-    raw: bool = False
-    header: float | None = None
-    skip: float | None = None
-    encoding: str = ""
-    held: str = ""
 
     def __post_init__(self) -> None:
-        given = self.reading
-        for name in ("rate", "rest_length", "gaps", "raw", "encoding"):
-            setattr(self, name, getattr(given, name))
-        self.header, self.skip = given.header or None, given.skip or None
-        self.held = "; ".join(f"{c} = {v:g} {u}" for c, (v, u) in given.constants.items())
+        self.start(self.reading)
+
+    def start(self, reading: Reading) -> None:
+        """Begin with a reading."""
+        self.reading, self.columns = reading, []
+        held = "; ".join(f"{c} = {v:g} {u}" for c, (v, u) in reading.constants.items())
+        names = ("rate", "rest_length", "gaps", "raw", "encoding")
+        self.values |= {name: getattr(reading, name) for name in names} | {"held": held}
+        self.values |= {"header": reading.header or None, "skip": reading.skip or None}
 
     def look(self) -> bool:
         """Read the file as it is said to be, and return whether its columns are others now."""
@@ -97,16 +95,17 @@ class Form:
             self.error = error
         if columns is None:
             columns = columns_in(self.path, self.reading)
-        same = [one.seen.header for one in self.columns] == [one.header for one in columns]
-        if not same or not self.columns:
-            self.columns = [self._column(one) for one in columns]
-            return True
-        return False
-
-    def _column(self, seen: Seen) -> Column:
-        channel = seen.channel
-        gain, offset = self.reading.calibration.get(channel, (1.0, 0.0))
-        return Column(seen, channel, self.reading.units.get(channel, seen.unit), gain, offset)
+        if self.columns and [c.seen.header for c in self.columns] == [c.header for c in columns]:
+            return False
+        way = self.reading
+        self.columns = [
+            Column(
+                *(one, one.channel, way.units.get(one.channel, one.unit)),
+                *way.calibration.get(one.channel, (1.0, 0.0)),
+            )
+            for one in columns
+        ]
+        return True
 
     def said(self) -> Reading:
         """Return the reading that the controls say.
@@ -116,62 +115,46 @@ class Form:
         DataError
             If they contradict each other.
         """
-        named = [one for one in self.columns if one.channel]
-        twice = {a.channel for a in named for b in named if a is not b and a.channel == b.channel}
-        if twice:
-            problem = "two columns are this channel"
-            raise DataError(problem, channel=min(map(str, twice)), remedy="clear one of `columns`")
-        header, skip = int(self.header or 0), int(self.skip or 0)
-        layout: dict[str, Any] = {"header": header, "skip": skip, "encoding": self.encoding}
-        before = (self.reading.header, self.reading.skip, self.reading.encoding)
-        plain = ("rate", "rest_length", "gaps", "raw")
-        general = layout | {name: getattr(self, name) for name in plain}
+        held = self.values["held"].split(";")
+        try:
+            constants = dict(constant(p.replace(" = ", "=").strip()) for p in held if p.strip())
+        except ValueError:
+            problem = f"{self.values['held']!r:.80} is no channel with a value and a unit"
+            raise DataError(problem, parameter="constants", remedy="write force = 200 g") from None
+        general = self.values | {"constants": constants}
+        general |= {name: int(self.values[name] or 0) for name in ("header", "skip")}
+        if any(general[name] != getattr(self.reading, name) for name in LAYOUT):
+            self.columns = []  # others: what was said of these is void
+            return Reading.model_validate(general)
         if not self.columns:
-            given = self.reading.model_dump() | general | {"constants": self._held()}
-            return Reading.model_validate(given)
-        if tuple(layout.values()) != before:  # other columns: what was said of these is void
-            self.columns = []
-            return Reading.model_validate(general | {"constants": self._held()})
-        left_out = any(not one.channel and one.seen.unasked for one in self.columns)
+            return Reading.model_validate(self.reading.model_dump() | general)
+        named = {one.channel: one for one in self.columns if one.channel}
+        if len(named) < sum(bool(one.channel) for one in self.columns):
+            twice = [one.channel for one in self.columns if one.channel]
+            channel = next(name for name in named if twice.count(name) > 1)
+            problem = "two columns are this channel"
+            raise DataError(problem, channel=channel, remedy="clear one of `columns`")
+        seen = {name: one.seen for name, one in named.items()}
+        units = {name: one.unit or "" for name, one in named.items()}
+        lines = {name: one.line for name, one in named.items() if one.line != (1.0, 0.0)}
+        all_used = all(one.channel or not one.seen.unasked for one in self.columns)
         return Reading.model_validate(
             general
             | {
-                "columns": {
-                    one.channel: one.seen.header for one in named if one.channel != one.seen.unasked
-                },
-                "units": {
-                    one.channel: one.unit or ""
-                    for one in named
-                    if (one.unit or "") != one.seen.unit
-                },
-                "calibration": {
-                    one.channel: (one.gain or 1.0, one.offset or 0.0)
-                    for one in named
-                    if (one.gain or 1.0, one.offset or 0.0) != (1.0, 0.0)
-                },
-                "channels": [o.channel for o in named if o.channel != "time"] if left_out else None,
-                "constants": self._held(),
+                "columns": {n: one.header for n, one in seen.items() if n != one.unasked},
+                "units": {n: unit for n, unit in units.items() if unit != seen[n].unit},
+                "calibration": lines,
+                "channels": None if all_used else [name for name in named if name != "time"],
             }
         )
-
-    def _held(self) -> dict[str, tuple[float, str]]:
-        from mckibben.options import constant
-
-        try:
-            parts = [part.replace(" = ", "=").strip() for part in self.held.split(";")]
-            return dict(constant(part) for part in parts if part)
-        except ValueError:
-            problem = f"{self.held!r:.80} is no channel with a value and a unit"
-            raise DataError(problem, parameter="constants", remedy="write force = 200 g") from None
 
     def lines(self) -> list[str]:
         """Return the first lines of a text."""
         if self.path.suffix.casefold() not in TEXT:
             return []
-        with self.path.open("rb") as file:
-            start = file.read(4096)
-        with suppress(LookupError):
-            return start.decode(self.encoding or "utf-8", "replace").splitlines()[:FIRST_LINES]
+        with self.path.open("rb") as file, suppress(LookupError):
+            start = file.read(4096).decode(self.reading.encoding or "utf-8", "replace")
+            return start.splitlines()[:FIRST_LINES]
         return []
 
 
@@ -191,79 +174,76 @@ async def ask(
         The raw file.
     reading : Reading
         How it is read now.
-    take : callable
+    take : coroutine function
         Called with the reading, and whether others are read so, too; its errors are shown.
     others : str
         Which others, for a check box; empty for none.
     verb : str
         On the button.
     """
-    form = Form(path, reading)
-    one = asyncio.Lock()
+    form, one = Form(path, reading), asyncio.Lock()
     await asyncio.to_thread(form.look)
+
+    async def again() -> None:
+        async with one:
+            if await asyncio.to_thread(form.look):
+                columns.refresh()
+        understood.refresh()
+        button.set_enabled(form.error is None)
+
+    async def finish() -> None:
+        await again()
+        if form.error is None:
+            await take(form.reading, all_so.value)
+            shown.close()
+
+    async def as_found() -> None:
+        form.start(Reading())
+        await again()
+
+    check = widgets.guarded(again)
+
+    def bound(made: Any, name: str) -> None:
+        made.bind_value(form.values, name).on_value_change(check).props(FIELD)
+
+    @ui.refreshable
+    def understood() -> None:
+        _understood(form)
+
+    @ui.refreshable
+    def columns() -> None:
+        _columns(form, check)
+
     with widgets.dialog(f"How is {path.name} read?") as shown:
         mark(shown, "importing")
-
-        async def again() -> None:
-            async with one:
-                if await asyncio.to_thread(form.look):
-                    columns.refresh()
-            understood.refresh()
-            import_button.set_enabled(form.error is None)
-
-        async def finish() -> None:
-            await again()
-            if form.error is None:
-                found = take(form.reading, all_so.value)
-                if found is not None:
-                    await found
-                shown.close()
-
-        check = widgets.guarded(again)
-
-        @ui.refreshable
-        def understood() -> None:
-            _understood(form)
-
-        @ui.refreshable
-        def columns() -> None:
-            _columns(form, check)
-
         understood()
         columns()
         with widgets.row():
-            for label, name in (
-                ("Samples per second", "rate"),
-                ("Rest length [mm]", "rest_length"),
-            ):
-                number = ui.number(label).bind_value(form, name).on_value_change(check)
-                number.props("dense outlined debounce=600 clearable")
-            ui.select(GAPS, label="Gaps").bind_value(form, "gaps").on_value_change(check).props(
-                "dense outlined"
-            )
-            held = ui.input("Held, in no column", placeholder="force = 200 g")
-            held.bind_value(form, "held").on_value_change(check).props(
-                "dense outlined debounce=600"
-            )
-            ui.checkbox("Codes and counters as measured").bind_value(form, "raw").on_value_change(
-                check
-            )
+            bound(ui.number("Samples per second").props("clearable"), "rate")
+            bound(ui.number("Rest length [mm]").props("clearable"), "rest_length")
+            bound(ui.select(GAPS, label="Gaps"), "gaps")
+            bound(ui.input("Held, in no column", placeholder="force = 200 g"), "held")
+            bound(ui.checkbox("Codes and counters as measured"), "raw")
         if lines := form.lines():
             with widgets.details("Lines, header and encoding of the text"):
-                _layout(form, lines, check)
+                numbered = [[str(at), line[:160]] for at, line in enumerate(lines, start=1)]
+                widgets.table(["", "First lines"], numbered)
+                with widgets.row():
+                    for label, name in (
+                        ("Header in line", "header"),
+                        ("Lines after it left out", "skip"),
+                    ):
+                        number = ui.number(label, min=0, precision=0, placeholder="as found")
+                        bound(number.props("clearable"), name)
+                    known = {"": "As found", **{name: name for name in ENCODINGS}}
+                    bound(ui.select(known, label="Encoding"), "encoding")
         with widgets.row(classes="spread"):
-            widgets.button("As found", lambda: _reset(form, again))
+            widgets.button("As found", as_found)
             ui.space()
             all_so = mark(ui.checkbox(others, value=bool(others)), "others")
             all_so.set_visibility(bool(others))
-            import_button = mark(widgets.primary(verb, finish), "import")
-            import_button.set_enabled(form.error is None)
-
-
-async def _reset(form: Form, again: Callable[[], Any]) -> None:
-    form.columns, form.reading = [], Reading()
-    form.__post_init__()
-    await again()
+            button = mark(widgets.primary(verb, finish), "import")
+            button.set_enabled(form.error is None)
 
 
 def _understood(form: Form) -> None:
@@ -271,13 +251,15 @@ def _understood(form: Form) -> None:
     if form.error is not None:
         widgets.error_box(form.error)
         return
+    found = form.recordings
+    more = [f"and {len(found) - 3} more recordings"] * (len(found) > 3)
     with ui.element("div"):
-        for one in form.recordings[:3]:
-            ui.label(summary(one)).classes("muted")
-        if len(form.recordings) > 3:
-            ui.label(f"and {len(form.recordings) - 3} more recordings").classes("muted")
-        for note in form.recordings[0].notes if form.recordings else ():
-            ui.label(said(note)).classes("muted")
+        for text in [
+            *map(summary, found[:3]),
+            *more,
+            *(map(said, found[0].notes) if found else ()),
+        ]:
+            ui.label(text).classes("muted")
 
 
 def summary(recording: Recording) -> str:
@@ -296,32 +278,28 @@ def _columns(form: Form, check: Callable[[], Any]) -> None:
     """Show the columns with controls for what each is read as."""
 
     def cells(column: Column) -> list[Any]:
-        def channel() -> None:
-            found = ui.input(placeholder="left out").bind_value(column, "channel")
-            found.on_value_change(check).style("min-width: 160px")
-            widgets.labelled(found, f"Channel of {column.seen.header}")
-            found.props("dense outlined clearable debounce=600 list=channels")
+        def bound(made: Any, name: str, label: str, width: int) -> Any:
+            made.bind_value(column, name).on_value_change(check).props(FIELD)
+            return widgets.labelled(made, label).style(f"width: {width}px; min-width: 0")
 
-        def unit() -> None:
-            found = ui.input().bind_value(column, "unit").on_value_change(check)
-            found.props("dense outlined debounce=600 aria-label=Unit").style("width: 80px")
+        def channel() -> None:
+            made = ui.input(placeholder="left out").props("clearable list=channels")
+            bound(made, "channel", f"Channel of {column.seen.header}", 180)
 
         def calibration() -> None:
+            async def turn() -> None:
+                column.turn()
+                await check()
+
             with widgets.row():
                 for name in ("gain", "offset"):
-                    number = ui.number().bind_value(column, name).on_value_change(check)
-                    number.props(f"dense outlined debounce=600 aria-label={name}").style(
-                        "width: 88px; min-width: 0"
-                    )
-
-                async def turn() -> None:
-                    column.turn()
-                    await check()
-
+                    bound(ui.number(), name, name, 88)
                 widgets.icon_button("swap_vert", "Turn the sign", turn)
 
-        first = ", ".join(column.seen.first[:3])
-        return [column.seen.header, first, channel, unit, calibration]
+        def unit() -> None:
+            bound(ui.input(), "unit", "Unit", 80)
+
+        return [column.seen.header, ", ".join(column.seen.first[:3]), channel, unit, calibration]
 
     if form.columns:
         with ui.element("datalist").props("id=channels"):
@@ -329,18 +307,3 @@ def _columns(form: Form, check: Callable[[], Any]) -> None:
                 ui.element("option").props(f"value={name}")
         heads = ["Column", "First values", "Channel", "Unit", "Gain, offset, sign"]
         widgets.table(heads, [cells(one) for one in form.columns])
-
-
-def _layout(form: Form, lines: list[str], check: Callable[[], Any]) -> None:
-    with ui.element("pre").classes("code").style("margin: 0; white-space: pre; overflow-x: auto"):
-        for at, line in enumerate(lines, start=1):
-            ui.label(f"{at:3d}  {line[:160]}")
-    with widgets.row():
-        for label, name in (("Header in line", "header"), ("Lines after it left out", "skip")):
-            number = ui.number(label, min=0, precision=0).bind_value(form, name)
-            number.on_value_change(check).props(
-                'dense outlined debounce=600 clearable placeholder="as found"'
-            )
-        ui.select(ENCODINGS, label="Encoding").bind_value(form, "encoding").on_value_change(
-            check
-        ).props("dense outlined")

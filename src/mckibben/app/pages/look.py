@@ -6,17 +6,25 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from nicegui import events, ui
+from nicegui import ui
 
-from mckibben.app import widgets
+from mckibben.app import forms, widgets
 from mckibben.app.later import later
-from mckibben.app.modelling import last_plan, plan, sides_of
+from mckibben.app.modelling import last_plan, plan, restored, sides_of
 from mckibben.app.state import State, view
 from mckibben.app.terms import said
 from mckibben.app.widgets import mark
 from mckibben.comparison.channels import Channels
-from mckibben.numerals import number, typeset_within
+from mckibben.diagnosis.characterization import characterize
+from mckibben.diagnosis.coupling import coupling
+from mckibben.diagnosis.data_gaps import Gap, data_gaps
+from mckibben.numerals import number
+from mckibben.options import PlanOptions
 from mckibben.recording import Recording
+from mckibben.report import results
+from mckibben.report.builder import Text
+from mckibben.report.figures import draw
+from mckibben.report.subjects import loop_by
 
 TITLE = "Look"
 ICON = "insights"
@@ -24,8 +32,8 @@ ICON = "insights"
 DRAWN = 3
 """Recordings that are drawn at first."""
 
-GAPS = 3
-"""Data gaps that are shown before a fold-out."""
+MOST = 6
+"""Channels that are drawn over time together."""
 
 VIEWS = {"loop": "Loop", "time": "Over time"}
 
@@ -39,65 +47,55 @@ def build(state: State) -> None:
             widgets.heading(
                 "Look", "What the muscle does, and what the recordings do not show yet."
             )
-            action = widgets.primary(
-                "Choose models", lambda: ui.navigate.to("/models"), "leaderboard"
-            )
-            mark(action, "choose-models")
+            choose = partial(ui.navigate.to, "/models")
+            mark(widgets.primary("Choose models", choose, "leaderboard"), "choose-models")
         content(state)
 
 
 @view
 def content(state: State) -> None:
     """Show the recordings that are chosen, and what all of them tell."""
-    used = state.workspace.used()
-    known = [name for name in (*state.inputs, *state.outputs) if name in state.workspace.channels()]
-    if not used or not known:
-        with (
-            widgets.card(),
-            widgets.empty(
-                "insights",
-                "Nothing to look at yet",
-                "Add recordings with an input, such as pressure, and an output, such as displacement. "
-                "You then see how wide the loop is, whether speed matters, and what is missing.",
-            ),
-        ):
+    used, known = state.workspace.used(), state.workspace.channels()
+    if not used or not {*state.inputs, *state.outputs} & {*known}:
+        text = (
+            "Add recordings with an input, such as pressure, and an output, such as displacement. "
+            "You then see how wide the loop is, whether speed matters, and what is missing."
+        )
+        with widgets.card(), widgets.empty("insights", "Nothing to look at yet", text):
             ui.link("Add recordings →", "/")
         return
-    sides = sides_of(state.workspace, state.inputs, state.outputs, state.load)
-    pairs = _pairs(list(used.values()), sides)
+    sides, runs = (
+        sides_of(state.workspace, state.inputs, state.outputs, state.load),
+        [*used.values()],
+    )
+    pairs = coupling(runs, sides.inputs, sides.outputs).pairs(runs)
+    every = [(given, wanted) for given in sides.inputs for wanted in sides.outputs]
     pair = state.chosen.get("look.pair")
-    if pair is None or pair[1] not in sides.outputs or pair[0] not in (*sides.inputs, *dict(pairs)):
-        pair = pairs[0]
-    several = len(sides.inputs) > 1 or len(sides.outputs) > 1
+    pair = pair if pair in [*every, *pairs] else pairs[0]
     shown = [name for name in state.chosen.get("look.shown", []) if name in used]
-    shown = shown or list(used)[:DRAWN]
+    shown = shown or [*used][:DRAWN]
     with ui.element("div").classes("columns"):
         with ui.element("div").classes("stack"):
             _recordings(state, used, shown)
-            _words(state, sides, pair)
+            _words(state, runs, sides, pair)
         with ui.element("div").classes("stack"):
-            if several:
-                _coupling(state, list(used.values()), sides, pair)
+            if len(every) > 1:
+                _coupling(state, runs, sides, pair)
             _figure(state, [used[name] for name in shown], sides, pair)
             _gaps(state, sides, pair)
     widgets.next_step("Seen enough? Fit models to it, and compare them.", "Models", "/models")
 
 
-def _pairs(recordings: list[Recording], sides: Channels) -> list[Pair]:
-    """Return what every output is drawn over, and the output."""
-    from mckibben.diagnosis.coupling import coupling
-
-    return list(coupling(recordings, sides.inputs, sides.outputs).pairs(recordings))
+def _choose(state: State, key: str, value: Any) -> None:
+    state.chosen[key] = value
+    content.refresh()
 
 
 def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> None:
     roles = {entry.name: entry.role for entry in state.workspace.entries()}
 
     def tick(name: str, on: bool) -> None:
-        state.chosen["look.shown"] = [
-            n for n in used if (n in shown and n != name) or (n == name and on)
-        ]
-        state.changed()
+        _choose(state, "look.shown", [n for n in used if (on if n == name else n in shown)])
 
     def box(name: str) -> None:
         found = ui.checkbox(name, value=name in shown, on_change=lambda e: tick(name, e.value))
@@ -106,41 +104,37 @@ def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> N
     def chip(role: str) -> None:
         ui.label(role).classes(f"chip {role}")
 
-    def row(name: str, run: Recording) -> list[Any]:
-        long = f"{run.duration:.4g} s" if run.sample_time else f"{len(run)} samples"
-        return [partial(box, name), partial(chip, roles[name]), long]
-
+    rows = [
+        [
+            partial(box, name),
+            partial(chip, roles[name]),
+            f"{run.duration:.4g} s" if run.sample_time else f"{len(run)} samples",
+        ]
+        for name, run in used.items()
+    ]
     with widgets.card("Recordings"):
-        widgets.table(["Shown", "Role", "Length"], [row(*one) for one in used.items()])
+        widgets.table(["Shown", "Role", "Length"], rows)
 
 
 def _coupling(state: State, used: list[Recording], sides: Channels, pair: Pair) -> None:
     """Show how far every input moves every output; a click shows their loop."""
-    from mckibben.diagnosis.coupling import coupling
-
     found = coupling(used, sides.inputs, sides.outputs)
-
-    def choose(given: str, wanted: str) -> None:
-        state.chosen["look.pair"] = (given, wanted)
-        state.changed()
 
     def cell(given: str, wanted: str, effect: float, unit: str) -> None:
         text = f"{number(effect, 2)}\xa0{unit}" if np.isfinite(effect) else "loop"
-        button = widgets.button(text, partial(choose, given, wanted))
+        button = widgets.button(text, partial(_choose, state, "look.pair", (given, wanted)))
         chosen = "unelevated" if (given, wanted) == pair else "flat"
         widgets.labelled(button, f"{wanted} over {given}").props(chosen, remove="flat")
         mark(button, f"pair-{given}-{wanted}")
 
+    rows: list[list[Any]] = []
+    for wanted, effects, unit, share in zip(
+        found.outputs, found.effects.tolist(), found.units, found.explained, strict=True
+    ):
+        each = zip(found.inputs, effects, strict=True)
+        cells = [partial(cell, given, wanted, effect, unit) for given, effect in each]
+        rows.append([wanted, *cells, f"{100 * max(share, 0):.0f} %"])
     with widgets.card("What moves what"):
-        rows: list[list[Any]] = [
-            [wanted]
-            + [
-                partial(cell, given, wanted, float(found.effects[place, at]), found.units[place])
-                for at, given in enumerate(found.inputs)
-            ]
-            + [f"{100 * max(found.explained[place], 0):.0f} %"]
-            for place, wanted in enumerate(found.outputs)
-        ]
         mark(widgets.table(["", *found.inputs, "Explained"], rows), "coupling")
         ui.label(
             "What each input over its whole range does to an output, by one straight line through all "
@@ -150,104 +144,73 @@ def _coupling(state: State, used: list[Recording], sides: Channels, pair: Pair) 
 
 
 def _figure(state: State, recordings: list[Recording], sides: Channels, pair: Pair) -> None:
-    from mckibben.report.figures import draw
-    from mckibben.report.subjects import loop_by
-
     given, wanted = pair
     shared = [n for n in recordings[0].channels if all(n in run for run in recordings)]
-    values = {n: np.concatenate([run[n] for run in recordings]) for n in shared if n not in pair}
-    free = [name for name, all_of_it in values.items() if np.ptp(all_of_it) > 0]
+    spans = {n: np.ptp(np.concatenate([run[n] for run in recordings])) for n in shared}
+    free = [name for name in shared if name not in pair and spans[name] > 0]
     by = state.chosen.get("look.by", "")
     by = by if by in free else ""
     kind = state.chosen.get("look.view", "loop")
-
-    def choose(key: str, event: events.ValueChangeEventArguments[Any]) -> None:
-        state.chosen[key] = event.value
-        state.changed()
-
+    named = [n for n in (*sides.inputs, *sides.outputs, *(sides.scheduling or ())) if n in shared]
+    channels = [*dict.fromkeys([given, wanted, *(named if len(named) <= MOST else ())])]
     with widgets.card():
         with widgets.row(classes="spread"):
-            ui.label(
-                f"{wanted} over {given}" if kind == "loop" else f"{wanted} and {given}"
-            ).classes("subtitle")
+            ui.label(f"{wanted} over {given}").classes("subtitle")
             with widgets.row():
                 if kind == "loop" and free:
-                    options = {"": "Colour by recording or time"} | {
-                        n: f"Colour by {n}" for n in free
-                    }
-                    colour = ui.select(options, value=by, on_change=partial(choose, "look.by"))
-                    mark(colour.props('dense outlined aria-label="Colour"'), "colour")
-                toggle = ui.toggle(VIEWS, value=kind, on_change=partial(choose, "look.view"))
-                mark(toggle.props("no-caps unelevated dense"), "look-view")
-        channels = [given, wanted, *([by] if by else [])]
-        if kind == "loop" and by:
+                    options = {"": "Colour by recording or time"}
+                    options |= {n: f"Colour by {n}" for n in free}
+                    colour = ui.select(options, value=by).props(
+                        'dense outlined aria-label="Colour"'
+                    )
+                    colour.on_value_change(lambda event: _choose(state, "look.by", event.value))
+                toggle = ui.toggle(VIEWS, value=kind).props("no-caps unelevated dense")
+                toggle.on_value_change(lambda event: _choose(state, "look.view", event.value))
+        if kind == "time":
+            drawing = draw(recordings, "time", channels=channels)
+        elif by:
             drawing = loop_by(recordings, given, wanted, by)
-        elif kind == "loop":
-            drawing = draw(recordings, "loop", input=given, output=wanted)
         else:
-            several = [*sides.inputs, *sides.outputs, *(sides.scheduling or ())]
-            named = [name for name in several if all(name in each for each in recordings)]
-            channels = named if len(several) <= 6 else channels
-            drawing = draw(recordings, "time", channels=list(dict.fromkeys([*channels, given])))
-        for plot in widgets.plot(
-            drawing, height=360 if kind == "loop" else 130 + 90 * len(channels)
-        ):
+            drawing = draw(recordings, "loop", input=given, output=wanted)
+        height = 360 if kind == "loop" else 130 + 90 * len(channels)
+        for plot in widgets.plot(drawing, height=height):
             mark(plot, f"look-{kind}")
         if drawing.note:
             ui.label(said(drawing.note)).classes("muted")
 
 
-def _words(state: State, sides: Channels, pair: Pair) -> None:
+def _words(state: State, used: list[Recording], sides: Channels, pair: Pair) -> None:
     """Show what the muscle does: a few sentences, and all numbers behind a fold-out."""
-    from mckibben.diagnosis.characterization import Characterization, characterize
-    from mckibben.report.results import characterization
-
-    used, (given, wanted) = list(state.workspace.used().values()), pair
+    given, wanted = pair
     beside = [name for name in (*sides.inputs, *(sides.scheduling or ())) if name != given]
-
-    def show(found: Characterization) -> None:
-        widgets.items(characterization(found))
-
     what = f": {wanted}" if len(sides.outputs) > 1 else ""
     with widgets.card(f"What the muscle does{what}") as card:
         mark(card, "words")
         key = "characterization", state.workspace.digest(), pair, tuple(beside)
-        later(key, partial(characterize, used, given, wanted, beside=beside), show, height=120)
+        make = partial(characterize, used, given, wanted, beside=beside)
+        later(key, make, lambda found: widgets.items(results.characterization(found)), height=120)
 
 
 def _gaps(state: State, sides: Channels, pair: Pair) -> None:
     """Show what the recordings cannot identify, and plan what to record next."""
-    from mckibben.diagnosis.data_gaps import Gap, data_gaps
-    from mckibben.report.words import gap_run, gap_sentence
-
-    train, test = state.workspace.with_role("train"), state.workspace.with_role("test")
+    train, test = state.workspace.train_and_test()
     inputs = sides.inputs if len(sides.inputs) > 1 else (pair[0],)
-
-    def one(gap: Gap) -> None:
-        with ui.element("div"):
-            ui.label(typeset_within(gap_sentence(gap)))
-            ui.label(typeset_within(gap_run(gap))).classes("muted")
+    none = [Text(["Nothing is missing: the recordings show all that models ask for."])]
 
     def show(found: tuple[Gap, ...]) -> None:
-        if not found:
-            ui.label("Nothing is missing: the recordings show all that models ask for.")
-        for gap in found[:GAPS]:
-            one(gap)
-        if found[GAPS:]:
-            with widgets.details(f"{len(found[GAPS:])} more"):
-                for gap in found[GAPS:]:
-                    one(gap)
+        widgets.items(results.data_gaps(found) or none)
 
     with widgets.card("What to record next") as card:
         mark(card, "gaps")
         key = "gaps", state.workspace.digest(), inputs, sides.outputs
         make = partial(data_gaps, train or test, inputs, sides.outputs, tests=test if train else ())
         later(key, make, show)
-        _planned(state, inputs)
+        _planned(state)
 
 
-def _planned(state: State, inputs: tuple[str, ...]) -> None:
+def _planned(state: State) -> None:
     jobs = [job for job in state.jobs.jobs.values() if job.kind == "plan"]
+    made = last_plan(state.workspace)
     if running := next((job for job in jobs if job.active), None):
 
         def cancel() -> None:
@@ -259,49 +222,37 @@ def _planned(state: State, inputs: tuple[str, ...]) -> None:
             ui.label("Planning the next recording …").classes("muted")
             widgets.button("Cancel", cancel)
         return
-    made = last_plan(state.workspace)
     if jobs and jobs[-1].state == "failed":
         widgets.error_box(jobs[-1].message)
     elif made:
-        text = " ".join(typeset_within(said(one)) for one in made[0]["sentences"])
-        mark(ui.label(f"Planned: {text}").classes("muted"), "planned")
+        items = restored(made[0])
+        with mark(ui.element("div").classes("stack"), "planned"):
+            ui.label("Planned").classes("subtitle")
+            widgets.items([one for one in items if isinstance(one, Text)])
+            with widgets.details("Its steps, and what they tell"):
+                widgets.items([one for one in items if not isinstance(one, Text)])
     with widgets.row():
         text = "Plan another" if made else "Plan the next recording"
-        mark(widgets.button(text, partial(_ask, state, inputs), "edit_calendar"), "plan")
+        mark(widgets.button(text, partial(_ask, state), "edit_calendar"), "plan")
         if made:
-            path = made[1]
-
-            def download() -> None:
-                ui.download.content(path.read_bytes(), path.name, "text/csv")
-
+            download = partial(widgets.download, made[1])
             mark(widgets.button("Download its commands (CSV)", download, "download"), "commands")
 
 
-def _ask(state: State, inputs: tuple[str, ...]) -> None:
-    used = list(state.workspace.used().values())
-    fields: dict[str, list[Any]] = {}
+def _ask(state: State) -> None:
+    values: dict[str, Any] = {}
 
     def submit() -> None:
-        limits = {name: [one.value for one in two] for name, two in fields.items()}
-        limits = {name: two for name, two in limits.items() if two != [None, None]}
-        for job in [j for j in state.jobs.jobs.values() if j.kind == "plan"]:
-            state.jobs.forget(job.name)
-        minutes = float(field.value or 3)
-        state.jobs.submit(plan, "next recording", minutes=minutes, limits=limits)
+        state.jobs.forget_ended("plan")
+        state.jobs.submit(plan, "next recording", **forms.given(PlanOptions, values))
         dialog.close()
         state.changed()
 
     with widgets.dialog("Plan the next recording") as dialog:
-        ui.label("Random motion within limits, and what closes the gaps.").classes("muted")
-        field = mark(ui.number("Minutes", value=3, min=0.5, max=60), "minutes")
-        with widgets.details("Limits, where they are not those recorded"):
-            for name in inputs:
-                ends = min(run[name].min() for run in used), max(run[name].max() for run in used)
-                with widgets.row():
-                    fields[name] = [
-                        ui.number(
-                            f"{which} {name} [{used[0].units[name]}]", placeholder=f"{end:.3g}"
-                        )
-                        for which, end in zip(("Lowest", "Highest"), ends, strict=True)
-                    ]
+        ui.label(
+            "Random motion within the limits recorded, and what closes the gaps. "
+            f"Other limits are written as {state.inputs[0]}=1:5."
+        ).classes("muted")
+        with widgets.row(classes="fields"):
+            forms.fields(PlanOptions, ("minutes", "limits"), values)
         mark(widgets.primary("Plan it", submit), "plan-it")

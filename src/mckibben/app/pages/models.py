@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -18,23 +19,26 @@ from mckibben.app.terms import said
 from mckibben.app.widgets import mark
 from mckibben.arrays import Array
 from mckibben.blocks.bands import Banded
-from mckibben.blocks.base import Block
+from mckibben.blocks.free_run import run_free
 from mckibben.comparison.channels import Channels
+from mckibben.diagnosis.coupling import coupling
+from mckibben.diagnosis.description import ModelDescription, describe
 from mckibben.estimators.catalogue import caution, full_name
-from mckibben.numerals import number, numeral, typeset, typeset_within
+from mckibben.numerals import number, typeset, typeset_within
 from mckibben.recording import Recording
+from mckibben.report import interactive, results, subjects
+from mckibben.report.builder import Figure, Table
+from mckibben.report.columns import Column, columns_of
+from mckibben.report.drawing import POINTS, over_time
+from mckibben.report.words import CAREFUL
 
 TITLE = "Models"
 ICON = "leaderboard"
 
-TABS = {
-    "loop": "Loop",
-    "time": "Time",
-    "residual": "Residual",
-    "parameters": "Parameters",
-    "band": "Band",
-    "check": "Check",
-}
+FIGURES = {"loop": "loops", "time": "fit", "residual": "residuals", "band": "residuals"}
+"""Tabs with a figure, and its kind."""
+
+TABS = (*FIGURES, "parameters", "check")
 
 HEIGHT = 380
 """Of a figure [px]."""
@@ -42,8 +46,8 @@ HEIGHT = 380
 ENDED = 6
 """Fits that did not work that are shown."""
 
-FIRST = 12
-"""Parameters that are shown before a fold-out."""
+FIRST = ("chosen", "test")
+"""Columns of the leaderboard; the others are behind a fold-out."""
 
 OTHER_DATA = (
     "Those marked “other data” were fitted or tested on recordings that have changed since, so that "
@@ -51,7 +55,6 @@ OTHER_DATA = (
 )
 
 Json = dict[str, Any]
-Part = tuple[Recording, int | None, str]
 
 
 def build(state: State) -> None:
@@ -64,7 +67,21 @@ def build(state: State) -> None:
             fit = widgets.primary("Fit models", partial(choosing.choose, state), "add")
             mark(fit, "fit-models")
         fits(state)
-        content(state)
+        with ui.element("div").classes("columns"):
+            with ui.element("div").classes("stack"):
+                board(state)
+            with ui.element("div").classes("stack"):
+                closer(state)
+        figures(state)
+
+
+def _compared(state: State) -> tuple[Channels, list[Json]]:
+    """Return what is modelled, and what came of its models; the first is chosen until one is picked."""
+    sides = modelling.sides_of(state.workspace, state.inputs, state.outputs, state.load)
+    rows = modelling.comparable(state.workspace, sides)
+    if rows and not (state.chosen.get("models.picked") and state.model in state.workspace.models()):
+        state.model = rows[0]["name"]
+    return sides, rows
 
 
 # -- fits that run, or did not work ----------------------------------------------------------------
@@ -76,14 +93,15 @@ def fits(state: State) -> None:
     jobs = [job for job in state.jobs.jobs.values() if job.kind == "fit" and job.state != "done"]
     active = [job for job in jobs if job.active]
     ended = [job for job in reversed(jobs) if not job.active]
+    if not active and not state.workspace.models():
+        _empty(state)
     if not jobs:
         return
     with widgets.card() as card:
         mark(card, "fits")
         with widgets.row(classes="spread"):
-            ui.label(f"Fitting, {len(active)} to go" if active else "Did not work").classes(
-                "subtitle"
-            )
+            text = f"Fitting, {len(active)} to go" if active else "Did not work"
+            ui.label(text).classes("subtitle")
             if len(active) > 1:
                 mark(widgets.button("Cancel all", partial(_end, state, active)), "cancel-all")
             if not active:
@@ -99,11 +117,28 @@ def fits(state: State) -> None:
                     mark(button, f"cancel-{job.title}")
 
 
+def _empty(state: State) -> None:
+    title, text = (
+        "Which model describes your muscle?",
+        "“Fit models” lists those that apply to your recordings, and why others do not. Each is "
+        "fitted in the background; here they are then compared, the best first.",
+    )
+    lacking = not any(entry.role == "train" for entry in state.workspace.entries())
+    if lacking:
+        title, text = (
+            "Models need recordings",
+            "Add at least one with the role Train. With another of the role Test, errors are on "
+            "motion that no model has seen; else the last part is held out for that.",
+        )
+    with widgets.card(), widgets.empty("leaderboard", title, text):
+        if lacking:
+            ui.link("Add recordings →", "/")
+
+
 def _end(state: State, jobs: Sequence[Job]) -> None:
     for job in reversed(jobs):  # those that wait first, or they would begin
-        (state.jobs.cancel if job.active else state.jobs.forget)(job.name)
-        if job.state == "cancelled":
-            state.jobs.forget(job.name)
+        state.jobs.cancel(job.name)
+        state.jobs.forget(job.name)
     state.changed()
 
 
@@ -114,24 +149,23 @@ def _fit(state: State, job: Job) -> None:
         state.jobs.submit(modelling.fit, job.title, **given)
         state.changed()
 
+    def tell() -> None:
+        bar.set_value(round(job.share, 3))
+        share.set_text(f"{100 * job.share:.0f} %")
+
     with widgets.row(classes="spread"):
         with ui.element("div").classes("grow"):
             ui.label(f"{full_name(job.title)} · {job.title}")
             if not job.active:
                 ui.label(said(job.message or job.state)).classes("muted")
-        if not job.active:
-            widgets.icon_button("replay", f"Fit {job.title} again", again)
-        else:
-            bar = ui.linear_progress(value=job.share, show_value=False, color="primary")
+        if job.active:
+            bar = ui.linear_progress(show_value=False, color="primary").classes("meter")
+            widgets.labelled(bar, "Progress")
             share = ui.label().classes("muted")
-
-            def tell() -> None:
-                bar.set_value(round(job.share, 3))
-                share.set_text(f"{100 * job.share:.0f} %")
-
-            bar.classes("meter").props('aria-label="Progress"')
             tell()
             ui.timer(0.3, tell)
+        else:
+            widgets.icon_button("replay", f"Fit {job.title} again", again)
         text = f"Cancel {job.title}" if job.active else f"Take {job.title} off the list"
         mark(widgets.icon_button("close", text, partial(_end, state, [job])), f"cancel-{job.title}")
 
@@ -139,97 +173,47 @@ def _fit(state: State, job: Job) -> None:
 # -- leaderboard -----------------------------------------------------------------------------------
 
 
+def _columns(rows: list[Json], outputs: Sequence[str] = ()) -> tuple[Column, ...]:
+    return columns_of(rows, rows[0]["unit"], outputs, rows[0]["chosen_by"])
+
+
 @view
-def content(state: State) -> None:
-    """Show the leaderboard with the model that is chosen, or what to do without any."""
-    workspace = state.workspace
-    if not workspace.models():
-        _empty(state)
+def board(state: State) -> None:
+    """Show the models that compare, best first, and behind a fold-out those of other channels."""
+    _, rows = _compared(state)
+    compared = [row["name"] for row in rows]
+    others = [name for name in state.workspace.models() if name not in compared]
+    if not rows and not others:
         return
-    sides = modelling.sides_of(workspace, state.inputs, state.outputs, state.load)
-    results = modelling.comparable(workspace, sides)
-    if results and not (state.chosen.get("models.picked") and state.model in workspace.models()):
-        state.model = results[0]["name"]
-    with ui.element("div").classes("columns"):
-        with ui.element("div").classes("stack"):
-            _board(state, sides, results)
-        with ui.element("div").classes("stack"):
-            if state.model:
-                _closer(state, sides)
-    if results:
-        with widgets.details("All figures of all models"):
-            _figures(results, sides)
-        widgets.next_step(
-            "One is good enough? Let it follow a reference.", "Compensate", "/compensate"
-        )
-
-
-def _empty(state: State) -> None:
-    if not state.workspace.with_role("train"):
-        with (
-            widgets.card(),
-            widgets.empty(
-                "leaderboard",
-                "Models need recordings",
-                "Add at least one with the role Train. With another of the role Test, errors are on "
-                "motion that no model has seen; else the last part is held out for that.",
-            ),
-        ):
-            ui.link("Add recordings →", "/")
-    elif not any(job.active for job in state.jobs.jobs.values()):
-        with (
-            widgets.card(),
-            widgets.empty(
-                "leaderboard",
-                "Which model describes your muscle?",
-                "“Fit models” lists those that apply to your recordings, and why others do not. Each is "
-                "fitted in the background; here they are then compared, the best first.",
-            ),
-        ):
-            pass
-
-
-def _pick(state: State, name: str) -> None:
-    state.model, state.chosen["models.picked"] = name, True
-    state.changed()
-
-
-def _board(state: State, sides: Channels, results: list[Json]) -> None:
-    from mckibben.report.columns import columns_of
-    from mckibben.report.words import CAREFUL
-
-    shared = dict.fromkeys(why for row in results for why in row.get("shared", ()))
     with widgets.card("Leaderboard") as card:
         mark(card, "leaderboard")
-        if results:
-            first = results[0]
-            shown = columns_of(results, first["unit"], (), first["chosen_by"])
-            shown = tuple(one for one in shown if one.key in ("chosen", "test"))
-            rows = [[partial(_title, row), *(_error(one, row) for one in shown)] for row in results]
-            names = [row["name"] for row in results]
-            chosen = names.index(state.model) if state.model in names else None
-
-            heads = ["Model", *(one.label for one in shown)]
-            widgets.table(heads, rows, chosen=chosen, on_choose=lambda at: _pick(state, names[at]))
-            if first["current"] and (mean := first.get("constant")):
-                errors = ", ".join(
-                    f"{one.heading} {typeset(one.text(mean))} {one.unit}" for one in shown
-                )
-                ui.label(f"To be beaten: the mean of the output, {errors}.").classes("muted")
-            if why := modelling.against(results):
-                mark(_warning(why), "not-recommended")
-            notes = [f"{first['split'][:1].upper()}{first['split'][1:]}.", *shared]
-            notes += [f"* {CAREFUL}."] * any(caution(row["model"]) for row in results)
-            notes += [OTHER_DATA] * (not all(row["current"] for row in results))
-            ui.label(typeset_within(said(" ".join(notes)))).classes("muted")
+        if rows:
+            shown = [one for one in _columns(rows) if one.key in FIRST]
+            lines = []
+            for row in rows:
+                errors = [(one.flag(row), one.value(row)) for one in shown]
+                texts = [flag or ("–" if value is None else value) for flag, value in errors]
+                lines.append([partial(_title, row), *texts])
+            _choosable(state, ["Model", *(one.label for one in shown)], lines, compared)
+            _remarks(rows, shown)
         else:
             ui.label("No model of these inputs and outputs is fitted yet.").classes("muted")
-        _others(state, results)
+        if others:
+            about = {row["name"]: row for row in state.workspace.results()}
+            of = (about.get(name, {}) for name in others)
+            words = [" ".join(str(row.get(key, "")) for key in ("output", "input")) for row in of]
+            with widgets.details(f"{len(others)} of other channels, or not fitted here"):
+                lines = [list(line) for line in zip(others, words, strict=True)]
+                _choosable(state, ["Model", "Output, input"], lines, others)
 
 
-def _error(column: Any, row: Json) -> float | str:
-    value = column.value(row)
-    return column.flag(row) or ("–" if value is None else float(value))
+def _choosable(state: State, heads: list[str], lines: list[list[Any]], names: list[str]) -> None:
+    def pick(at: int) -> None:
+        state.model, state.chosen["models.picked"] = names[at], True
+        state.changed()
+
+    chosen = names.index(state.model) if state.model in names else None
+    widgets.table(heads, lines, chosen=chosen, on_choose=pick)
 
 
 def _title(row: Json) -> None:
@@ -238,61 +222,59 @@ def _title(row: Json) -> None:
         ui.label(row["name"] + " · other data" * (not row["current"])).classes("muted")
 
 
-def _others(state: State, results: list[Json]) -> None:
-    """Show models of other channels, and those that were not fitted here."""
-    known = {row["name"] for row in results}
-    others = [name for name in state.workspace.models() if name not in known]
-    if not others:
+def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
+    first = rows[0]
+    if first["current"] and (mean := first.get("constant")):
+        errors = [f"{one.heading} {typeset(one.text(mean))} {one.unit}" for one in shown]
+        text = f"To be beaten: the mean of the output, {', '.join(errors)}."
+        ui.label(text).classes("muted")
+    if why := modelling.against(rows):
+        with mark(ui.element("div").classes("error"), "not-recommended"):
+            ui.icon("info_outline")
+            ui.label(typeset_within(said(why)))
+    notes = [f"{first['split'][:1].upper()}{first['split'][1:]}."]
+    notes += dict.fromkeys(why for row in rows for why in row.get("shared", ()))
+    notes += [f"* {CAREFUL}."] * any(caution(row["model"]) for row in rows)
+    notes += [OTHER_DATA] * (not all(row["current"] for row in rows))
+    ui.label(typeset_within(said(" ".join(notes)))).classes("muted")
+
+
+@view
+def figures(state: State) -> None:
+    """Show all figures of all models behind a fold-out, and what comes next."""
+    sides, rows = _compared(state)
+    if not rows:
         return
-    with widgets.details(f"{len(others)} of other channels, or not fitted here"):
-        about = {row["name"]: row for row in state.workspace.results()}
-        rows: list[list[Any]] = []
-        for name in others:
-            row = about.get(name, {})
-            of = f"{row['output']} of {row['input']}" if row else ""
-            of += f", load {row['load']}" if row.get("load") else ""
-            rows.append([partial(ui.label, name), of])
-        chosen = others.index(state.model) if state.model in others else None
-        widgets.table(
-            ["Model", "Of"], rows, chosen=chosen, on_choose=lambda at: _pick(state, others[at])
-        )
-
-
-def _figures(results: list[Json], sides: Channels) -> None:
-    from mckibben.report.columns import columns_of
-
-    found = columns_of(results, results[0]["unit"], sides.outputs, results[0]["chosen_by"])
-    rows = [
-        [row["name"], *(f"{typeset(one.text(row))} {one.flag(row)}".strip() for one in found)]
-        for row in results
-    ]
-    widgets.table(["Model", *(one.label for one in found)], rows)
-    ui.label(
-        "Width reproduced: 100 % where rising and falling branches are as far apart as measured. "
-        "Inverse: exact by a formula, solved in every step, or none."
-    ).classes("muted")
-
-
-def _warning(text: str) -> Any:
-    with ui.element("div").classes("error") as found:
-        ui.icon("info_outline")
-        ui.label(typeset_within(said(text)))
-    return found
+    found = _columns(rows, sides.outputs)
+    with widgets.details("All figures of all models"):
+        texts = [
+            [f"{typeset(one.text(row))} {one.flag(row)}".strip() for one in found] for row in rows
+        ]
+        lines = [[row["name"], *line] for row, line in zip(rows, texts, strict=True)]
+        widgets.table(["Model", *(one.label for one in found)], lines)
+        ui.label(
+            "Width reproduced: 100 % where rising and falling branches are as far apart as measured. "
+            "Inverse: exact by a formula, solved in every step, or none."
+        ).classes("muted")
+    widgets.next_step("One is good enough? Let it follow a reference.", "Compensate", "/compensate")
 
 
 # -- the model that is chosen ----------------------------------------------------------------------
 
 
-@ui.refreshable  # by itself when a tab is chosen, and with all of the content else
-def _closer(state: State, sides: Channels) -> None:
-    """Show the model that is chosen in tabs, perhaps beside another."""
+@view
+def closer(state: State) -> None:
+    """Show the model that is chosen, in tabs."""
+    sides, _ = _compared(state)
     workspace, name = state.workspace, state.model
+    if name not in workspace.models():
+        return
     row = workspace.read("results", name) or {}
-    tab = state.chosen.get("models.tab", "loop")
+    tab = state.chosen.get("models.tab", TABS[0])
 
-    def choose_tab(event: Any) -> None:
+    def choose(event: Any) -> None:
         state.chosen["models.tab"] = event.value
-        _closer.refresh()
+        closer.refresh()
 
     with widgets.card() as card:
         mark(card, "closer")
@@ -301,46 +283,35 @@ def _closer(state: State, sides: Channels) -> None:
                 title = f"{full_name(row['model'])} · {name}" if row.get("model") else name
                 ui.label(title).classes("subtitle").props('role=heading aria-level="3"')
                 ui.label(_summary(row)).classes("muted")
-            delete = widgets.icon_button(
-                "delete_outline", f"Delete {name}", partial(_delete, state)
-            )
-            mark(delete, "delete-model")
-        tabs = ui.tabs(value=tab, on_change=choose_tab).props(
+            delete = partial(_delete, state)
+            mark(widgets.icon_button("delete_outline", f"Delete {name}", delete), "delete-model")
+        with ui.tabs(value=tab, on_change=choose).props(
             "dense no-caps align=left active-color=primary indicator-color=primary"
-        )
-        with tabs:
-            for key, label in TABS.items():
-                mark(ui.tab(key, label), f"tab-{key}")
-        runs = modelling.parts(workspace, sides)
-        if tab == "parameters":
-            later(
-                ("parameters", *_version(state, name)), lambda: workspace.model(name), _parameters
-            )
-        elif tab == "check":
+        ):
+            for key in TABS:
+                mark(ui.tab(key, key.capitalize()), f"tab-{key}")
+        if tab == "check":
             _check(state, row)
-        elif runs:
-            _drawn(state, tab, sides, runs, row)
-
-
-def _version(state: State, *names: str) -> tuple[Any, ...]:
-    """Return what changes when models do."""
-    paths = [
-        state.workspace.path(kind, f"{n}.json") for n in names for kind in ("models", "banded")
-    ]
-    return names + tuple(path.stat().st_mtime_ns if path.is_file() else 0 for path in paths)
+        elif tab == "band" and name not in workspace.names("banded"):
+            _work(state, modelling.calibrate, "Calibrate a band", "straighten", BAND)
+        else:
+            _shown(state, tab, sides, row)
 
 
 def _summary(row: Json) -> str:
     if not row.get("test"):
         return "Not fitted here."
-    unit, parameters = row.get("unit", ""), row.get("n_parameters")
-    test = row["test"]["rmse"]
-    ends = row["test"].get("rmse_interval")
-    text = f"Test RMSE {number(test, 3)} {unit}"
-    text += f" ({number(ends[0], 2)} to {number(ends[1], 2)} in 95 %)" if ends else ""
+    test, unit = row["test"], row.get("unit", "")
+    text = f"Test RMSE {number(test['rmse'], 3)} {unit}"
+    if ends := test.get("rmse_interval"):
+        text += f" ({number(ends[0], 2)} to {number(ends[1], 2)} in 95 %)"
     inverse = {"exact": "exact inverse", "solved": "inverse by solving", "none": "no inverse"}
-    parts = [text, inverse.get(row.get("inverse") or "", ""), f"{parameters} parameters"]
-    return typeset_within(" · ".join(filter(None, parts)))
+    about = [
+        text,
+        inverse.get(row.get("inverse") or "", ""),
+        f"{row.get('n_parameters')} parameters",
+    ]
+    return typeset_within(" · ".join(filter(None, about)))
 
 
 def _delete(state: State) -> None:
@@ -358,197 +329,145 @@ def _delete(state: State) -> None:
         mark(widgets.primary("Delete", delete), "delete-sure")
 
 
-def _drawn(state: State, tab: str, sides: Channels, runs: Mapping[str, Part], row: Json) -> None:
-    """Show the model, and perhaps another, on a recording."""
+def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
+    """Show parameters, or the model on a recording."""
     workspace, name = state.workspace, state.model
-    block: Block = workspace.model(name)
-    outputs = [channel.name for channel in block.outputs]
-    needed = {*outputs, *(channel.name for channel in block.inputs)}
-    runs = {key: one for key, one in runs.items() if needed <= {*one[0].channels}}
+    block = workspace.model(name)
+    inputs, outputs = ([c.name for c in side] for side in (block.inputs, block.outputs))
+    every = modelling.parts(workspace, sides).items()
+    runs = {key: one for key, one in every if {*inputs, *outputs} <= {*one[0].channels}}
     if not runs:
-        ui.label(f"No recording has {', '.join(sorted(needed))}.").classes("muted")
+        text = f"No recording has {', '.join(sorted({*inputs, *outputs}))}."
+        ui.label(text).classes("muted")
         return
-    alike = [row["name"] for row in modelling.comparable(workspace, sides)]
-    alike = [each for each in alike if each != name] if name in alike else []
-    keys = {"models.run": [*runs], "models.output": outputs, "models.other": ["", *alike]}
-    chosen: dict[str, str] = {
-        key: str(state.chosen[key]) if state.chosen.get(key) in known else known[0]
-        for key, known in keys.items()
-    }
-
-    def field(key: str, label: str, options: dict[str, str]) -> None:
-        def pick(event: Any) -> None:
-            state.chosen[key] = event.value
-            _closer.refresh()
-
-        found = ui.select(options, value=chosen[key], label=label, on_change=pick)
-        mark(found.props("dense outlined"), key.replace("models.", "closer-"))
-
-    with widgets.row():
-        if len(runs) > 1:
-            uses = {key: f"{key} ({use})" for key, (_, _, use) in runs.items()}
-            field("models.run", "Recording", uses)
-        if len(outputs) > 1:
-            field("models.output", "Output", {each: each for each in outputs})
-        if alike and tab != "band":
-            field("models.other", "Beside", {"": "No other"} | {each: each for each in alike})
-    names = [name, *([chosen["models.other"]] if chosen["models.other"] and tab != "band" else [])]
-    run, tested, _ = runs[chosen["models.run"]]
-    wanted = chosen["models.output"]
-    place = outputs.index(wanted)
     train = workspace.with_role("train")
-    if tab == "band" and not workspace.path("banded", f"{name}.json").is_file():
-        _no_band(state)
+    paths = [workspace.path(kind, f"{name}.json") for kind in ("models", "banded")]
+    key = [name, workspace.digest(), *(p.stat().st_mtime_ns if p.is_file() else 0 for p in paths)]
+    if tab == "parameters":
+        fitted = [run for run in train if {*inputs, *outputs} <= {*run.channels}]
+        on = fitted or [run for run, *_ in runs.values()]
+        describing = partial(describe, block, on, fitted=bool(fitted))
+        later(("parameters", *key), describing, _parameters, height=HEIGHT)
         return
-    key = *_version(state, *names), run.name, workspace.digest(), outputs
 
-    def free() -> dict[str, Array]:
-        from mckibben.blocks.free_run import run_free
+    def choice(what: str, label: str, options: dict[str, str]) -> str:
+        def pick(event: Any) -> None:
+            state.chosen[f"models.{what}"] = event.value
+            closer.refresh()
 
-        blocks = {each: workspace.model(each) for each in names}
-        return {each: run_free(one, run, outputs, train) for each, one in blocks.items()}
+        chosen = state.chosen.get(f"models.{what}")
+        chosen = chosen if chosen in options else next(iter(options))
+        if len(options) > 1:
+            found = ui.select(options, value=chosen, label=label, on_change=pick)
+            mark(found.props("dense outlined"), f"closer-{what}")
+        return str(chosen)
 
-    def show(found: Mapping[str, Array]) -> None:
-        modelled = {each: values[:, place] for each, values in found.items()}
-        given = _driving(sides, block, run, wanted)
-        figures = _figures_of(tab, run, given, wanted, modelled, tested)
-        ends = _shade(state, figures[0], run, found[name], place) if tab == "band" else None
-        with ui.element("div").classes("columns-even" if len(figures) > 1 else "stack"):
-            for figure in figures:
-                mark(widgets.plot_of(figure, height=HEIGHT), f"closer-{tab}")
-        rows = slice(tested or 0, None)
-        off = [
-            f"{each} {number(float(np.sqrt(np.mean((y[rows] - run[wanted][rows]) ** 2))), 3)}"
-            for each, y in modelled.items()
-        ]
-        unit = run.units[wanted]
-        what = "the held-out part of " if tested else ""
-        text = f"RMSE of {wanted} on {what}{run.name}: {', '.join(off)} {unit}."
-        mark(ui.label(typeset_within(text)).classes("muted"), "closer-on")
-        if ends is not None:
-            inside = (ends[0] <= run[wanted]) & (run[wanted] <= ends[1])
-            text = f"The band holds {100 * inside[rows].mean():.0f} % of these samples"
-            text += (
-                f"; its half width is {number(float(np.mean(ends[1] - ends[0])) / 2, 2)} {unit}."
-            )
-            mark(ui.label(typeset_within(text)), "closer-band")
-            for sentence in row.get("calibrated", ()):
-                ui.label(typeset_within(said(sentence))).classes("muted")
-            _calibrate_button(state, "Calibrate again")
-
-    later(("free", *map(str, key)), free, show, height=HEIGHT)
-
-
-def _driving(sides: Channels, block: Block, run: Recording, wanted: str) -> str:
-    """Return what an output is drawn over."""
-    from mckibben.diagnosis.coupling import coupling
-
-    named = [channel.name for channel in block.inputs]
-    inputs = [name for name in sides.inputs if name in named] or named[:1]
-    return coupling([run], inputs, [wanted]).pairs([run])[0][0]
-
-
-def _figures_of(
-    tab: str,
-    run: Recording,
-    given: str,
-    wanted: str,
-    modelled: Mapping[str, Array],
-    tested: int | None,
-) -> list[Json]:
-    from mckibben.report import interactive, subjects
-
-    kind = {"loop": "loops", "time": "fit"}.get(tab, "residuals")
-    drawing = subjects.against(kind, run, (given, wanted), modelled, tested)
-    return interactive.plots(drawing)[-1 if tab == "band" else 0 :]
-
-
-def _shade(
-    state: State, figure: Json, run: Recording, modelled: Array, place: int
-) -> tuple[Array, Array] | None:
-    """Shade the band behind the residual over time, and return its ends."""
-    from mckibben.report.drawing import POINTS, over_time
-    from mckibben.report.interactive import packed
-
-    banded = state.workspace.model(state.model, "banded")
-    if not isinstance(banded, Banded):
-        return None
-    found = banded.band.simulate(modelled, sample_time=run.sample_time)
-    low, high = found.reshape(*modelled.shape, 3)[:, place, 1:].T
-    ends = (end - modelled.reshape(len(run), -1)[:, place] for end in (low, high))
-    (t, lower), (back, upper) = (over_time(run.time, end, POINTS) for end in ends)
-    trace = {"type": "scatter", "mode": "lines", "name": "band", "fill": "toself", "opacity": 0.3}
-    trace |= {"x": packed(np.append(t, back[::-1])), "y": packed(np.append(lower, upper[::-1]))}
-    trace |= {"fillcolor": "--series-1", "line": {"width": 0}, "hoverinfo": "skip"}
-    figure["data"].insert(0, trace)
-    return low, high
-
-
-def _submitted(state: State, work: Callable[..., str]) -> None:
-    for job in [j for j in state.jobs.jobs.values() if j.kind == work.__name__ and not j.active]:
-        state.jobs.forget(job.name)
-    state.jobs.submit(work, f"{work.__name__} {state.model}", name=state.model)
-    state.changed()
-
-
-def _work_button(state: State, text: str, work: Callable[..., str], icon: str) -> None:
-    """Show a button that does something with the model; while that runs, how it does."""
-    jobs = [job for job in state.jobs.jobs.values() if job.kind == work.__name__]
-    mine = [job for job in jobs if job.given.get("name") == state.model]
-    if any(job.active for job in mine):
-        with widgets.row():
-            ui.spinner(size="20px")
-            ui.label("At work …").classes("muted")
-        return
-    if mine and mine[-1].state == "failed":
-        widgets.error_box(mine[-1].message)
     with widgets.row():
-        mark(widgets.button(text, partial(_submitted, state, work), icon), work.__name__)
+        uses = {key: f"{key} ({use})" for key, (*_, use) in runs.items()}
+        run, tested, _ = runs[choice("run", "Recording", uses)]
+        wanted = choice("output", "Output", {each: each for each in outputs})
+    driving = [each for each in sides.inputs if each in inputs] or inputs[:1]
+    pair = coupling([run], driving, [wanted]).pairs([run])[0]
+
+    def show(modelled: Array) -> None:
+        place = outputs.index(wanted)
+        y = modelled.reshape(len(run), -1)[:, place]
+        drawn = subjects.against(FIGURES[tab], run, pair, {name: y}, tested)
+        plots = interactive.plots(drawn)[-1 if tab == "band" else 0 :]
+        banded = workspace.model(name, "banded") if tab == "band" else None
+        rows, unit = slice(tested or 0, None), run.units[wanted]
+        off = float(np.sqrt(np.mean((y[rows] - run[wanted][rows]) ** 2)))
+        what = f"{'the held-out part of ' if tested else ''}{run.name}"
+        text = [f"RMSE of {wanted} on {what}: {number(off, 3)} {unit}."]
+        if isinstance(banded, Banded):
+            band = banded.band.simulate(modelled, sample_time=run.sample_time)
+            low, high = band.reshape(len(run), -1, 3)[:, place, 1:].T
+            plots[0]["data"].insert(0, _shade(run, low - y, high - y))
+            inside = ((low <= run[wanted]) & (run[wanted] <= high))[rows].mean()
+            text.append(f"The band holds {100 * inside:.0f} % of these samples.")
+        with ui.element("div").classes("columns-even" if len(plots) > 1 else "stack"):
+            for plot in plots:
+                mark(widgets.plot_of(plot, height=HEIGHT), f"closer-{tab}")
+        ui.label(typeset_within(" ".join(text))).classes("muted")
+        if banded is not None:
+            widgets.items(modelling.restored(row.get("calibration")))
+            _work(state, modelling.calibrate, "Calibrate again", "straighten")
+
+    free = partial(run_free, block, run, outputs, train)
+    later(("free", *key, run.name), free, show, height=HEIGHT)
 
 
-def _calibrate_button(state: State, text: str) -> None:
-    _work_button(state, text, modelling.calibrate, "straighten")
+def _shade(run: Recording, low: Array, high: Array) -> Json:
+    """Return a band about the residual over time, as a trace."""
+    (t, lower), (back, upper) = (over_time(run.time, end, POINTS) for end in (low, high))
+    x, y = np.append(t, back[::-1]), np.append(lower, upper[::-1])
+    trace = {"type": "scatter", "mode": "lines", "name": "band", "fill": "toself", "opacity": 0.3}
+    trace |= {"x": interactive.packed(x), "y": interactive.packed(y), "hoverinfo": "skip"}
+    return trace | {"fillcolor": "--series-1", "line": {"width": 0}}
 
 
-def _no_band(state: State) -> None:
-    with widgets.empty(
-        "straighten",
-        "How far off may it be?",
-        "A band around the model's output holds a share of the samples of new recordings, such as 90 %. "
-        "It is calibrated on the test recordings.",
-    ):
-        _calibrate_button(state, "Calibrate a band")
+def _parameters(found: ModelDescription) -> None:
+    for item in results.description(found):
+        if isinstance(item, Table):  # symbols belong to equations, which the report has
+            heads, rows = (
+                [[a, *rest] for a, _, *rest in some] for some in ([item.headings], item.rows)
+            )
+            item = replace(item, headings=heads[0], rows=rows)
+        with mark(ui.element("div").classes("stack"), "parameters"):
+            widgets.items([item])
+
+
+BAND = (
+    "How far off may it be?",
+    "A band around the model's output holds a share of the samples of new recordings, such as 90 %. "
+    "It is calibrated on the test recordings.",
+)
+
+CHECK = (
+    "Is the model right?",
+    "What it leaves over is tested for what it may have missed: speed, load, creep, hysteresis, lags "
+    "and drift.",
+)
 
 
 def _check(state: State, row: Json) -> None:
-    found = row.get("check")
+    found: Mapping[str, Any] = row.get("check") or {}
     if not found:
-        with widgets.empty(
-            "fact_check",
-            "Is the model right?",
-            "What it leaves over is tested for what it may have missed: speed, load, creep, hysteresis, "
-            "lags and drift.",
-        ):
-            _work_button(state, "Check it", modelling.check, "fact_check")
+        _work(state, modelling.check, "Check it", "fact_check", CHECK)
         return
+    items = modelling.restored(found)
+    with mark(ui.element("div").classes("stack"), "verdict"):
+        widgets.items([one for one in items if not isinstance(one, Figure)])
+    if drawn := [one for one in items if isinstance(one, Figure)]:
+        with widgets.details("What the residual follows"):
+            widgets.items(drawn)
     on = "the test recordings" if found["on"] == "test" else "its training recordings"
     old = "" if found["data"] == state.workspace.digest() else ", as they were"
-    mark(ui.label(typeset_within(found["verdict"])), "verdict")
-    for sentence in found["sentences"]:
-        ui.label(typeset_within(said(sentence)))
     ui.label(f"Checked on {on}{old}.").classes("muted")
-    _work_button(state, "Check again", modelling.check, "fact_check")
+    _work(state, modelling.check, "Check again", "fact_check")
 
 
-def _parameters(block: Block) -> None:
-    from mckibben.blocks.equations import quantities
+def _work(
+    state: State,
+    work: Callable[..., str],
+    text: str,
+    icon: str,
+    about: tuple[str, str] | None = None,
+) -> None:
+    """Show a button for a job on the model, and what it is for; while it runs, that it does."""
+    jobs = [job for job in state.jobs.jobs.values() if job.kind == work.__name__]
+    mine = [job for job in jobs if job.given.get("name") == state.model]
 
-    rows = [
-        [one.name, typeset(numeral(value, 4)), one.unit, one.meaning]
-        for one, value in zip(quantities(block), block.pack().tolist(), strict=True)
-    ]
-    heads = ["Parameter", "Value", "Unit", "What it is"]
-    mark(widgets.table(heads, rows[:FIRST]), "parameters")
-    if rows[FIRST:]:
-        with widgets.details(f"{len(rows) - FIRST} more"):
-            widgets.table(heads, rows[FIRST : FIRST + 500])
+    def start() -> None:
+        state.jobs.forget_ended(work.__name__)
+        state.jobs.submit(work, f"{work.__name__} {state.model}", name=state.model)
+        state.changed()
+
+    with widgets.empty(icon, *about) if about else widgets.row():
+        if any(job.active for job in mine):
+            ui.spinner(size="20px")
+            ui.label("At work …").classes("muted")
+            return
+        if mine and mine[-1].state == "failed":
+            widgets.error_box(mine[-1].message)
+        mark(widgets.button(text, start, icon), work.__name__)

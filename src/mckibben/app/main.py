@@ -34,6 +34,9 @@ PAGES = ("data", "look", "models", "compensate", "takeaway")
 TICK = 0.3
 """How often jobs are asked how far they are [s]."""
 
+PATIENCE = 0.7
+"""How long a new page waits for recordings to be read before it says that they are [s]."""
+
 ABSENCE = 30.0
 """How long a page that has lost the server is kept as it was [s]."""
 
@@ -78,8 +81,9 @@ def serve(
     @ui.page("/")
     @ui.page("/{_:path}")
     async def page() -> None:
-        await asyncio.to_thread(state.settle)  # reads what is new, away from clicks
-        build(state)
+        settling = asyncio.create_task(asyncio.to_thread(state.settle))  # reads what is new
+        await asyncio.wait({settling}, timeout=PATIENCE)
+        build(state, settling)
 
     def ready() -> None:
         """Say where it is once it listens, and load what the first job needs."""
@@ -120,8 +124,8 @@ def pages() -> dict[str, Any]:
     return {"/" if at == 0 else f"/{names[at]}": one for at, one in enumerate(modules)}
 
 
-def build(state: State) -> None:
-    """Build the frame of a window, and the page that its address names."""
+def build(state: State, settling: asyncio.Future[None]) -> None:
+    """Build the frame of a window, and the page that its address names once all is read."""
     ui.add_css(widgets.style())
     ui.dark_mode().bind_value_from(widgets.theme, "dark")
     known, router = pages(), context.client.sub_pages_router
@@ -140,8 +144,23 @@ def build(state: State) -> None:
 
     router.on_path_changed(choose)
     choose(router.current_path)
-    with ui.element("main").props('id=content tabindex="-1"'):
+
+    def content() -> None:
         ui.sub_pages({path: _builder(page, state) for path, page in known.items()})
+
+    async def wait() -> None:
+        await settling
+        place.clear()
+        with place:
+            content()
+
+    with ui.element("div").props('id=content tabindex="-1"') as place:
+        if settling.done():
+            settling.result()
+            content()
+        else:
+            widgets.empty("hourglass_empty", "Reading the recordings", "Large files take a while.")
+            ui.timer(0, wait, once=True)
     ui.timer(0.1, lambda: _prefer(state), once=True)
 
 
@@ -161,8 +180,10 @@ def running(state: State) -> None:
     """Show how many jobs wait or run, on every page."""
     active = state.jobs.active()
     if active:
+        waiting = sum(job.state == jobs.WAITING for job in active)
+        text = f"{len(active) - waiting} running" + f", {waiting} waiting" * bool(waiting)
         ui.spinner(size="16px", color="currentColor")
-        widgets.mark(ui.label(f"{len(active)} running"), "running").props("role=status")
+        widgets.mark(ui.label(text).classes("muted"), "running").props("role=status")
 
 
 def _switch(state: State) -> None:

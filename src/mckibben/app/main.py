@@ -34,9 +34,6 @@ PAGES = ("data", "look", "models", "compensate", "takeaway")
 TICK = 0.3
 """How often jobs are asked how far they are [s]."""
 
-PATIENCE = 0.7
-"""How long a new page waits for recordings to be read before it says that they are [s]."""
-
 ABSENCE = 30.0
 """How long a page that has lost the server is kept as it was [s]."""
 
@@ -81,9 +78,8 @@ def serve(
     @ui.page("/")
     @ui.page("/{_:path}")
     async def page() -> None:
-        settling = asyncio.create_task(asyncio.to_thread(state.settle))  # reads what is new
-        await asyncio.wait({settling}, timeout=PATIENCE)
-        build(state, settling)
+        await asyncio.to_thread(state.settle)  # reads what is new, away from clicks
+        build(state)
 
     def ready() -> None:
         """Say where it is once it listens, and load what the first job needs."""
@@ -124,8 +120,8 @@ def pages() -> dict[str, Any]:
     return {"/" if at == 0 else f"/{names[at]}": one for at, one in enumerate(modules)}
 
 
-def build(state: State, settling: asyncio.Future[None]) -> None:
-    """Build the frame of a window, and the page that its address names once all is read."""
+def build(state: State) -> None:
+    """Build the frame of a window, and the page that its address names."""
     ui.add_css(widgets.style())
     ui.dark_mode().bind_value_from(widgets.theme, "dark")
     known, router = pages(), context.client.sub_pages_router
@@ -144,23 +140,8 @@ def build(state: State, settling: asyncio.Future[None]) -> None:
 
     router.on_path_changed(choose)
     choose(router.current_path)
-
-    def content() -> None:
+    with ui.element("div").props('id=content tabindex="-1"'):
         ui.sub_pages({path: _builder(page, state) for path, page in known.items()})
-
-    async def wait() -> None:
-        await settling
-        place.clear()
-        with place:
-            content()
-
-    with ui.element("div").props('id=content tabindex="-1"') as place:
-        if settling.done():
-            settling.result()
-            content()
-        else:
-            widgets.empty("hourglass_empty", "Reading the recordings", "Large files take a while.")
-            ui.timer(0, wait, once=True)
     ui.timer(0.1, lambda: _prefer(state), once=True)
 
 

@@ -190,12 +190,12 @@ def icon_button(icon: str, label: str, action: Callable[..., Any]) -> Any:
 
 
 def error_toast(error: Exception | str) -> None:
-    """Show an error, with its remedy in terms of controls, until it is closed."""
+    """Show an error, with its remedy in terms of controls, until it is read or closed."""
     ui.notify(
         said(error),
         type="negative",
         multi_line=True,
-        timeout=0,
+        timeout=20_000,
         close_button="Close",
         color="warning",
     )
@@ -216,7 +216,10 @@ def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endi
         auto_upload=True,
         max_file_size=LARGEST,
         on_upload=guarded(action),
-        on_rejected=lambda: error_toast(f"A file has more than {LARGEST // 2**20} MiB"),
+        on_rejected=lambda: error_toast(
+            f"A file is of a kind that cannot be read here ({endings.replace(',', ', ')}), or has more "
+            f"than {LARGEST // 2**20} MiB"
+        ),
     )
     return found.props(f'flat accept="{endings}"').classes("upload")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mckibben.app.guard import BODY, HEAD
+from mckibben.app.guard import BODY, HEAD, PRECAUTIONS
 from tests.app.browsing import Workbench, workbench
 
 
@@ -90,6 +90,22 @@ def test_heads_are_bounded_before_the_token(bench: Workbench) -> None:
         except OSError:  # hung up
             answer = b""
     assert answer == b"" or answer.startswith(b"HTTP/1.1 400")
+
+
+def test_every_answer_forbids_what_is_foreign(bench: Workbench, cookie: str) -> None:
+    static = next(
+        word for word in ask(bench, Cookie=cookie).body.decode().split('"') if word.endswith(".css")
+    )
+    for path, headers in (("/", {"Cookie": cookie}), (static, {"Cookie": cookie}), ("/", {})):
+        answer = ask(bench, path, **headers)
+        for name, value in PRECAUTIONS.items():
+            assert answer.headers.get_all(name.decode()) == [value.decode()]
+        (policy,) = answer.headers.get_all("content-security-policy") or []
+        rules = {rule.split()[0]: rule.split()[1:] for rule in policy.split("; ")}
+        own = {"'self'", "'none'", "'unsafe-inline'", "'unsafe-eval'", "data:", "blob:"}
+        own |= {f"ws://{host}:{bench.port}" for host in ("127.0.0.1", "localhost")}
+        assert {source for sources in rules.values() for source in sources} <= own
+        assert {"default-src", "connect-src", "script-src", "frame-ancestors"} <= {*rules}
 
 
 def test_bodies_are_bounded(bench: Workbench, cookie: str) -> None:

@@ -31,12 +31,28 @@ LOCAL = ("127.0.0.1", "localhost", "::1")
 ENTER = "/enter"
 """Path of the one-time link."""
 
-PRECAUTIONS = [
-    (b"x-content-type-options", b"nosniff"),
-    (b"x-frame-options", b"DENY"),
-    (b"referrer-policy", b"no-referrer"),
-    (b"cache-control", b"no-cache"),
-]
+POLICY = "; ".join(
+    [
+        "default-src 'self' data: blob:",
+        "script-src 'self' 'unsafe-inline' 'unsafe-eval'",  # as NiceGUI and Vue need them
+        "style-src 'self' 'unsafe-inline'",
+        "connect-src 'self' ws://127.0.0.1:{port} ws://localhost:{port}",
+        "object-src 'none'",
+        "base-uri 'none'",
+        "form-action 'self'",
+        "frame-ancestors 'none'",
+    ]
+)
+"""What a page may load and ask: nothing of anybody else."""
+
+PRECAUTIONS = {
+    b"x-content-type-options": b"nosniff",
+    b"x-frame-options": b"DENY",
+    b"referrer-policy": b"no-referrer",
+    b"cross-origin-opener-policy": b"same-origin",
+    b"cross-origin-resource-policy": b"same-origin",
+}
+"""Headers of every answer."""
 
 
 class Guard:
@@ -53,12 +69,15 @@ class Guard:
 
     def __init__(self, app: Any, *, port: int, links: Links) -> None:
         self.app, self.links, self.cookie = app, links, f"mckibben-{port}"
+        policy = {b"content-security-policy": POLICY.format(port=port).encode()}
+        self.headers = PRECAUTIONS | policy
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
+        send = self._careful(send)
         headers = {
             key.decode("latin1").lower(): value.decode("latin1") for key, value in scope["headers"]
         }
@@ -79,6 +98,20 @@ class Guard:
             await _answer(scope, receive, send, 413, text)
         else:
             await self.app(scope, _bounded(receive), send)
+
+    def _careful(self, send: Send) -> Send:
+        """Return what sends answers with the headers that are on all of them."""
+
+        async def careful(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                given = {key.lower() for key, _ in message["headers"]}
+                kept = [one for one in message["headers"] if one[0].lower() not in self.headers]
+                if b"cache-control" not in given:  # what never changes says so itself
+                    kept.append((b"cache-control", b"no-cache"))
+                message["headers"] = [*kept, *self.headers.items()]
+            await send(message)
+
+        return careful
 
     def _knows(self, headers: dict[str, str]) -> bool:
         try:
@@ -167,6 +200,6 @@ async def _answer(
         await send({"type": "websocket.close", "code": 1008})
         return
     plain = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
-    headers = [*plain, *PRECAUTIONS, *(more or [])]
+    headers = [*plain, *(more or [])]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": text.encode()})

@@ -146,7 +146,7 @@ def build(state: State) -> None:
 
     router.on_path_changed(choose)
     choose(router.current_path)
-    with ui.element("main").props('id=content tabindex="-1"'):
+    with ui.element("div").props('id=content tabindex="-1"'):
         ui.sub_pages({path: _builder(page, state) for path, page in known.items()})
     ui.timer(0.1, lambda: _prefer(state), once=True)
 
@@ -167,8 +167,10 @@ def running(state: State) -> None:
     """Show how many jobs wait or run, on every page."""
     active = state.jobs.active()
     if active:
+        waiting = sum(job.state == jobs.WAITING for job in active)
+        text = f"{len(active) - waiting} running" + f", {waiting} waiting" * bool(waiting)
         ui.spinner(size="16px", color="currentColor")
-        widgets.mark(ui.label(f"{len(active)} running"), "running").props("role=status")
+        widgets.mark(ui.label(text).classes("muted"), "running").props("role=status")
 
 
 def _switch(state: State) -> None:

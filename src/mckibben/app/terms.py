@@ -62,8 +62,16 @@ def _placeholder(word: str) -> bool:
 
 
 def said(error: Exception | str) -> str:
-    """Return an error or a note in the terms of the workbench, without the folder of its file."""
-    if not isinstance(error, MckibbenError):
-        return in_terms_of(str(error), control)[:2000]
-    text = rendered(error, control)
-    return text.replace(f"{error.file}", error.file.name if error.file else "")[:2000]
+    """Return an error or a note in the terms of the workbench, without the folder of its file.
+
+    >>> said("it is too short")
+    'It is too short'
+    """
+    if isinstance(error, MckibbenError):
+        text = rendered(error, control)
+        text = text.replace(f"{error.file}", error.file.name if error.file else "")
+    else:
+        text = in_terms_of(str(error), control)
+    if text.partition(" ")[0].isalpha():  # a word, not the name of a file or channel
+        text = text[:1].upper() + text[1:]
+    return text[:2000]

@@ -30,6 +30,9 @@ from mckibben.report.drawing import Drawing
 
 Json = dict[str, Any]
 
+SIZE = 12
+"""Of text in plots [px]."""
+
 
 class Theme:
     """Whether pages are dark; ``known`` once a browser has said so, or a person."""
@@ -187,12 +190,12 @@ def icon_button(icon: str, label: str, action: Callable[..., Any]) -> Any:
 
 
 def error_toast(error: Exception | str) -> None:
-    """Show an error, with its remedy in terms of controls, until it is closed."""
+    """Show an error, with its remedy in terms of controls, until it is read or closed."""
     ui.notify(
         said(error),
         type="negative",
         multi_line=True,
-        timeout=0,
+        timeout=20_000,
         close_button="Close",
         color="warning",
     )
@@ -208,12 +211,15 @@ def error_box(error: Exception | str) -> None:
 def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endings: str) -> Any:
     """Make a place to drop files, which are streamed to the disk, or to choose them."""
     found = ui.upload(
-        label=text,
+        label=f"{text}, or click to choose",
         multiple=True,
         auto_upload=True,
         max_file_size=LARGEST,
         on_upload=guarded(action),
-        on_rejected=lambda: error_toast(f"A file has more than {LARGEST // 2**20} MiB"),
+        on_rejected=lambda: error_toast(
+            f"A file is of a kind that cannot be read here ({endings.replace(',', ', ')}), or has more "
+            f"than {LARGEST // 2**20} MiB"
+        ),
     )
     return found.props(f'flat accept="{endings}"').classes("upload")
 
@@ -249,13 +255,14 @@ def plot_of(figure: Json, *, height: int = 320, dragged: str = "zoom") -> Any:
     }
     for key in [key for key in layout if key.startswith(("xaxis", "yaxis"))]:
         layout[key] = axis | layout[key]
+        _place_title(layout, key, height)
     layout |= {
         "height": height,
         "dragmode": dragged,
-        "margin": {"l": 56, "r": 16, "t": 32 if "title" in layout else 16, "b": 48},
+        "margin": {"l": 56, "r": 16, "t": 32 if "title" in layout else 16, "b": 40},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": "--ink", "family": "system-ui, sans-serif", "size": 12},
+        "font": {"color": "--ink", "family": "system-ui, sans-serif", "size": SIZE},
         "legend": {"orientation": "h", "x": 0, "y": 1, "yanchor": "bottom"},
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "--muted", "activecolor": "--accent"},
         "uirevision": "same",
@@ -263,6 +270,19 @@ def plot_of(figure: Json, *, height: int = 320, dragged: str = "zoom") -> Any:
     config = interactive.CLOSED | {"displayModeBar": "hover", "responsive": True}
     plain = _plain({"data": figure["data"], "layout": layout}, colours(theme.dark))
     return ui.plotly(plain | {"config": config}).classes("plot")
+
+
+def _place_title(layout: Json, key: str, height: int) -> None:
+    """Put the title of an axis near it, or over its panel where that is too low for it."""
+    title = layout[key].get("title")
+    text = title.get("text", "") if isinstance(title, dict) else title or ""
+    layout[key]["title"] = {"text": text, "font": {"size": SIZE}, "standoff": 8}
+    low, high = layout[key].get("domain", (0, 1))
+    if key[0] == "y" and 0.55 * SIZE * len(text) > (high - low) * height:
+        at = {"xref": "paper", "x": 0, "yref": "paper", "y": high, "text": text}
+        at |= {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": SIZE}}
+        layout["annotations"] = [*layout.get("annotations", ()), at]
+        layout[key]["title"] = {"text": ""}
 
 
 def _plain(value: Any, palette: dict[str, str]) -> Any:

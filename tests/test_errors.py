@@ -128,4 +128,6 @@ def test_each_face_renders_in_its_own_terms() -> None:
     terminal = rendered(ERROR, as_flag, as_command)
     for part in ("--gaps split", "--column 'force=F 1'", "--set monotone=true", "mckibben plan"):
         assert part in terminal
-    assert not re.search("`|run.csv", said(ERROR))
+    page = said(ERROR)
+    assert not re.search(r"`|\(\)", page)
+    assert "“Plan the next recording”" in page

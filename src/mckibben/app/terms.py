@@ -43,6 +43,29 @@ CONTROLS = {
 """Parameters of operations, and the controls that set them."""
 
 
+PLACES = {
+    "calibrate": "the tab Band under Models",
+    "check": "the tab Check under Models",
+    "compare": "“Fit models”",
+    "fit": "“Fit models”",
+    "invert": "Compensate",
+    "plan": "“Plan the next recording” under Look",
+    "resample": "“Resample” under Data",
+    "study": "“Report” under Take away",
+    "track": "“Run” under Compensate",
+}
+"""Operations, and where they are."""
+
+
+def place(name: str) -> str:
+    """Return an operation as a place of the workbench.
+
+    >>> place("invert"), place("open_it")
+    ('Compensate', 'open it')
+    """
+    return PLACES.get(name, name.replace("_", " "))
+
+
 def control(name: str, key: str | None = None, value: str | None = None) -> str:
     """Return a parameter as a control of a page.
 
@@ -68,10 +91,10 @@ def said(error: Exception | str) -> str:
     'It is too short'
     """
     if isinstance(error, MckibbenError):
-        text = rendered(error, control)
+        text = rendered(error, control, place)
         text = text.replace(f"{error.file}", error.file.name if error.file else "")
     else:
-        text = in_terms_of(str(error), control)
+        text = in_terms_of(str(error), control, place)
     if text.partition(" ")[0].isalpha():  # a word, not the name of a file or channel
         text = text[:1].upper() + text[1:]
     return text[:2000]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from nicegui import events, run, ui
 
-from mckibben.app import following, forms, widgets
+from mckibben.app import following, forms, modelling, widgets
 from mckibben.app.pages import trying
 from mckibben.app.state import State, view
 from mckibben.app.widgets import mark
@@ -301,7 +301,7 @@ def _compensator(state: State, name: str) -> None:
             with widgets.details("Imperfections of the loop"), widgets.row(classes="fields"):
                 forms.fields(TrackOptions, LOOP, _values(state, "loop"))
         with widgets.row(classes="spread"):
-            ui.label("Beside no compensation" if plant else "").classes("muted")
+            ui.label("Compared with no compensation." if plant else "").classes("muted")
             text = "Run" if plant else "Show commands"
             mark(widgets.primary(text, lambda: _start(state, name), "play_arrow"), "run")
 
@@ -345,6 +345,8 @@ def _followed(state: State) -> None:
     with widgets.card("What is wanted, and what came of it" if chosen else "What is wanted"):
         drawn = dict.fromkeys([*filter(None, [chosen]), *of_it])
         _motion_plot(state, reference, reach, {run: runs[run] for run in [*drawn][:DRAWN]})
+        if why := _doubt(state):
+            widgets.error_box(why)
         together = "; each channel by itself, all at once less" if len(reach) > 1 else ""
         ui.label(f"Shaded: what the model reaches{together}.").classes("muted")
         for channel, (low, high) in reach.items():
@@ -361,6 +363,12 @@ def _followed(state: State) -> None:
         else:
             text = "Run shows the errors beside no compensation, and the commands, here."
             mark(ui.label(text).classes("muted"), "nothing-yet")
+
+
+def _doubt(state: State) -> str:
+    """Return why no model of these channels is recommended; empty where one is."""
+    sides = modelling.sides_of(state.workspace, state.inputs, state.outputs, state.load)
+    return modelling.against(modelling.comparable(state.workspace, sides))
 
 
 def _title(one: Mapping[str, Any]) -> str:
@@ -463,7 +471,7 @@ def _acts(state: State, name: str) -> None:
         path.unlink(missing_ok=True)
         state.changed()
 
-    with ui.element("div").classes("acts"):
+    with ui.element("div").classes("acts").on("click.stop", js_handler="() => {}"):
         widgets.icon_button("download", f"Download {name}", partial(widgets.download, path))
         widgets.icon_button("delete_outline", f"Delete {name}", away)
 

@@ -11,7 +11,7 @@ import numpy as np
 from nicegui import events, ui
 
 from mckibben import example, registry
-from mckibben.app import widgets
+from mckibben.app import together, widgets
 from mckibben.app.pages import importing
 from mckibben.app.state import State, view
 from mckibben.app.steps import Reading, Step
@@ -209,8 +209,8 @@ async def _correct(state: State, entry: Entry) -> None:
         state.changed()
 
     path = workspace.path("uploads", entry.upload) if entry.upload else workspace.raw_path(entry)
-    text = f"The {len(alike)} others like it, too" if alike else ""
-    await importing.ask(path, entry.way, take, others=text, verb="Read it so")
+    text = f"Also read {', '.join(alike[:3])}{' …' * (len(alike) > 3)} so" if alike else ""
+    await importing.ask(path, entry.way, take, others=text, verb="Read again", ticked=False)
 
 
 # -- the list ---------------------------------------------------------------------------------------
@@ -285,12 +285,25 @@ def _sides(state: State) -> None:
     with widgets.card("What drives, what moves"):
         if not known:
             widgets.error_box(
-                "The recordings in use have no channel in common. Set one of them to unused, or "
-                "correct how it is read"
+                "The recordings in use have no channel in common. Join those of one run, set one of "
+                "them to unused, or correct how it is read"
             )
+            if several := together.pairs(state.workspace):
+                text = f"Join {' and '.join(several[0])}" + " …" * (len(several) > 1)
+                join = partial(together.join, state.workspace)
+                mark(widgets.button(text, partial(_changed, state, join), "merge"), "join")
             return
+        if times := together.sample_times(state.workspace):
+            slow = f"{times[1]:.4g}"
+            with widgets.row():
+                ui.label(f"Sample times differ, from {times[0]:.4g} to {slow} s.").classes("muted")
+                alike = partial(together.resample, state.workspace, times[1])
+                button = widgets.button(f"Resample to {slow} s", partial(_changed, state, alike))
+                mark(button, "one-rate")
+        if state.outputs == ["force"] and "pressure" in known and "pressure" not in state.inputs:
+            ui.label("Models of a force are given the pressure, too.").classes("muted")
         rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
-        loads = {"": "None, or as found", **{name: name for name in rest}}
+        loads = {"": "By name, or none", **{name: name for name in rest}}
         for side, options in (("inputs", known), ("outputs", known), ("load", loads)):
             value = getattr(state, side)
             if side == "load":

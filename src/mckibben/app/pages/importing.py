@@ -165,6 +165,7 @@ async def ask(
     *,
     others: str,
     verb: str = "Import",
+    ticked: bool = True,
 ) -> None:
     """Ask how a file is to be read, and call ``take`` with that once it can be.
 
@@ -180,6 +181,8 @@ async def ask(
         Which others, for a check box; empty for none.
     verb : str
         On the button.
+    ticked : bool
+        Whether the others are read so unless somebody says no.
     """
     form, one = Form(path, reading), asyncio.Lock()
     await asyncio.to_thread(form.look)
@@ -222,7 +225,8 @@ async def ask(
             bound(ui.number("Samples per second").props("clearable"), "rate")
             bound(ui.number("Rest length [mm]").props("clearable"), "rest_length")
             bound(ui.select(GAPS, label="Gaps"), "gaps")
-            bound(ui.input("Held, in no column", placeholder="force = 200 g"), "held")
+            held = ui.input("Held, such as force = 200 g")
+            bound(held.tooltip("A channel that stood still and has no column"), "held")
             bound(ui.checkbox("Codes and counters as measured"), "raw")
         if lines := form.lines():
             with widgets.details("Lines, header and encoding of the text"):
@@ -240,7 +244,7 @@ async def ask(
         with widgets.row(classes="spread"):
             widgets.button("As found", as_found)
             ui.space()
-            all_so = mark(ui.checkbox(others, value=bool(others)), "others")
+            all_so = mark(ui.checkbox(others, value=bool(others) and ticked), "others")
             all_so.set_visibility(bool(others))
             button = mark(widgets.primary(verb, finish), "import")
             button.set_enabled(form.error is None)

@@ -47,8 +47,9 @@ def build(state: State) -> None:
             widgets.heading(
                 "Look", "What the muscle does, and what the recordings do not show yet."
             )
-            choose = partial(ui.navigate.to, "/models")
-            mark(widgets.primary("Choose models", choose, "leaderboard"), "choose-models")
+            if state.workspace.names("recordings"):
+                choose = partial(ui.navigate.to, "/models")
+                mark(widgets.primary("Choose models", choose, "leaderboard"), "choose-models")
         content(state)
 
 
@@ -102,7 +103,7 @@ def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> N
         mark(found.props("dense"), f"show-{name}")
 
     def chip(role: str) -> None:
-        ui.label(role).classes(f"chip {role}")
+        ui.label(role.capitalize()).classes(f"chip {role}")
 
     rows = [
         [

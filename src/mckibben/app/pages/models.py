@@ -30,7 +30,7 @@ from mckibben.report import interactive, results, subjects
 from mckibben.report.builder import Figure, Table
 from mckibben.report.columns import Column, columns_of
 from mckibben.report.drawing import POINTS, over_time
-from mckibben.report.words import CAREFUL
+from mckibben.report.words import CAREFUL, CHOICES
 
 TITLE = "Models"
 ICON = "leaderboard"
@@ -62,7 +62,7 @@ def build(state: State) -> None:
     with mark(ui.element("div").classes("page"), "page-models"):
         with widgets.row(classes="spread"):
             widgets.heading(
-                "Models", "Fitted to recordings for training, tested on others, running free."
+                "Models", "Fitted to the recordings for training, tested on others in simulation."
             )
             fit = widgets.primary("Fit models", partial(choosing.choose, state), "add")
             mark(fit, "fit-models")
@@ -226,13 +226,15 @@ def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
     first = rows[0]
     if first["current"] and (mean := first.get("constant")):
         errors = [f"{one.heading} {typeset(one.text(mean))} {one.unit}" for one in shown]
-        text = f"To be beaten: the mean of the output, {', '.join(errors)}."
+        text = f"The mean of the output, to compare with: {', '.join(errors)}."
         ui.label(text).classes("muted")
     if why := modelling.against(rows):
         with mark(ui.element("div").classes("error"), "not-recommended"):
             ui.icon("info_outline")
             ui.label(typeset_within(said(why)))
-    notes = [f"{first['split'][:1].upper()}{first['split'][1:]}."]
+    by = CHOICES[first["chosen_by"]]
+    notes = [f"Ordered by {by[0]} ({by[1]}), as the test is to judge, not to choose."]
+    notes += [f"{first['split'][:1].upper()}{first['split'][1:]}."]
     notes += dict.fromkeys(why for row in rows for why in row.get("shared", ()))
     notes += [f"* {CAREFUL}."] * any(caution(row["model"]) for row in rows)
     notes += [OTHER_DATA] * (not all(row["current"] for row in rows))

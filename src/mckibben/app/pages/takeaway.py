@@ -62,7 +62,7 @@ def page(state: State) -> None:
 
 def _use(state: State) -> str:
     """Let a model be chosen, and what it is used as; return that."""
-    uses = following.uses(state.workspace, state.model)
+    uses = following.uses(state.workspace, state.model) or {"model": "Damaged"}
     if state.chosen.get("takeaway.use") not in uses:
         usual = str(state.chosen.get("compensate.form", "inverse"))
         state.chosen["takeaway.use"] = usual if usual in uses else next(reversed(uses))

@@ -19,6 +19,7 @@ from mckibben.numerals import number
 from mckibben.options import InvertOptions, TrackOptions
 from mckibben.recording import Recording
 from mckibben.report import interactive
+from mckibben.report.columns import RAN_AWAY
 from mckibben.report.drawing import axis_label, series_colour
 
 TITLE = "Compensate"
@@ -436,7 +437,7 @@ def _due(one: Recording) -> Any:
 
 def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) -> None:
     """Show the errors of all runs of the model; one that is chosen brings its motion back."""
-    names, rows = [*runs], []
+    names, rows, lost = [*runs], [], False
     for name, one in runs.items():
         plain = one.get("uncompensated") or {}
         errors = one.get("rmse"), plain.get("rmse", plain), one.get("largest")
@@ -447,6 +448,8 @@ def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) ->
             for of in errors
         ]
         motion = one["reference"].removesuffix(".csv")
+        if _ran_away(state, one):
+            texts, lost = ["ran away", texts[1], "–"], True
         limited = str(one.get("clipped", "–"))
         rows.append([_title(one), motion, *texts, limited, partial(_acts, state, name)])
 
@@ -461,6 +464,20 @@ def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) ->
     columns = ["Run", "Motion", "RMSE", "No compensation", "Largest", "Steps at a limit", ""]
     at = names.index(chosen) if chosen else None
     mark(widgets.table(columns, rows, chosen=at, on_choose=choose), "runs")
+    if lost:
+        ui.label(
+            "Ran away: a plant that is a model is right near the motions that it was fitted to. Try it "
+            "on another one, or with a smaller motion."
+        ).classes("muted")
+
+
+def _ran_away(state: State, one: Mapping[str, Any]) -> bool:
+    """Return whether a run is farther off than its reference is wide, many times."""
+    with suppress(MckibbenError):
+        wanted = following.read_run(state.workspace, one["reference"])
+        errors = (one.get("rmse") or {}).items()
+        return any(rmse > RAN_AWAY * max(float(np.std(wanted[key])), 1e-9) for key, rmse in errors)
+    return False
 
 
 def _acts(state: State, name: str) -> None:

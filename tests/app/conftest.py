@@ -25,3 +25,4 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):
             item.add_marker(needs("chromium"))
+            item.add_marker(pytest.mark.long)

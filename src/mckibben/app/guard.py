@@ -144,7 +144,7 @@ class Links:
     Parameters
     ----------
     address : str
-        Such as ``http://127.0.0.1:8750``.
+        Scheme, host and port.
     announce : callable
         Called with a link whenever the one before was used, and with the first.
     """

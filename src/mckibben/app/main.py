@@ -31,6 +31,8 @@ from mckibben.system.atomic import write_text
 PAGES = ("data", "look", "models", "compensate", "takeaway")
 """Modules of `mckibben.app.pages`, in the order of tabs; those that do not exist have none."""
 
+HOST = "127.0.0.1"
+
 TICK = 0.3
 """How often jobs are asked how far they are [s]."""
 
@@ -72,7 +74,7 @@ def serve(
     workspace = Workspace(folder)
     workspace.claim()
     port = _free(port)
-    links = Links(f"http://127.0.0.1:{port}", lambda link: announce(f"Another browser: {link}"))
+    links = Links(f"http://{HOST}:{port}", lambda link: announce(f"Another browser: {link}"))
     state = State(workspace, Jobs(workspace))
     app.add_middleware(Guard, port=port, links=links)
     app.on_shutdown(state.jobs.close)
@@ -89,7 +91,7 @@ def serve(
     def ready() -> None:
         """Say where it is once it listens, and load what the first job needs."""
         for _ in range(200):
-            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+            with contextlib.suppress(OSError), socket.create_connection((HOST, port)):
                 break
             time.sleep(0.05)
         announce(f"Workbench over {workspace.folder}: {links.link} (Ctrl-C ends it)")
@@ -102,7 +104,7 @@ def serve(
             if show:
                 _open(door, links.link)
             ui.run(
-                host="127.0.0.1",
+                host=HOST,
                 port=port,
                 title="mckibben",
                 show=False,
@@ -207,7 +209,7 @@ def _free(port: int) -> int:
     try:
         with socket.socket() as trial:
             trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            trial.bind(("127.0.0.1", port))
+            trial.bind((HOST, port))
             return int(trial.getsockname()[1])
     except (OSError, OverflowError) as error:
         problem = f"port {port} cannot be listened on ({error})"

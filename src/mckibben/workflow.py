@@ -430,6 +430,8 @@ def _inverse(
     if chosen.predictive:
         return Inverse(Predictive(block.inverse(), **chosen.of_predictive()), "predictive")
     if chosen.wanted == "force":
+        if all(channel.name.startswith("force") for channel in block.outputs):
+            return Inverse(block, "itself")
         return Inverse(load_of(block), "force")
     if not chosen.adaptive:
         if (feedforward := ForceFeedforward.of(block)) is not None:

@@ -6,6 +6,7 @@ reviews of logs gave is in ``runs`` and ``reviews``: numbers as JSON, samples as
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
@@ -61,6 +62,9 @@ SETTINGS = {
 STEP = 0.02
 """Time between steps, where neither a model nor a recording has one [s]."""
 
+LEAST = 40
+"""Steps that a motion has by default, or more."""
+
 MOST_SAMPLES = 1_000_000
 """Of a reference."""
 
@@ -80,8 +84,6 @@ def made(workspace: Workspace, name: str, use: str, settings: Mapping[str, Any])
         return workspace.model(name, "models" if use == "model" else "banded")
     block, given = workspace.model(name), dict(settings)
     if use == "force":
-        if all(channel.name.startswith("force") for channel in block.outputs):
-            return block
         given = {"wanted": "force"}
     elif drives(block.outputs[0]) or (block.undoing and not drives(block.inputs[0])):
         raise ModelError("it is a compensator already", remedy="choose the model that it undoes")
@@ -197,14 +199,22 @@ def wish(workspace: Workspace, name: str) -> Json:
     step, cycle = pace(workspace, name)
     channels, held = asked_for(workspace, name)
     middles = {key: float(f"{np.median(recorded(workspace, key)):.4g}") for key in held}
-    found: Json = {"seconds": float(f"{2 * cycle:.2g}"), "cycles": 2, "step": step, "stored": ""}
+    found: Json = {
+        "seconds": float(f"{max(2 * cycle, LEAST * step):.2g}"),
+        "cycles": 2,
+        "step": step,
+        "stored": "",
+    }
     found |= {"held": middles, "now": next(iter(channels)), "channels": {}}
     for channel, (low, high) in reach(workspace, name).items():
         rest, margin = recorded(workspace, channel)[0], 0.1 * (high - low)
+        digits = 2 - math.floor(math.log10(high - low))
         low, high = low + margin, high - margin
         first = float(np.clip(rest, low, high))
         ends = first, high if high - first >= first - low else low
-        own = dict(zip(("first", "other"), (float(f"{end:.3g}") for end in ends), strict=True))
+        own = dict(
+            zip(("first", "other"), (round(float(end), digits) for end in ends), strict=True)
+        )
         kind = "sine" if channel == found["now"] else "hold"
         found["channels"][channel] = {"kind": kind, **own, "points": []}
     shape(found)

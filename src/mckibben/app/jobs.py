@@ -143,7 +143,9 @@ class Jobs:
         """Hear what jobs report, and start what can be started; return whether any began or ended."""
         ended = [self._hear(job) for job in self.active() if job.state == RUNNING]
         free = self.at_once - sum(job.state == RUNNING for job in self.active())
-        begun = [job for job in self.active() if job.state == WAITING][: max(free, 0)]
+        waiting = [job for job in self.active() if job.state == WAITING]
+        waiting.sort(key=lambda job: job.kind == "fit")  # what else there is takes seconds
+        begun = waiting[: max(free, 0)]
         for job in begun:
             self._start(job)
         return any(ended) or bool(begun)

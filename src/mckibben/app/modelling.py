@@ -42,8 +42,8 @@ def sides_of(
     workspace: Workspace, inputs: Sequence[str], outputs: Sequence[str], load: str = ""
 ) -> Channels:
     """Return what is modelled: a load is the one named, else what schedules by its name."""
-    if load:
-        return Channels(tuple(inputs), tuple(outputs), (load,))
+    if load or not (inputs and outputs):
+        return Channels(tuple(inputs), tuple(outputs), (load,) if load else None)
     recordings = workspace.with_role("train") or list(workspace.used().values())
     found = loads_told(recordings, Channels(tuple(inputs), tuple(outputs)))
     return dead_loads_told(recordings, found)
@@ -115,6 +115,10 @@ def offered(workspace: Workspace, sides: Channels) -> Offered:
     DataError
         Where nothing can be fitted to the recordings as they are.
     """
+    if not (sides.inputs and sides.outputs):
+        problem = "the recordings in use have no input and output in common"
+        remedy = "correct how they are read, or set some to Unused, under Data"
+        raise DataError(problem, remedy=remedy)
     train, test = workspace.train_and_test()
     if not train:
         raise DataError("there is no recording to train on", remedy="give one the role Train")

@@ -11,10 +11,10 @@ from typing import Any
 from nicegui import binding, ui
 
 from mckibben.app.jobs import Jobs
-from mckibben.app.widgets import error_box
+from mckibben.app.widgets import shielded
 from mckibben.app.workspace import Workspace
 from mckibben.comparison.channels import channels_of
-from mckibben.errors import DataError, MckibbenError
+from mckibben.errors import DataError
 
 _VIEWS: list[Any] = []
 
@@ -35,10 +35,7 @@ def view(build: Callable[..., None]) -> Any:
             ui.spinner()
             ui.timer(0.1, lambda: made.refresh() if state.ready.is_set() else None)
             return
-        try:
-            build(state)
-        except MckibbenError as error:
-            error_box(error)
+        shielded(build)(state)
 
     made = ui.refreshable(built)
     _VIEWS.append(made)

@@ -172,6 +172,19 @@ def guarded(action: Callable[..., Any]) -> Callable[..., Awaitable[None]]:
     return act
 
 
+def shielded(build: Callable[..., None]) -> Callable[..., None]:
+    """Let a part of a page show its error in its place, such as that of a damaged model."""
+
+    @wraps(build)
+    def built(*given: Any) -> None:
+        try:
+            build(*given)
+        except MckibbenError as error:
+            error_box(error)
+
+    return built
+
+
 def primary(text: str, action: Callable[..., Any], icon: str = "") -> Any:
     """Make the primary button of a page, of which there is one."""
     act = guarded(action)

@@ -64,6 +64,7 @@ def _prepare(state: State) -> None:
 
 
 @ui.refreshable
+@widgets.shielded
 def page(state: State) -> None:
     """Show the tab that is chosen; fields in it outlive what happens to jobs."""
     able = following.having(state.workspace, "inverse")
@@ -472,11 +473,12 @@ def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) ->
 
 
 def _ran_away(state: State, one: Mapping[str, Any]) -> bool:
-    """Return whether a run is farther off than its reference is wide, many times."""
+    """Return whether a run is farther off than its reference moves, many times."""
     with suppress(MckibbenError):
         wanted = following.read_run(state.workspace, one["reference"])
         errors = (one.get("rmse") or {}).items()
-        return any(rmse > RAN_AWAY * max(float(np.std(wanted[key])), 1e-9) for key, rmse in errors)
+        wide = max(float(np.std(values)) for values in wanted.channels.values())
+        return any(rmse > RAN_AWAY * wide for _, rmse in errors)
     return False
 
 

@@ -41,6 +41,7 @@ def watch(state: State) -> None:
 
 
 @ui.refreshable
+@widgets.shielded
 def page(state: State) -> None:
     """Show the list."""
     models, use = state.workspace.models(), ""

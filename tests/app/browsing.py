@@ -21,6 +21,10 @@ SLOW = 60_000
 START = "from mckibben.app.main import serve; import sys; serve(sys.argv[1], port=0, show=False)"
 
 
+NARROW: dict[str, Any] = {"viewport": {"width": 400, "height": 850}, "color_scheme": "dark"}
+"""Of a window on a telephone, at night."""
+
+
 @contextmanager
 def workbench(folder: Path, before: str = "") -> Iterator[Workbench]:
     """Start a workbench over a folder on a free port, after some Python, and end it."""

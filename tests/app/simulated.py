@@ -1,17 +1,36 @@
-"""Files as a rig writes them, of virtual muscles."""
+"""Files as a rig writes them, of virtual muscles, and folders with the example."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from mckibben import Recording
+from mckibben import Recording, example, workflow
+from mckibben.app.workspace import Role, Workspace
 from mckibben.arrays import Array
 from mckibben.rigs import load_rig
 
 STEP = 0.05
 """Time between rows [s]."""
+
+
+def with_example(folder: Path, *models: str) -> Workspace:
+    """Return a workspace with one recording to train on and one to test on, and models of it."""
+    workspace = Workspace(folder)
+    roles: dict[Role, Any] = {"train": example.TRAIN, "test": example.TEST}
+    for role, source in roles.items():
+        file = Path(str(source))
+        with workspace.receiving(file.name, file.stat().st_size) as (part, path):
+            part.write_bytes(file.read_bytes())
+        workspace.add(path.name, role=role)
+    for model in models:
+        found = workflow.fit(model, workspace.with_role("train"))
+        row = {"status": "ok", "model": model, "data": workspace.digest(), "settings": {}}
+        workspace.save_model(model, found.model, row)
+    return workspace
 
 
 def wave(seconds: float, seed: int, low: float, high: float) -> Array:

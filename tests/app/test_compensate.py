@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import PI, example, workflow
+from mckibben import PI, workflow
 from mckibben.app import following
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
@@ -17,6 +17,7 @@ from mckibben.files import write
 from mckibben.options import InvertOptions, TrackOptions
 from mckibben.recording import Recording
 from tests.app.browsing import SLOW, Workbench, seen, visited, workbench
+from tests.app.simulated import with_example
 
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
 
@@ -28,22 +29,7 @@ def silent(*_: Any) -> None:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the example and two models of it, made without a browser."""
-    workspace = Workspace(tmp_path_factory.mktemp("bench"))
-    for source, role in ((example.TRAIN, "train"), (example.TEST, "test")):
-        file = Path(str(source))
-        with workspace.receiving(file.name, file.stat().st_size) as (part, path):
-            part.write_bytes(file.read_bytes())
-        workspace.add(path.name, role=role)  # type: ignore[arg-type]
-    for model in ("pi", "p2z"):
-        found = workflow.fit(model, workspace.with_role("train"))
-        row: dict[str, Any] = {
-            "status": "ok",
-            "model": model,
-            "data": workspace.digest(),
-            "settings": {},
-        }
-        workspace.save_model(model, found.model, row)
-    return workspace.folder
+    return with_example(tmp_path_factory.mktemp("bench"), "pi", "p2z").folder
 
 
 @pytest.fixture

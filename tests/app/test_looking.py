@@ -10,7 +10,7 @@ import pytest
 
 import mckibben
 from mckibben.app.workspace import Workspace
-from tests.app.browsing import SLOW, seen, visited, workbench
+from tests.app.browsing import NARROW, SLOW, seen, visited, workbench
 
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
 
@@ -67,11 +67,10 @@ def test_several_muscles_are_looked_at_and_a_next_recording_is_planned(
 def test_an_empty_folder_says_what_to_do_and_a_narrow_page_fits(
     browser: Any, tmp_path: Path
 ) -> None:
-    narrow: dict[str, Any] = {"viewport": {"width": 400, "height": 850}, "color_scheme": "dark"}
     with (
         workbench(tmp_path / "bench") as bench,
         visited(browser, bench) as page,
-        visited(browser, bench, **narrow) as other,
+        visited(browser, bench, **NARROW) as other,
     ):
         for one in (page, other):
             one.get_by_test_id("tab-look").click()

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from mckibben import example
 from mckibben.app import modelling
 from mckibben.app.modelling import comparable, offered, sides_of
 from mckibben.app.workspace import Workspace
 from mckibben.blocks.bands import Banded
 from mckibben.errors import DataError
-from tests.app.browsing import SLOW, seen, visited, workbench
+from tests.app.browsing import NARROW, SLOW, seen, visited, workbench
+from tests.app.simulated import with_example
 
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.errors.MckibbenWarning")
 
@@ -27,13 +27,7 @@ def silent(*_: Any) -> None:
 @pytest.fixture
 def workspace(tmp_path: Path) -> Workspace:
     """Return a folder with the example: one recording to train on, one to test on."""
-    found = Workspace(tmp_path / "bench")
-    for source, role in ((example.TRAIN, "train"), (example.TEST, "test")):
-        file = Path(str(source))
-        with found.receiving(file.name, file.stat().st_size) as (part, path):
-            part.write_bytes(file.read_bytes())
-        found.add(path.name, role=role)  # type: ignore[arg-type]
-    return found
+    return with_example(tmp_path / "bench")
 
 
 def test_offers_follow_the_recordings(workspace: Workspace) -> None:
@@ -98,11 +92,10 @@ def test_a_model_no_better_than_the_mean_is_not_recommended() -> None:
 def test_models_are_chosen_fitted_and_seen_closer_in_two_windows(
     browser: Any, workspace: Workspace, tmp_path: Path
 ) -> None:
-    narrow: dict[str, Any] = {"viewport": {"width": 400, "height": 850}, "color_scheme": "dark"}
     with (
         workbench(tmp_path / "bench") as bench,
         visited(browser, bench) as page,
-        visited(browser, bench, **narrow) as other,
+        visited(browser, bench, **NARROW) as other,
     ):
         for one in (page, other):
             seen(one, "over-time")

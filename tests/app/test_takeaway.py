@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 import mckibben
-from mckibben import example, workflow
 from mckibben.app import taking
 from mckibben.app.workspace import Workspace
 from tests.app.browsing import Workbench, seen, visited, workbench
+from tests.app.simulated import with_example
 
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
 
@@ -31,16 +31,7 @@ def silent(*_: Any) -> None:
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """The example, and a model of it."""
-    workspace = Workspace(tmp_path_factory.mktemp("bench"))
-    for source, role in ((example.TRAIN, "train"), (example.TEST, "test")):
-        file = Path(str(source))
-        with workspace.receiving(file.name, file.stat().st_size) as (part, path):
-            part.write_bytes(file.read_bytes())
-        workspace.add(path.name, role=role)  # type: ignore[arg-type]
-    found = workflow.fit("pi", workspace.with_role("train"))
-    row = {"status": "ok", "model": "pi", "data": workspace.digest(), "settings": {}}
-    workspace.save_model("pi", found.model, row)
-    return workspace
+    return with_example(tmp_path_factory.mktemp("bench"), "pi")
 
 
 def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:

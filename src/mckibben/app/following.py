@@ -112,9 +112,8 @@ def uses(workspace: Workspace, name: str) -> dict[str, str]:
             return bool(made(workspace, name, use, {}))
         return False
 
-    known = of_model(
-        workspace, name, "uses", lambda: [*filter(able, [u for u in USES if u != "banded"])]
-    )
+    tried = [use for use in USES if use not in ("model", "banded")]
+    known = ["model", *of_model(workspace, name, "uses", lambda: [*filter(able, tried)])]
     if workspace.path("banded", f"{name}.json").is_file():
         known = [*known, "banded"]
     return {use: words for use, words in USES.items() if use in known}

@@ -185,10 +185,9 @@ def fit(
     olds = {name: workspace.read("results", name) or {} for name in workspace.names("results")}
     same = (n for n, old in olds.items() if all(old.get(key) == about[key] for key in about))
     name = next(same, None) or workspace.new_name("models", model)
-    told = {
-        key: board.to_dict()[key]
-        for key in ("unit", "split", "chosen_by", "not_recommended", "shared")
-    }
+    whole = board.to_dict()
+    copied = ("unit", "split", "chosen_by", "not_recommended", "shared")
+    told = {key: whole[key] for key in copied}
     told["constant"] = None if board.constant is None else board.constant.to_dict()
     told["notes"] = [*board.notes, *row.diagnostics.get("notes", ())]
     workspace.save_model(name, row.block, row.to_dict() | about | told | {"data": data}, row.banded)

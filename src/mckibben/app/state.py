@@ -11,9 +11,10 @@ from typing import Any
 from nicegui import binding, ui
 
 from mckibben.app.jobs import Jobs
+from mckibben.app.modelling import sides_of
 from mckibben.app.widgets import shielded
 from mckibben.app.workspace import Workspace
-from mckibben.comparison.channels import channels_of
+from mckibben.comparison.channels import Channels, channels_of
 from mckibben.errors import DataError
 
 _VIEWS: list[Any] = []
@@ -112,6 +113,11 @@ class State:
                 except DataError:
                     return
                 self.inputs, self.outputs = list(sides.inputs), list(sides.outputs)
+
+    @property
+    def sides(self) -> Channels:
+        """What is modelled."""
+        return sides_of(self.workspace, self.inputs, self.outputs, self.load)
 
     def changed(self) -> None:
         """Build every `view` again, in all windows; call it after the folder or a choice has changed."""

@@ -5,8 +5,7 @@
 ``recordings/N.json``   a recording: raw file, how it is read, role, and the list of steps
 ``models/N.json``       a model; ``banded/N.json`` is the same with its band
 ``results/N.json``      what came of its fit
-``runs``, ``reviews``,  closed loops, reviews of logs, estimates of force
-``forces``
+``runs``, ``reviews``   closed loops, and reviews of logs
 ``jobs/N.json``         a job and how it went; ``takeaway/`` has what jobs write for the user
 ``history/``            recordings that were removed
 ======================= =======================================================================
@@ -53,7 +52,7 @@ Role = Literal["train", "test", "unused"]
 
 KINDS = (
     *("uploads", "recordings", "history", "models", "banded", "results", "jobs", "runs"),
-    *("takeaway", "reviews", "forces"),
+    *("takeaway", "reviews"),
 )
 
 NAME = re.compile(r"[^\W_][\w.-]{0,79}")

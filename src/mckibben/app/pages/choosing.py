@@ -31,7 +31,7 @@ OWN_CHOICE = "its own choice"
 
 async def choose(state: State) -> None:
     """Open the drawer."""
-    sides = modelling.sides_of(state.workspace, state.inputs, state.outputs, state.load)
+    sides = state.sides
     with (
         ui.dialog(value=True).props("position=right full-height") as drawer,
         ui.element("div").classes("card drawer") as place,

@@ -19,7 +19,6 @@ from mckibben.numerals import number
 from mckibben.options import InvertOptions, TrackOptions
 from mckibben.recording import Recording
 from mckibben.report import interactive
-from mckibben.report.columns import RAN_AWAY
 from mckibben.report.drawing import axis_label, series_colour
 
 TITLE = "Compensate"
@@ -369,8 +368,7 @@ def _followed(state: State) -> None:
 
 def _doubt(state: State) -> str:
     """Return why no model of these channels is recommended; empty where one is."""
-    sides = modelling.sides_of(state.workspace, state.inputs, state.outputs, state.load)
-    return modelling.against(modelling.comparable(state.workspace, sides))
+    return modelling.against(modelling.comparable(state.workspace, state.sides))
 
 
 def _title(one: Mapping[str, Any]) -> str:
@@ -438,7 +436,7 @@ def _due(one: Recording) -> Any:
 
 def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) -> None:
     """Show the errors of all runs of the model; one that is chosen brings its motion back."""
-    names, rows, lost = [*runs], [], False
+    names, rows = [*runs], []
     for name, one in runs.items():
         plain = one.get("uncompensated") or {}
         errors = one.get("rmse"), plain.get("rmse", plain), one.get("largest")
@@ -449,8 +447,6 @@ def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) ->
             for of in errors
         ]
         motion = one["reference"].removesuffix(".csv")
-        if _ran_away(state, one):
-            texts, lost = ["ran away", texts[1], "–"], True
         limited = str(one.get("clipped", "–"))
         rows.append([_title(one), motion, *texts, limited, partial(_acts, state, name)])
 
@@ -465,21 +461,6 @@ def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) ->
     columns = ["Run", "Motion", "RMSE", "No compensation", "Largest", "Steps at a limit", ""]
     at = names.index(chosen) if chosen else None
     mark(widgets.table(columns, rows, chosen=at, on_choose=choose), "runs")
-    if lost:
-        ui.label(
-            "Ran away: a plant that is a model is right near the motions that it was fitted to. Try it "
-            "on another one, or with a smaller motion."
-        ).classes("muted")
-
-
-def _ran_away(state: State, one: Mapping[str, Any]) -> bool:
-    """Return whether a run is farther off than its reference moves, many times."""
-    with suppress(MckibbenError):
-        wanted = following.read_run(state.workspace, one["reference"])
-        errors = (one.get("rmse") or {}).items()
-        wide = max(float(np.std(values)) for values in wanted.channels.values())
-        return any(rmse > RAN_AWAY * wide for _, rmse in errors)
-    return False
 
 
 def _acts(state: State, name: str) -> None:

@@ -10,7 +10,7 @@ from nicegui import ui
 
 from mckibben.app import forms, widgets
 from mckibben.app.later import later
-from mckibben.app.modelling import last_plan, plan, restored, sides_of
+from mckibben.app.modelling import last_plan, plan, restored
 from mckibben.app.state import State, view
 from mckibben.app.terms import said
 from mckibben.app.widgets import mark
@@ -66,7 +66,7 @@ def content(state: State) -> None:
             ui.link("Add recordings →", "/")
         return
     sides, runs = (
-        sides_of(state.workspace, state.inputs, state.outputs, state.load),
+        state.sides,
         [*used.values()],
     )
     pairs = coupling(runs, sides.inputs, sides.outputs).pairs(runs)

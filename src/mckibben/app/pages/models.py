@@ -77,7 +77,7 @@ def build(state: State) -> None:
 
 def _compared(state: State) -> tuple[Channels, list[Json]]:
     """Return what is modelled, and what came of its models; the first is chosen until one is picked."""
-    sides = modelling.sides_of(state.workspace, state.inputs, state.outputs, state.load)
+    sides = state.sides
     rows = modelling.comparable(state.workspace, sides)
     if rows and not (state.chosen.get("models.picked") and state.model in state.workspace.models()):
         state.model = rows[0]["name"]

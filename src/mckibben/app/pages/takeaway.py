@@ -63,7 +63,7 @@ def page(state: State) -> None:
 
 def _use(state: State) -> str:
     """Let a model be chosen, and what it is used as; return that."""
-    uses = following.uses(state.workspace, state.model) or {"model": "Damaged"}
+    uses = following.uses(state.workspace, state.model)
     if state.chosen.get("takeaway.use") not in uses:
         usual = str(state.chosen.get("compensate.form", "inverse"))
         state.chosen["takeaway.use"] = usual if usual in uses else next(reversed(uses))

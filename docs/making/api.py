@@ -16,7 +16,7 @@ SOURCE = Path(mckibben.__file__).parent
 PARTS = (
     *("recording", "signals", "metrics", "diagnosis", "files", "rigs", "environments"),
     *("blocks", "estimators", "control", "comparison", "planning", "validation", "muscles"),
-    *("papers", "report", "studying", "export", "stream", "link", "simulators", "ros"),
+    *("papers", "report", "studying", "export", "stream", "link", "ros"),
     *("diagnosis", "measured", "example", "errors"),
 )
 """Of the package, in the order of its layers."""

@@ -298,6 +298,12 @@ class FitOptions:
         Path | None,
         Option("Saved model (JSON) that is subtracted first; the sum of both is saved.", "MODEL"),
     ] = None
+    target: Annotated[
+        Literal["mjcf"] | None,
+        Option(
+            "Fit what a format can carry, and compare the error without its limits.", flag="--for"
+        ),
+    ] = None
     settings: Settings = field(default_factory=dict)
     validation: Annotated[
         tuple[Path, ...], Option("Recording that stops a search; repeatable.", "FILE")
@@ -518,6 +524,31 @@ class COptions(ExportOptions):
         float | None,
         Option("Of link: silence after which outputs are safe [s]. Default: 0.5.", "S"),
     ] = None
+
+
+@dataclass(frozen=True)
+class MJCFOptions:
+    """Options of `export` to MJCF."""
+
+    rest_length: Annotated[
+        float | None, Option("Distance of the sites where the displacement is 0.", "MM")
+    ] = None
+    sheet: Annotated[
+        str | None,
+        Option("Muscle of the library or data sheet (.toml) with the rest length.", "NAME|FILE"),
+    ] = None
+    site_from: Annotated[
+        str | None,
+        Option("Site of your model from which the muscle pulls; with --site-to.", "SITE"),
+    ] = None
+    site_to: Annotated[str | None, Option("Site that it pulls.", "SITE")] = None
+    example: Annotated[
+        Literal["hanging", "joint", "arm"],
+        Option("Without sites: a load on a muscle, a joint between two, or a plate on three."),
+    ] = "hanging"
+    lag: Annotated[float, Option("Time constant from command to pressure.", "SECONDS")] = 0.0
+    name: Annotated[str | None, Option("Name of the actuator. Default: muscle.", "NAME")] = None
+    force: Annotated[bool, Option("Replace files of yours, too; never what is read.")] = False
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ from mckibben.options import (
     FitOptions,
     FMUOptions,
     InvertOptions,
+    MJCFOptions,
     Options,
     PlanOptions,
     ReadOptions,
@@ -52,7 +53,7 @@ from mckibben.reading import (
     read_sides,
 )
 from mckibben.recording import Recording
-from mckibben.studying.results import Exported, Fit, Inverse, Tracking
+from mckibben.studying.results import Exported, Fit, Inverse, Price, Tracking
 from mckibben.system.progress import Tell, telling
 
 if TYPE_CHECKING:
@@ -91,11 +92,15 @@ def fit(
         if names := getattr(chosen, side):
             settings.setdefault(side, names[0] if len(names) == 1 else tuple(names))
     kind = registry.load("estimators", model)
+    if chosen.target is not None and chosen.target not in kind.targets:
+        problem = f"{model!r} cannot be fitted for {chosen.target}"
+        raise ModelError(problem, parameter="target", remedy="fit 'balance', or leave it out")
     if chosen.prior is not None:
         if "prior" not in kind.__dataclass_fields__:
             raise ModelError(f"{model!r} has none", parameter="prior", remedy="leave it out")
         settings["prior"] = chosen.prior
-    estimator = kind(**{"seed": chosen.seed} | settings)
+    settings = {"seed": chosen.seed} | settings
+    estimator = kind(**{**kind.targets.get(chosen.target, {}), **settings})
     if chosen.validation and not estimator.stops_early:
         problem = f"{model!r} does not stop early"
         raise DataError(problem, parameter="validation", remedy="leave it out")
@@ -114,6 +119,15 @@ def fit(
     check_shared({"fit": runs}, *([one.name for one in of] for of in (used.inputs, used.outputs)))
     with telling(progress, f"fitting {model}") as tell:
         estimator.fit(runs, validation=checks, progress=tell)
+    price = None
+    if chosen.target is not None:
+        from mckibben.export.mjcf import carried
+
+        carried(estimator.model_)
+        free = kind(**{"of_force": True} | settings)
+        with telling(progress, f"fitting {model} without the limits of {chosen.target}") as tell:
+            free.fit(runs, progress=tell)
+        price = Price(*(_force_error(one.model_, runs) for one in (estimator, free)))
     found: Block = estimator.model_ if base is None else Parallel((base, estimator.model_))
     if file is not None:
         found.save(file)
@@ -123,7 +137,20 @@ def fit(
         notes.append(
             "voltage was recorded too; for a model of the valve's command: `input=voltage`"
         )
-    return Fit(model, found, estimator, tuple(notes), file)
+    return Fit(model, found, estimator, tuple(notes), file, price)
+
+
+def _force_error(model: Block, runs: Sequence[Recording]) -> float:
+    """Return the RMSE of the force by displacement and pressure, from rest [N]."""
+    from mckibben.blocks.coupled.load_estimate import load_of
+
+    block = load_of(model)
+    names, (force,) = [one.name for one in block.inputs], [one.name for one in block.outputs]
+    errors = [
+        block.simulate(run.matrix(names), sample_time=run.sample_time)[:, 0] - run[force]
+        for run in runs
+    ]
+    return math.sqrt(sum(float(e @ e) for e in errors) / sum(e.size for e in errors))
 
 
 def _residuals(base: Block, estimator: Any, runs: list[Recording]) -> list[Recording]:
@@ -534,19 +561,19 @@ def review(
 def export(
     model: Block | str | Path,
     out: str | Path,
-    target: Literal["c", "fmu", "ros2"] = "c",
-    options: ExportOptions | None = None,
+    target: Literal["c", "fmu", "ros2", "mjcf"] = "c",
+    options: ExportOptions | MJCFOptions | None = None,
     **given: Any,
 ) -> Exported:
-    """Write a model as code: C99, an FMU, or a ROS 2 package.
+    """Write a model as code: C99, an FMU, a ROS 2 package, or MJCF for MuJoCo.
 
     Parameters
     ----------
     model : Block, or file
     out : path
-        Folder, or for an FMU the file, to write.
-    target : {"c", "fmu", "ros2"}
-        Of that target: `COptions`, `FMUOptions`, or for ROS 2 `ExportOptions`.
+        Folder, or for an FMU and MJCF the file, to write.
+    target : {"c", "fmu", "ros2", "mjcf"}
+        Of that target: `COptions`, `FMUOptions`, `MJCFOptions`, or for ROS 2 `ExportOptions`.
     """
     from mckibben.blocks.force.feedforward import compensator
     from mckibben.export import export_c, export_fmu, export_ros2
@@ -555,13 +582,15 @@ def export(
     from mckibben.export.programs import self_test
     from mckibben.outputs import refuse_inputs
 
-    kinds = {"c": COptions, "fmu": FMUOptions, "ros2": ExportOptions}
+    kinds = {"c": COptions, "fmu": FMUOptions, "ros2": ExportOptions, "mjcf": MJCFOptions}
     if target not in kinds:
         problem = f"there is no target {target!r:.60}"
-        raise ModelError(problem, parameter="target", remedy="use c, fmu or ros2")
+        raise ModelError(problem, parameter="target", remedy="use c, fmu, ros2 or mjcf")
     chosen: Any = given_options(kinds[target], options, given)
     out = Path(out)
     refuse_inputs(out, _paths(model))
+    if target == "mjcf":
+        return _export_mjcf(saved(model), out, chosen)
     block = saved(model, chosen.fields)
     block = compensator(block) if chosen.inverse else block
     name = chosen.name or next(map(name_from, _paths(model)), "model")
@@ -581,6 +610,33 @@ def export(
         name = chosen.name or name.lower()
         export_ros2(block, out, name=name, **common)
     return Exported(out, name, tuple(_contents(out)), *tests)
+
+
+def _export_mjcf(model: Any, out: Path, chosen: MJCFOptions) -> Exported:
+    """Write a muscle as MJCF."""
+    from mckibben.export.mjcf import Sites, export_mjcf
+    from mckibben.muscles import prior_of
+
+    rest, sheet, ends = chosen.rest_length, chosen.sheet, (chosen.site_from, chosen.site_to)
+    if (rest is None) == (sheet is None):
+        problem = "of rest length and data sheet, one is needed"
+        remedy = "give `rest_length` or `sheet`"
+        raise ModelError(problem, parameter="rest_length", remedy=remedy)
+    if sum(end is None for end in ends) == 1:
+        remedy = "give both, or neither"
+        raise ModelError("one site is missing", parameter="site_from", remedy=remedy)
+    name = chosen.name or "muscle"
+    export_mjcf(
+        model,
+        out,
+        rest_length=prior_of(str(sheet)).sheet.rest_length_mm if rest is None else rest,
+        name=name,
+        sites=None if None in ends else Sites(*map(str, ends)),
+        example=chosen.example,
+        lag=chosen.lag,
+        force=chosen.force,
+    )
+    return Exported(out, name, (out.name,))
 
 
 def _contents(path: Path) -> list[str]:

@@ -15,6 +15,7 @@ from mckibben import GPI, PI, Recording, write
 from mckibben.cli.main import app
 from mckibben.rigs import describe, load_rig
 from mckibben.signals import triangle
+from tests.export.muscle import MUSCLE
 
 MODEL, RUN, INVERSE, RIG = "model.json", "run.csv", "inverse.json", "rail.toml"
 
@@ -64,6 +65,7 @@ CALLS: dict[str, Call] = {
     "example": call_of("out", own="decaying-triangle.csv"),
     "export c": call_of(f"{MODEL} -o out", MODEL, own="README.md"),
     "export fmu": call_of(f"{MODEL} --platforms none -o out.fmu", MODEL),
+    "export mjcf": call_of("muscle.json --rest-length 200 -o out.xml", "muscle.json"),
     "export ros2": call_of(f"{INVERSE} -o out", INVERSE, own="README.md"),
     "rig list": call_of(""),
     "rig show": call_of("rail"),
@@ -88,6 +90,7 @@ def files(folder: Path) -> None:
     GPI.example().save(folder / MODEL)
     PI.example().save(folder / "pi.json")
     GPI.example().inverse().save(folder / INVERSE)
+    MUSCLE.save(folder / "muscle.json")
     (folder / RIG).write_text(describe(load_rig("mas20-hanging")))
 
 

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from mckibben import registry
-from mckibben.numerals import numeral, percent
+from mckibben.numerals import counted, numeral, percent
 from mckibben.recording import reading_notes
 from mckibben.report import interactive, model_subjects, words
 from mckibben.report.builder import Equations, Figure, Item, Table, Text, Tile
@@ -145,6 +145,11 @@ def fit(found: Fit) -> list[Item]:
         )
     if about["undetermined"]:
         said.append(f"Not determined by these recordings: {'; '.join(about['undetermined'])}.")
+    if found.price is not None:
+        limited, unlimited = (numeral(value, 4) for value in found.price)
+        said.append(
+            f"RMSE of the force {limited} N; without the limits of the format {unlimited} N."
+        )
     keys = ("parameter_names", "parameters", "standard_errors", "parameter_units")
     rows = [
         [name, value, "–" if math.isnan(error) else numeral(error, 2), measure]
@@ -271,9 +276,8 @@ def exported(found: Exported) -> list[Item]:
         *filter(None, (found.self_test, found.emulation)),
         *(f"Library: {x}" for x in libraries),
     ]
-    return [
-        Text([*said, f"{len(found.files)} files{'' if libraries else '; start with README.md'}"])
-    ]
+    start = "; start with README.md" if "README.md" in found.files else ""
+    return [Text([*said, counted(len(found.files), "file") + start])]
 
 
 # --- Comparisons and studies ------------------------------------------------------------------------

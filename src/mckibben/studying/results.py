@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mckibben.blocks.equations import quantities
 
@@ -15,6 +15,13 @@ if TYPE_CHECKING:
     from mckibben.control.roles import Plant
     from mckibben.estimators.core.estimator import Estimator
     from mckibben.recording import Recording
+
+
+class Price(NamedTuple):
+    """RMSE of the force from rest [N]: within the limits of a format, and without them."""
+
+    force_rmse: float
+    force_rmse_unlimited: float
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,8 @@ class Fit:
     notes : tuple of str
     file : Path or None
         Where the model is saved.
+    price : Price or None
+        Of what the format does not carry that the model is for, if it is for one.
     """
 
     name: str
@@ -39,6 +48,7 @@ class Fit:
     estimator: Estimator = field(repr=False)
     notes: tuple[str, ...] = field(default=(), repr=False)
     file: Path | None = None
+    price: Price | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return errors and parameters, for JSON."""
@@ -60,6 +70,7 @@ class Fit:
             "at_bounds": list(found.at_bounds),
             "undetermined": [numbers[place].name for place in self.estimator.undetermined()],
             "notes": list(self.notes),
+            **({} if self.price is None else self.price._asdict()),
         }
 
 

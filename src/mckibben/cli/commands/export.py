@@ -1,4 +1,4 @@
-"""Write a model as code for elsewhere: c, fmu, ros2."""
+"""Write a model as code for elsewhere: c, fmu, ros2, mjcf."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 
 from mckibben.cli.output import show
 from mckibben.cli.parameters import Argument, Json, command
-from mckibben.options import COptions, ExportOptions, FMUOptions, Option
+from mckibben.options import COptions, ExportOptions, FMUOptions, MJCFOptions, Option
 
 Model = Annotated[Path, Argument("MODEL", "Model, inverse or controller (JSON).")]
 Folder = Annotated[Path, Option("Folder to write.", "DIR", "-o")]
@@ -38,10 +38,21 @@ def ros2(model: Model, options: ExportOptions, out: Folder, as_json: Json = Fals
     _export("ros2", model, options, out, as_json)
 
 
+@command
+def mjcf(
+    model: Model,
+    options: MJCFOptions,
+    out: Annotated[Path, Option("MJCF to write (.xml).", "FILE", "-o")],
+    as_json: Json = False,
+) -> None:
+    """Write a muscle as plain XML for MuJoCo: of a balance fitted with --for mjcf."""
+    _export("mjcf", model, options, out, as_json)
+
+
 def _export(
-    target: Literal["c", "fmu", "ros2"],
+    target: Literal["c", "fmu", "ros2", "mjcf"],
     model: Path,
-    options: ExportOptions,
+    options: ExportOptions | MJCFOptions,
     out: Path,
     as_json: bool,
 ) -> None:
@@ -53,5 +64,5 @@ def _export(
 
 
 export = click.Group(
-    "export", help=__doc__, commands={one.name or "": one for one in (c, fmu, ros2)}
+    "export", help=__doc__, commands={one.name or "": one for one in (c, fmu, ros2, mjcf)}
 )

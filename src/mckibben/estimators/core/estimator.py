@@ -160,6 +160,9 @@ class Estimator(ABC):
     quick: ClassVar[bool] = False
     """Whether it is tried first: well known, or good, and fitted in seconds."""
 
+    targets: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
+    """Settings with which a model can be exported to a format that carries less."""
+
     param_grid: ClassVar[Grid] = {}
     """Setting -> values tried where orders are chosen by cross-validation."""
 

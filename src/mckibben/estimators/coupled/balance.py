@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -60,6 +60,9 @@ FEW, MOST, MOST_SAMPLES = 6_000, 12_000, 60_000
 GRIPS = (0.05, 0.3, 1.0, 4.0)
 """Pressures below zero at which friction holds nothing, relative to the highest, to begin from."""
 
+CONSTANT = 1e6
+"""The same, so far below that friction does not depend on pressure."""
+
 ROUNDS, STEPS_BETWEEN, LAST_STEPS = 6, 8, 8
 """Times that terms are added, and steps before each; those on all samples in the end."""
 
@@ -99,6 +102,8 @@ class BalanceEstimator(CoupledEstimator):
         (``walls``), air's lag in front (``filling``, ``venting``), a ``dead`` zone, or one that fades
         (``contact``), ``muscles`` that differ, and that go ``slack``. Each is added if the error of what
         is left out falls by more than its standard error. Default all.
+    friction : {"pressure", "constant"}
+        Whether the forces at which stops break away grow with pressure.
     n_stops : int
         Stops, which break away after travels from 0.3 to 50 % of the stroke at the highest pressure.
     n_lags : int
@@ -147,6 +152,16 @@ class BalanceEstimator(CoupledEstimator):
     inverse_kind = "exact"
     quick = True
     default_for = "plan of displacement"
+    targets: ClassVar[dict[str, dict[str, Any]]] = {
+        "mjcf": {
+            "of_force": True,
+            "friction": "constant",
+            "elasticity": 3,
+            "area": 1,
+            "n_lags": 0,
+            "terms": ("elasticity", "areas", "obstacle"),
+        }
+    }
     param_grid: ClassVar[Grid] = {"n_lags": (3, 6), "n_stops": (5, 8), "area": (2, 4)}
     makes = (
         "balance",
@@ -162,6 +177,7 @@ class BalanceEstimator(CoupledEstimator):
     through: ClassVar[bool] = True
 
     terms: tuple[str, ...] | None = None
+    friction: Literal["pressure", "constant"] = "pressure"
     n_stops: Annotated[int, Interval(ge=0, le=30)] = 8
     n_lags: Annotated[int, Interval(ge=0, le=10)] = 6
     lags: tuple[Annotated[float, Gt(0)], ...] | None = None
@@ -294,7 +310,10 @@ class BalanceEstimator(CoupledEstimator):
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
         """Return the structure of all that may be."""
         longest = LONGEST if self.prior is None else TRAVELS[-1]
-        limits = np.geomspace(FINEST, longest, self.n_stops) * bench.stroke / bench.highest
+        travels = np.geomspace(FINEST, longest, self.n_stops) * bench.stroke
+        limits = travels / bench.highest
+        if self.friction == "constant":
+            limits = limits / (1.0 + CONSTANT)
         shortest, longest = bench.lag_range
         lags = np.geomspace(shortest, longest, self.n_lags + 1)[1:] if bench.step and timed else ()
         if self.lags is not None:
@@ -336,7 +355,7 @@ class BalanceEstimator(CoupledEstimator):
             if kind in ("elasticity", "areas"):
                 return which < 2
             return kind in ("loads", "damping", "bladder", "friction") or (
-                kind == "grip" and structure.n_stops > 0
+                kind == "grip" and structure.n_stops > 0 and self.friction == "pressure"
             )
 
         return np.array([term.muscle is None and there(term) for term in structure.terms])
@@ -351,7 +370,7 @@ class BalanceEstimator(CoupledEstimator):
         if belief is not None:
             starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
             z = min(starts, key=search.cost)
-        tried = np.array([self._tried(term) for term in structure.terms])
+        tried = np.array([self._tried(structure, term) for term in structure.terms])
         last = np.array([term.kind in LAST for term in structure.terms])
         pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
         for number in range(ROUNDS):
@@ -402,7 +421,8 @@ class BalanceEstimator(CoupledEstimator):
     def _balanced(self, search: Search, tracker: Tracker) -> Array:
         """Return what balances forces best where muscles were measured, of several grips."""
         structure, problem, starts = search.structure, search.problem, []
-        for grip in GRIPS[: None if structure.n_stops else 1]:
+        grips = GRIPS[: None if structure.n_stops else 1]
+        for grip in grips if self.friction == "pressure" else (CONSTANT,):
             z = np.zeros(problem.size(structure))
             z[: len(structure.terms)] = structure.begin(grip * structure.bench.highest)
             z = problem.balanced(structure, z, search.active)
@@ -424,10 +444,14 @@ class BalanceEstimator(CoupledEstimator):
         alone = replace(search, problem=replace(problem, data=replace(problem.data, runs=())))
         return alone.descend(z, TOWARDS, Tracker())
 
-    def _tried(self, term: Term) -> bool:
-        """Tell whether a term may be added."""
+    def _tried(self, structure: Structure, term: Term) -> bool:
+        """Return whether a term may be added."""
         if term.muscle is not None:
             return self.may("muscles")
+        if term.kind in ("grip", "grips") and self.friction == "constant":
+            return False
+        if term.kind in ("filling", "venting") and not structure.bench.step:
+            return False
         return self.may(PARTS.get(term.kind, term.kind)) and term.kind != "pushes"
 
     def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:

@@ -38,10 +38,7 @@ def later(
     def shown() -> None:
         found = _made[key] = _made.pop(key)  # the last used goes last
         with place:
-            if isinstance(found, MckibbenError):
-                widgets.error_box(found)
-            else:
-                show(found)
+            (widgets.error_box if isinstance(found, MckibbenError) else show)(found)
 
     async def fill() -> None:
         try:

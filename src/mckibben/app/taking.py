@@ -201,8 +201,6 @@ def script(workspace: Workspace, of: Json) -> str:
     """Return a Python script: read, compare, save, invert, export."""
     models, settings = fitted(workspace)
     lines = ['"""What was done in the workbench; run it in its folder."""', ""]
-    if any(one.way.amends for one in workspace.entries()):
-        lines += ["from pathlib import Path", "", "from mckibben.app import steps", ""]
     lines += ["import mckibben", "from mckibben import workflow", ""]
     for role in ("train", "test"):
         runs = [f"    {one.code()}," for one in workspace.entries() if one.role == role]

@@ -28,15 +28,7 @@ ENTER = "/enter"
 
 
 class Links:
-    """The token, and the one-time link that gives it.
-
-    Parameters
-    ----------
-    address : str
-        Scheme, host and port.
-    announce : callable
-        Called with a link whenever the one before was used.
-    """
+    """The token, and the one-time link that gives it; the next is announced when one was used."""
 
     def __init__(self, address: str, announce: Callable[[str], None]) -> None:
         self.address, self.announce = address, announce
@@ -57,16 +49,7 @@ class Links:
 
 
 class Guard:
-    """ASGI middleware.
-
-    Parameters
-    ----------
-    app : callable
-        What is behind it.
-    port : int
-        Names the cookie: browsers send those of one port to all.
-    links : Links
-    """
+    """ASGI middleware; the port is in the cookie's name, as browsers send cookies to all ports."""
 
     def __init__(self, app: ASGIApp, *, port: int, links: Links) -> None:
         self.app, self.links, self.cookie = app, links, f"mckibben-{port}"

@@ -42,22 +42,9 @@ Work = Callable[..., str]
 
 
 class Job(Plain):
-    """A job: what it does, how far it is, how it went.
+    """A job: ``kind`` is the name of its work, ``given`` the arguments of that, ``title`` for people.
 
-    Parameters
-    ----------
-    name : str
-        Of its file.
-    kind : str
-        Name of the work, such as ``"fit"``.
-    title : str
-        What a person calls it.
-    given : dict
-        Arguments of the work.
-    state : {"waiting", "running", "done", "failed", "cancelled", "interrupted"}
-    message : str
-        How it went.
-    progress : list of (seconds, share, words or cost)
+    ``progress`` has seconds, shares, and words or costs; ``message`` says how it went.
     """
 
     name: str = Field(exclude=True)
@@ -82,14 +69,7 @@ class Job(Plain):
 
 
 class Jobs:
-    """The jobs of a folder; unfinished ones of an earlier server are interrupted.
-
-    Parameters
-    ----------
-    workspace : Workspace
-    at_once : int, optional
-        How many run at the same time; default as many as cores.
-    """
+    """The jobs of a folder, some ``at_once``; unfinished ones of an earlier server are interrupted."""
 
     def __init__(self, workspace: Workspace, at_once: int | None = None) -> None:
         self.workspace, self.at_once = workspace, at_once or cores()
@@ -105,13 +85,7 @@ class Jobs:
                 self.jobs[name] = job
 
     def submit(self, work: Work, title: str, **given: Any) -> Job:
-        """Queue a job; one that is the same as one that waits or runs is returned instead.
-
-        Raises
-        ------
-        DataError
-            If the folder cannot be written to.
-        """
+        """Queue a job; one that is the same as one that waits or runs is returned instead."""
         kind = work.__name__
         for job in self.active():
             if (job.kind, job.title, job.given) == (kind, title, given):

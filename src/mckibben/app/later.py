@@ -21,18 +21,9 @@ _made: dict[Hashable, Any] = {}
 def later(
     key: Hashable, make: Callable[[], T], show: Callable[[T], Any], *, height: int = 0
 ) -> None:
-    """Show what ``make`` returns, which is called in a thread, and once for a key.
+    """Show what ``make`` returns, or its error; it is called in a thread, and once for a key.
 
-    Parameters
-    ----------
-    key : hashable
-        All that it depends on.
-    make : callable
-        Makes it. Its errors are shown in its place.
-    show : callable
-        Makes elements of it.
-    height : int
-        Room that is left for it meanwhile [px].
+    The key is all that it depends on, and ``height`` [px] the room that is left for it meanwhile.
     """
 
     def shown() -> None:

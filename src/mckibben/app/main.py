@@ -70,11 +70,6 @@ def serve(
         Whether to open a browser.
     announce : callable
         Called with every one-time link, in words.
-
-    Raises
-    ------
-    DataError
-        If the folder cannot be used or is open in another workbench, or the port is taken.
     """
     os.umask(0o077)  # what is written is its user's alone
     workspace = Workspace(folder)

@@ -48,20 +48,7 @@ def view(build: Callable[..., None]) -> Any:
 class State:
     """What is chosen, for all windows; what is known is in ``workspace`` and ``jobs``.
 
-    Parameters
-    ----------
-    workspace : Workspace
-    jobs : Jobs
-    recording : str
-        Name of the recording that is shown.
-    inputs, outputs : list of str
-        Channels that are modelled.
-    load : str
-        Channel of the load, or empty.
-    model : str
-        Name of the model that is chosen.
-    chosen : dict
-        What else pages choose, by names that begin with the page's.
+    ``chosen`` is what else pages choose, by names that begin with the page's.
     """
 
     workspace: Workspace
@@ -101,10 +88,11 @@ class State:
         known = self.workspace.channels()
         if not self.inputs or not self.outputs or {*self.inputs, *self.outputs} - {*known}:
             self.inputs, self.outputs = [], []
-            used = [one.select(known) for one in self.workspace.used().values() if known]
             with suppress(DataError):
-                sides = channels_of(used, None, None, None)
-                self.inputs, self.outputs = list(sides.inputs), list(sides.outputs)
+                if known:
+                    used = [one.select(known) for one in self.workspace.used().values()]
+                    sides = channels_of(used)
+                    self.inputs, self.outputs = list(sides.inputs), list(sides.outputs)
 
     @property
     def sides(self) -> Channels:

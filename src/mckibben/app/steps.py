@@ -101,24 +101,13 @@ class Step(Plain):
 
 
 class Entry(Plain):
-    """A recording of the folder.
+    """A recording of the folder: recording number ``part`` of the raw file ``upload``.
 
-    Parameters
-    ----------
-    role : {"train", "test", "unused"}
-    origin : str
-        Where it came from, in words.
-    kind, upload : str
-        Folder and name of its raw file; earlier versions had some among the recordings.
-    part : int
-        Which recording of that file it is.
-    reading : Reading
-    steps : list of Step
+    That is among the uploads; earlier versions had some among the recordings, and notes here.
     """
 
     name: str = ""
     role: Role
-    origin: str = ""
     kind: Literal["uploads", "recordings"] = "uploads"
     upload: str = ""
     part: int = 0

@@ -1,14 +1,8 @@
 """The folder of a workbench: plain files that any editor opens, and nothing else.
 
-======================= =======================================================================
-``uploads/``            raw files, as they came
-``recordings/N.json``   a recording: raw file, how it is read, role, and the list of steps
-``models/N.json``       a model; ``banded/N.json`` is the same with its band
-``results/N.json``      what came of its fit
-``runs``, ``reviews``   closed loops, and reviews of logs
-``jobs/N.json``         a job and how it went; ``takeaway/`` has what jobs write for the user
-``history/``            recordings that were removed
-======================= =======================================================================
+``uploads`` has raw files as they came, ``recordings`` how each is read, its role and steps, ``history``
+those removed; ``models``, ``banded`` (the same with bands) and ``results`` what was fitted; ``runs`` and
+``reviews`` closed loops; ``jobs`` how jobs went, and ``takeaway`` what they write for the user.
 
 Files are written whole or not at all, names from a browser are made safe, and no path leaves the folder.
 """
@@ -55,17 +49,9 @@ MOST_CACHED = 1000
 
 
 class Workspace:
-    """Recordings, models and results of a folder.
+    """Recordings, models and results of a folder, which is made where it is missing.
 
-    Parameters
-    ----------
-    folder : path
-        Made where it is missing.
-
-    Raises
-    ------
-    DataError
-        If it cannot be made or written to, or a folder in it is a link.
+    `DataError` if it cannot be written to, or a folder in it is a link.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -79,13 +65,7 @@ class Workspace:
         self._lock = threading.RLock()
 
     def claim(self) -> None:
-        """Become the one server of this folder until this process ends.
-
-        Raises
-        ------
-        DataError
-            If there is another one, or the folder is another user's.
-        """
+        """Become the one server of this folder until this process ends; `DataError` if it cannot."""
         from filelock import FileLock, Timeout
 
         if os.name == "posix" and self.folder.stat().st_uid != os.getuid():
@@ -153,10 +133,7 @@ class Workspace:
     def receiving(self, name: str, size: int) -> Iterator[tuple[Path, Path]]:
         """Give where to write an uploaded file to, and where it then is, under a safe name.
 
-        Raises
-        ------
-        DataError
-            If it is empty, too large, or no file that is read.
+        `DataError` if it is empty, too large, or no file that is read.
         """
         given = Path(name.replace("\\", "/"))
         ending = given.suffix.casefold()
@@ -233,11 +210,9 @@ class Workspace:
     ) -> list[str]:
         """Add the recordings of an uploaded file, and return their names."""
         path, names, way = self.path("uploads", upload), [], reading or Reading()
-        for part, one in enumerate(found := self._read(path, way)):
+        for part, one in enumerate(self._read(path, way)):
             chosen = self.new_name("recordings", name or one.name or path.stem)
-            origin = f"file {upload}" + f", part {part + 1}" * (len(found) > 1)
-            about = {"name": chosen, "role": role, "origin": origin, "upload": upload}
-            self.put(Entry(**about, part=part, reading=way))
+            self.put(Entry(name=chosen, role=role, upload=upload, part=part, reading=way))
             names.append(chosen)
         return names
 
@@ -250,13 +225,7 @@ class Workspace:
         return self.add(upload, name=name, role=role)[0]
 
     def change(self, name: str, **fields: Any) -> None:
-        """Change fields of a recording, once it is known that it can be read so.
-
-        Raises
-        ------
-        DataError
-            If it cannot; all stays as it was.
-        """
+        """Change fields of a recording; if it cannot be read so, all stays as it was."""
         with self._lock:
             after = self.entry(name).model_copy(update=fields)
             if fields.keys() != {"role"}:
@@ -351,10 +320,7 @@ class Workspace:
     def save_model(
         self, name: str, model: Block, result: Mapping[str, Any], banded: Block | None = None
     ) -> None:
-        """Write a model with what came of its fit, such as a row of a leaderboard as a dict.
-
-        ``result`` also has ``input``, ``output``, ``unit`` and ``data``, the `digest` at its start.
-        """
+        """Write a model with what came of its fit: a row of a leaderboard, its channels and `digest`."""
         model.save(self.path("models", f"{name}.json"))
         self.delete("banded", name)
         if banded is not None:
@@ -380,13 +346,7 @@ class Workspace:
         return sorted(found, key=place)
 
     def cached(self, path: Path, key: str, make: Callable[[], Any]) -> Any:
-        """Return what is made of a file, made again only when that has changed.
-
-        Raises
-        ------
-        DataError
-            If the file is missing; or what ``make`` raises.
-        """
+        """Return what is made of a file, made again only when that has changed."""
         try:
             stat = path.stat()
         except OSError as error:

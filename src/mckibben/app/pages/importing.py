@@ -149,22 +149,9 @@ async def ask(
     verb: str = "Import",
     ticked: bool = True,
 ) -> None:
-    """Ask how a file is to be read, and call ``take`` with that once it can be.
+    """Ask how a file is to be read, now as ``reading`` says, and ``take`` that once it can be.
 
-    Parameters
-    ----------
-    path : Path
-        The raw file.
-    reading : Reading
-        How it is read now.
-    take : coroutine function
-        Called with the reading, and whether others are read so, too; its errors are shown.
-    others : str
-        Which others, for a check box; empty for none.
-    verb : str
-        On the button.
-    ticked : bool
-        Whether the others are read so unless somebody says no.
+    That is a coroutine function, called also with whether ``others`` (empty for none) are read so, too.
     """
     form, one = Form(path, reading), asyncio.Lock()
     await asyncio.to_thread(form.look)
@@ -208,17 +195,11 @@ async def ask(
                 numbered = [[str(at), line[:160]] for at, line in enumerate(lines, start=1)]
                 widgets.table(["", "First lines"], numbered)
                 with widgets.row():
-                    for label, name in (
-                        ("Header in line", "header"),
-                        ("Lines after it left out", "skip"),
-                    ):
+                    labels = {"header": "Header in line", "skip": "Lines after it left out"}
+                    for name, label in labels.items():
                         number = ui.number(label, min=0, precision=0, placeholder="as found")
                         bound(number.props("clearable"), name)
-                    known: dict[str | None, str] = {
-                        None: "As found",
-                        **{name: name for name in ENCODINGS},
-                    }
-                    bound(ui.select(known, label="Encoding"), "encoding")
+                    bound(ui.select([*ENCODINGS], label="Encoding", clearable=True), "encoding")
         with widgets.row(classes="spread"):
             widgets.button("As found", as_found)
             ui.space()

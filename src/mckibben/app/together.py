@@ -32,16 +32,16 @@ def join(workspace: Workspace) -> list[str]:
     Channels of later runs are called as those of the first, place by place.
     """
     joined: list[str] = []
-    units: dict[str, str] = {}
+    first: dict[str, str] = {}
     for names in pairs(workspace):
         whole, *others = (workspace.recording(name) for name in names)
         for other in others:
             whole = whole.with_channels(other.units, **other.channels)
-        found = [whole.units, units or whole.units]
-        known = all(a in ("", b) for a, b in zip(*(one.values() for one in found), strict=False))
-        if len(found[0]) == len(found[1]) and known:
-            called = dict(zip(units := dict(found[1]), whole.channels.values(), strict=True))
-            whole = replace(whole, channels=called, units=units)
+        first = first or dict(whole.units)
+        alike = zip(whole.units.values(), first.values(), strict=False)
+        if len(whole.units) == len(first) and all(one in ("", other) for one, other in alike):
+            samples = dict(zip(first, whole.channels.values(), strict=True))
+            whole = replace(whole, channels=samples, units=first)
         role = workspace.entry(names[0]).role
         joined.append(workspace.add_recording(whole, name="-".join(names), role=role))
         for name in names:

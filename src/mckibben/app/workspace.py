@@ -68,17 +68,14 @@ class Workspace:
         """Become the one server of this folder until this process ends; `DataError` if it cannot."""
         from filelock import FileLock, Timeout
 
-        if os.name == "posix" and self.folder.stat().st_uid != os.getuid():
-            problem = "this folder is another user's"
-            raise DataError(problem, file=self.folder, remedy="give one of your own")
         self._owner = FileLock(self.folder / ".owner", timeout=0, mode=0o600)
         with written(self.folder):
+            self.folder.chmod(0o700)  # which another user may not
             try:
                 self._owner.acquire()
             except Timeout:
                 problem = "another workbench has this folder open"
                 raise DataError(problem, file=self.folder, remedy="use or close that") from None
-            self.folder.chmod(0o700)
         for path in self.folder.glob(f"*/{PART}*.part"):  # of a process that was killed
             path.unlink(missing_ok=True)
 
@@ -156,9 +153,8 @@ class Workspace:
     def entry(self, name: str) -> Entry:
         """Return a recording's description; `DataError` if it is missing or damaged."""
         found = self.read("recordings", name) or {}
-        if before := found.get("base") or found.get(
-            "file"
-        ):  # of an earlier version, as it was read
+        before = found.get("base") or found.get("file")  # of an earlier version: what was read
+        if before:
             found |= {"kind": "recordings", "upload": before, "part": 0, "reading": {}}
         try:
             return Entry.model_validate(found | {"name": name})
@@ -184,14 +180,14 @@ class Workspace:
         """Return the raw file of a recording."""
         return self.path(entry.kind, entry.upload)
 
-    def _read(self, path: Path, reading: Reading) -> list[Recording]:
+    def _parts(self, path: Path, reading: Reading) -> list[Recording]:
         return self.cached(path, reading.model_dump_json(), lambda: understand(path, reading)[0])
 
     def _made(self, entry: Entry) -> Recording:
-        parts = self._read(self.raw_path(entry), entry.reading)
-        if entry.part >= len(parts):
-            problem = f"the file has {len(parts)} recording(s), and this is number {entry.part + 1}"
-            raise DataError(problem, file=self.raw_path(entry), remedy="remove this recording")
+        path = self.raw_path(entry)
+        if entry.part >= len(parts := self._parts(path, entry.reading)):
+            problem = f"the file has {len(parts)} recordings, and this is number {entry.part + 1}"
+            raise DataError(problem, file=path, remedy="remove this recording")
         return applied(parts[entry.part], entry.steps).with_meta(name=entry.name)
 
     def _of(self, entry: Entry, what: str, make: Callable[[], Any]) -> Any:
@@ -210,7 +206,7 @@ class Workspace:
     ) -> list[str]:
         """Add the recordings of an uploaded file, and return their names."""
         path, names, way = self.path("uploads", upload), [], reading or Reading()
-        for part, one in enumerate(self._read(path, way)):
+        for part, one in enumerate(self._parts(path, way)):
             chosen = self.new_name("recordings", name or one.name or path.stem)
             self.put(Entry(name=chosen, role=role, upload=upload, part=part, reading=way))
             names.append(chosen)
@@ -353,10 +349,8 @@ class Workspace:
             problem = f"it cannot be read ({error.strerror})"
             raise DataError(problem, file=path, remedy="import it again") from None
         at = path, key, stat.st_mtime_ns, stat.st_size
-        made = (
-            self._cache[at] if at in self._cache else make()
-        )  # without the lock: it takes seconds
-        with self._lock:
+        made = self._cache[at] if at in self._cache else make()
+        with self._lock:  # not for the making, which takes seconds
             self._cache[at] = self._cache.pop(at, made)  # the last used goes last
             while len(self._cache) > MOST_CACHED:
                 del self._cache[next(iter(self._cache))]

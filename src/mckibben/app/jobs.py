@@ -81,7 +81,7 @@ class Jobs:
                 before = (job.given.get(key) for key in ("title", "name"))  # of earlier versions
                 job.title = next(filter(None, [job.title, *before]), job.kind)
                 if job.active:
-                    self._ended(job, INTERRUPTED, "the workbench was closed before it was done")
+                    self._now(job, INTERRUPTED, "the workbench was closed before it was done")
                 self.jobs[name] = job
 
     def submit(self, work: Work, title: str, **given: Any) -> Job:
@@ -93,7 +93,7 @@ class Jobs:
         name = self.workspace.new_name("jobs", f"{kind}-{title}")
         job = self.jobs[name] = Job(name=name, kind=kind, title=title, given=given)
         self._works[name] = work
-        _write(self.workspace, job)
+        self._now(job, WAITING)
         self.poll()
         return job
 
@@ -120,7 +120,7 @@ class Jobs:
             note = self.workspace.read("jobs", job.name) or {}
             job.state, job.message = str(note.get("state")), str(note.get("message", ""))
             if job.state not in (DONE, FAILED):
-                self._ended(job, FAILED, "its process ended early; is memory or disk full?")
+                self._now(job, FAILED, "its process ended early; is memory or disk full?")
             job._pipe.close()
         return ended
 
@@ -133,9 +133,9 @@ class Jobs:
         there.close()
         job._process, job._pipe, job.state = process, pipe, RUNNING
 
-    def _ended(self, job: Job, state: str, message: str = "") -> None:
+    def _now(self, job: Job, state: str, message: str = "") -> None:
         job.state, job.message = state, message
-        _write(self.workspace, job)
+        self.workspace.write("jobs", job.name, job.model_dump())
 
     def cancel(self, name: str) -> None:
         """End a job; what it wrote before stays."""
@@ -148,7 +148,7 @@ class Jobs:
             if job._process.is_alive():
                 job._process.kill()
             job._pipe.close()
-        self._ended(job, CANCELLED)
+        self._now(job, CANCELLED)
         self.poll()
 
     def forget(self, name: str) -> None:
@@ -177,11 +177,6 @@ def warm() -> None:
     first.join()
 
 
-def _write(workspace: Workspace, job: Job) -> None:
-    job.message = job.message[:5000]
-    workspace.write("jobs", job.name, job.model_dump(mode="json"))
-
-
 def _run(folder: str, job: Job, work: Work, pipe: Any) -> None:
     """Do the work; this runs in the job's process."""
     end_with_parent()
@@ -206,4 +201,4 @@ def _run(folder: str, job: Job, work: Work, pipe: Any) -> None:
         job.message, job.state = said(error), FAILED
     except Exception as error:
         job.message, job.state = str(unforeseen(error)), FAILED
-    _write(workspace, job)
+    workspace.write("jobs", job.name, job.model_dump())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import os
 import socket
 import threading
@@ -11,8 +10,8 @@ import time
 import warnings
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,6 @@ from mckibben.app.pages import compensate, data, look, models, takeaway
 from mckibben.app.state import State, view
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError, MckibbenWarning
-from mckibben.system.atomic import write_text
 
 PAGES: dict[str, Any] = {
     "/": data,
@@ -92,33 +90,29 @@ def serve(
     def ready() -> None:
         """Say where it is once it listens, and load what the first job needs."""
         for _ in range(200):
-            with contextlib.suppress(OSError), socket.create_connection((HOST, port)):
+            with suppress(OSError), socket.create_connection((HOST, port)):
                 break
             time.sleep(0.05)
         announce(f"Workbench over {workspace.folder}: {links.link} (Ctrl-C ends it)")
+        if show:
+            webbrowser.open(links.link)
         jobs.warm()
 
     app.on_startup(lambda: threading.Thread(target=ready, daemon=True).start())
-    door = workspace.folder / ".open.html"
-    with contextlib.suppress(KeyboardInterrupt):
-        try:
-            if show:
-                _open(door, links.link)
-            ui.run(
-                host=HOST,
-                port=port,
-                title="mckibben",
-                show=False,
-                reload=False,
-                show_welcome_message=False,
-                reconnect_timeout=ABSENCE,
-                favicon="🦾",
-                gzip_middleware_factory=None,
-                http="h11",
-                h11_max_incomplete_event_size=HEAD,
-            )
-        finally:
-            door.unlink(missing_ok=True)
+    with suppress(KeyboardInterrupt):
+        ui.run(
+            host=HOST,
+            port=port,
+            title="mckibben",
+            show=False,
+            reload=False,
+            show_welcome_message=False,
+            reconnect_timeout=ABSENCE,
+            favicon="🦾",
+            gzip_middleware_factory=None,
+            http="h11",
+            h11_max_incomplete_event_size=HEAD,
+        )
 
 
 def build(state: State) -> None:
@@ -174,18 +168,11 @@ async def _prefer(state: State) -> None:
     """Take the first browser's preference for light or dark."""
     if not widgets.theme.known:
         widgets.theme.known = True
-        with contextlib.suppress(TimeoutError):
+        with suppress(TimeoutError):
             query = "matchMedia('(prefers-color-scheme: dark)').matches"
             if await ui.run_javascript(query, timeout=5.0):
                 widgets.theme.dark = True
                 state.changed()
-
-
-def _open(door: Path, link: str) -> None:
-    """Open the browser by a file that only its user can read: commands are seen by all users."""
-    refresh = f'<meta http-equiv="refresh" content="1;url={escape(link)}">'
-    write_text(door, f"<!doctype html><meta charset=utf-8>{refresh}<p>Starting the workbench …</p>")
-    threading.Thread(target=webbrowser.open, args=(door.as_uri(),), daemon=True).start()
 
 
 def _free(port: int) -> int:

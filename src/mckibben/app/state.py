@@ -80,7 +80,8 @@ class State:
             self._settle()
 
     def _settle(self) -> None:
-        recordings, models = self.workspace.names("recordings"), self.workspace.models()
+        recordings = [entry.name for entry in self.workspace.entries()]
+        models = self.workspace.models()
         if self.recording not in recordings:
             self.recording = next(iter(recordings), "")
         if self.model not in models:

@@ -44,9 +44,8 @@ def build(state: State) -> None:
     """Build the page."""
     with mark(ui.element("div").classes("page"), "page-data"):
         with widgets.row(classes="spread"):
-            widgets.heading(
-                "Data", "Recordings to identify models with, and others to test them on."
-            )
+            text = "Recordings to identify models with, and others to test them on."
+            widgets.heading("Data", text)
             mark(widgets.primary("Add files", lambda: files.run_method("pickFiles"), "add"), "add")
         with ui.element("div").style("display: none"):
             files = _upload(state)
@@ -64,8 +63,8 @@ def _upload(state: State) -> Any:
 
 
 def _is_empty(state: State) -> bool:
-    known = state.workspace.names("recordings")
-    return not known and not _unread(state) and "data.removed" not in state.chosen
+    rest = _unread(state) or state.chosen.get("data.removed")
+    return not (rest or state.workspace.names("recordings"))
 
 
 async def _changed(state: State, change: Callable[..., Any], *given: Any) -> None:
@@ -219,14 +218,12 @@ async def _correct(state: State, entry: Entry) -> None:
 def _recordings(state: State, entries: list[Entry]) -> None:
     names = [one.name for one in entries]
 
-    def discard(upload: str) -> None:
-        _unread(state).pop(upload, None)
-        state.workspace.path("uploads", upload).unlink(missing_ok=True)
-        state.changed()
+    def discard(upload: str) -> Any:
+        del _unread(state)[upload]
+        return _changed(state, state.workspace.path("uploads", upload).unlink)
 
-    def restore() -> None:
-        state.workspace.restore(state.chosen.pop("data.removed"))
-        state.changed()
+    def restore() -> Any:
+        return _changed(state, state.workspace.restore, state.chosen.pop("data.removed"))
 
     def choose(at: int) -> None:
         if state.recording != names[at]:
@@ -329,16 +326,11 @@ def _recording(state: State, entry: Entry) -> None:
 
 
 def _actions(state: State, entry: Entry) -> None:
-    name, workspace = entry.name, state.workspace
+    name, workspace, act = entry.name, state.workspace, partial(_changed, state)
 
-    def role(event: Any) -> None:
-        workspace.change(name, role=event.value)
-        state.changed()
-
-    def remove() -> None:
-        workspace.remove(name)
+    def remove() -> Any:
         state.chosen["data.removed"] = name
-        state.changed()
+        return act(workspace.remove, name)
 
     def rename() -> None:
         def done() -> None:
@@ -351,8 +343,9 @@ def _actions(state: State, entry: Entry) -> None:
             field.on("keydown.enter", widgets.guarded(done), [])
             widgets.primary("Rename", done)
 
-    picked = ui.toggle(ROLES, value=entry.role, on_change=widgets.guarded(role))
-    mark(picked.props("dense no-caps unelevated toggle-color=primary"), "role")
+    picked = ui.toggle(ROLES, value=entry.role).props("dense no-caps unelevated")
+    role = widgets.guarded(lambda e: act(partial(workspace.change, name, role=e.value)))
+    mark(picked.props("toggle-color=primary").on_value_change(role), "role")
     mark(widgets.button("How it is read", lambda: _correct(state, entry), "tune"), "correct")
     widgets.icon_button("edit", "Rename", rename)
     mark(widgets.icon_button("delete_outline", "Remove", remove), "remove")
@@ -383,12 +376,12 @@ def _part(state: State, entry: Entry, recording: Recording) -> None:
         last = len(time) if high is None else np.searchsorted(time, high + half)
         return int(first), int(last)
 
-    async def keep() -> None:
+    def keep() -> Any:
         first, last = samples()
-        await _changed(state, workspace.do, entry.name, Step(do="slice", start=first, stop=last))
+        return _changed(state, workspace.do, entry.name, Step(do="slice", start=first, stop=last))
 
-    async def split() -> None:
-        await _changed(state, workspace.split, entry.name, samples()[0])
+    def split() -> Any:
+        return _changed(state, workspace.split, entry.name, samples()[0])
 
     unit = "s" if recording.sample_time is not None else "sample"
     with widgets.row():
@@ -417,8 +410,8 @@ def _steps(state: State, entry: Entry, recording: Recording) -> None:
     others = [name for name in recording.channels if name != driving]
 
     def offer(text: str, do: Any, values: Callable[[], dict[str, Any]]) -> None:
-        async def act() -> None:
-            await _changed(state, state.workspace.do, entry.name, Step(do=do, **values()))
+        def act() -> Any:
+            return _changed(state, state.workspace.do, entry.name, Step(do=do, **values()))
 
         mark(widgets.button(text, act), do)
 
@@ -430,9 +423,6 @@ def _steps(state: State, entry: Entry, recording: Recording) -> None:
             offer("Resample", "resample", lambda: {"sample_time": step.value})
         of = ui.select(others, value=others[:1], multiple=True, label="Channels")
         of.props("dense outlined")
-        offer(
-            f"Zero where {driving} is lowest",
-            "zero",
-            lambda: {"channels": of.value, "over": driving},
-        )
+        zero = f"Zero where {driving} is lowest"
+        offer(zero, "zero", lambda: {"channels": of.value, "over": driving})
         offer("Remove drift", "detrend", lambda: {"channels": of.value})

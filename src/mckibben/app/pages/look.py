@@ -44,9 +44,8 @@ def build(state: State) -> None:
     """Build the page."""
     with mark(ui.element("div").classes("page"), "page-look"):
         with widgets.row(classes="spread"):
-            widgets.heading(
-                "Look", "What the muscle does, and what the recordings do not show yet."
-            )
+            text = "What the muscle does, and what the recordings do not show yet."
+            widgets.heading("Look", text)
             if state.workspace.names("recordings"):
                 choose = partial(ui.navigate.to, "/models")
                 mark(widgets.primary("Choose models", choose, "leaderboard"), "choose-models")

@@ -177,11 +177,11 @@ async def _ask(state: State, upload: str) -> None:
     async def take(reading: Reading, others: bool) -> None:
         add = partial(workspace.add, reading=reading)
         state.recording, *_ = await asyncio.to_thread(add, upload)
-        del unread[upload]
+        unread.pop(upload, None)
         for one in [*unread] if others else ():
             try:
                 await asyncio.to_thread(add, one)
-                del unread[one]
+                unread.pop(one, None)
             except MckibbenError as error:
                 unread[one] = error
         state.changed()
@@ -194,13 +194,9 @@ async def _correct(state: State, entry: Entry) -> None:
     """Ask how a recording is to be read instead, and those that are read like it."""
     workspace = state.workspace
     channels = {name: [*run.channels] for name, run in workspace.used().items()}
-    alike = [
-        one.name
-        for one in workspace.entries()
-        if one.name != entry.name
-        and one.reading == entry.reading
-        and channels.get(one.name) == channels.get(entry.name)
-    ]
+    like = [one.name for one in workspace.entries() if one.reading == entry.reading]
+    own = channels.pop(entry.name, [])
+    alike = [name for name in like if channels.get(name) == own]
 
     async def take(reading: Reading, all_so: bool) -> None:
         for name in [entry.name, *(alike if all_so else ())]:
@@ -219,8 +215,10 @@ def _recordings(state: State, entries: list[Entry]) -> None:
     names = [one.name for one in entries]
 
     def discard(upload: str) -> Any:
-        del _unread(state)[upload]
-        return _changed(state, state.workspace.path("uploads", upload).unlink)
+        _unread(state).pop(upload, None)
+        return _changed(
+            state, state.workspace.path("uploads", upload).unlink, True
+        )  # if it is there
 
     def restore() -> Any:
         return _changed(state, state.workspace.restore, state.chosen.pop("data.removed"))

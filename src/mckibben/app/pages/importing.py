@@ -29,7 +29,8 @@ CHANNELS = (
 )
 """Channels that are offered; any other name can be typed."""
 
-ENCODINGS = ("utf-8", "cp1252", "utf-16", "cp932", "gb18030", "cp949")
+KNOWN = ("utf-8", "cp1252", "utf-16", "cp932", "gb18030", "cp949")
+ENCODINGS: dict[str | None, str] = {None: "As found", **{name: name for name in KNOWN}}
 
 FIRST_LINES = 8
 """Of a text that are shown."""
@@ -199,7 +200,7 @@ async def ask(
                     for name, label in labels.items():
                         number = ui.number(label, min=0, precision=0, placeholder="as found")
                         bound(number.props("clearable"), name)
-                    bound(ui.select([*ENCODINGS], label="Encoding", clearable=True), "encoding")
+                    bound(ui.select(ENCODINGS, label="Encoding"), "encoding")
         with widgets.row(classes="spread"):
             widgets.button("As found", as_found)
             ui.space()

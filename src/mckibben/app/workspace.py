@@ -68,9 +68,12 @@ class Workspace:
         """Become the one server of this folder until this process ends; `DataError` if it cannot."""
         from filelock import FileLock, Timeout
 
+        if os.name == "posix" and self.folder.stat().st_uid != os.getuid():
+            problem = "this folder is another user's"
+            raise DataError(problem, file=self.folder, remedy="give one of your own")
         self._owner = FileLock(self.folder / ".owner", timeout=0, mode=0o600)
         with written(self.folder):
-            self.folder.chmod(0o700)  # which another user may not
+            self.folder.chmod(0o700)
             try:
                 self._owner.acquire()
             except Timeout:

@@ -100,9 +100,9 @@ def laid_out(
     if READERS.get(path.suffix.casefold()) != "text":
         problem, remedy = "only text has lines and an encoding", "leave both as found"
         raise DataError(problem, file=path, remedy=remedy)
-    from mckibben.files import text
-
-    return text.laid_out(file, path, header, skip, encoding)
+    text = _module(path, READERS, "read")
+    found: BufferedReader = text.laid_out(file, path, header, skip, encoding)
+    return found
 
 
 def bag(folder: Path) -> list[Table]:

@@ -68,7 +68,7 @@ def _prepare(state: State) -> None:
             following.plants(state.workspace, _able(state))
 
 
-@parts.steady(lambda state: (state.workspace.models(), state.model, state.workspace.channels()))
+@parts.steady("models")
 def page(state: State) -> None:
     """Show the tab that is chosen."""
     able = following.having(state.workspace, "inverse")
@@ -322,7 +322,7 @@ async def _start(state: State, name: str) -> None:
 # -- what came of it ----------------------------------------------------------------------------------
 
 
-@parts.steady(lambda state: (parts.made(state, "runs", "loop"), state.model, parts.sides(state)))
+@parts.steady("runs", jobs=["loop"])
 def followed(state: State) -> None:
     """Show the motion, what came of it, and the errors of all runs of the model."""
     wish, runs, reference = _wish(state), _runs(state), _reference(state)

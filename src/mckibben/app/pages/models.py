@@ -86,7 +86,7 @@ def _compared(state: State) -> tuple[Channels, list[Json]]:
 # -- fits that run, or did not work ----------------------------------------------------------------
 
 
-@parts.steady(lambda state: (parts.made(state, "models", "fit"), state.workspace.entries()))
+@parts.steady("models", jobs=["fit"])
 def fits(state: State) -> None:
     """Show the fits that wait, run or did not work; those that did are in the leaderboard."""
     jobs = parts.jobs_of(state, ["fit"])
@@ -133,15 +133,7 @@ def _empty(state: State) -> None:
 # -- leaderboard -----------------------------------------------------------------------------------
 
 
-def _columns(rows: list[Json], outputs: Sequence[str] = ()) -> tuple[Column, ...]:
-    return columns_of(rows, rows[0]["unit"], outputs, rows[0]["chosen_by"])
-
-
-def _board_key(state: State) -> Any:
-    return state.workspace.results(), state.workspace.models(), state.model, parts.sides(state)
-
-
-@parts.steady(_board_key)
+@parts.steady("models", "results")
 def board(state: State) -> None:
     """Show the models that compare, best first, and behind a fold-out those of other channels."""
     _, rows = _compared(state)
@@ -152,7 +144,8 @@ def board(state: State) -> None:
     with widgets.card("Leaderboard") as card:
         mark(card, "leaderboard")
         if rows:
-            shown = [one for one in _columns(rows) if one.key in FIRST]
+            every = columns_of(rows, rows[0]["unit"], (), rows[0]["chosen_by"])
+            shown = [one for one in every if one.key in FIRST]
             lines = []
             for row in rows:
                 errors = [(one.flag(row), one.value(row)) for one in shown]
@@ -164,8 +157,8 @@ def board(state: State) -> None:
             ui.label("No model of these inputs and outputs is fitted yet.").classes("muted")
         if others:
             about = {row["name"]: row for row in state.workspace.results()}
-            of = (about.get(name, {}) for name in others)
-            words = [" ".join(str(row.get(key, "")) for key in ("output", "input")) for row in of]
+            rows = [about.get(name, {}) for name in others]
+            words = [f"{row.get('output', '')} {row.get('input', '')}" for row in rows]
             with widgets.details(f"{len(others)} of other channels, or not fitted here"):
                 lines = [list(line) for line in zip(others, words, strict=True)]
                 _choosable(state, ["Model", "Output, input"], lines, others)
@@ -205,13 +198,13 @@ def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
     ui.label(typeset_within(said(" ".join(notes)))).classes("muted")
 
 
-@parts.steady(_board_key)
+@parts.steady("models", "results")
 def figures(state: State) -> None:
     """Show all figures of all models behind a fold-out, and what comes next."""
     sides, rows = _compared(state)
     if not rows:
         return
-    found = _columns(rows, sides.outputs)
+    found = columns_of(rows, rows[0]["unit"], sides.outputs, rows[0]["chosen_by"])
     with widgets.details("All figures of all models"):
         texts = [
             [f"{typeset(one.text(row))} {one.flag(row)}".strip() for one in found] for row in rows
@@ -228,12 +221,7 @@ def figures(state: State) -> None:
 # -- the model that is chosen ----------------------------------------------------------------------
 
 
-def _closer_key(state: State) -> Any:
-    jobs = [(job.name, job.state) for job in parts.jobs_of(state, ["check", "calibrate"])]
-    return jobs, parts.sides(state), state.model, parts.versions(state), state.workspace.digest()
-
-
-@parts.steady(_closer_key)
+@parts.steady("models", "banded", "results", jobs=["check", "calibrate"], own=True)
 def closer(state: State) -> None:
     """Show the model that is chosen, in tabs."""
     sides, _ = _compared(state)
@@ -276,12 +264,8 @@ def _summary(row: Json) -> str:
     text = f"Test RMSE {number(test['rmse'], 3)} {unit}"
     if ends := test.get("rmse_interval"):
         text += f" ({number(ends[0], 2)} to {number(ends[1], 2)} in 95 %)"
-    inverse = {"exact": "exact inverse", "solved": "inverse by solving", "none": "no inverse"}
-    about = [
-        text,
-        inverse.get(row.get("inverse") or "", ""),
-        f"{row.get('n_parameters')} parameters",
-    ]
+    inverse = choosing.INVERSES.get(row.get("inverse") or "", "")
+    about = [text, inverse, f"{row.get('n_parameters')} parameters"]
     return typeset_within(" · ".join(filter(None, about)))
 
 
@@ -312,7 +296,12 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
         ui.label(text).classes("muted")
         return
     train = workspace.with_role("train")
-    key = [name, workspace.digest(), *parts.versions(state)[:2]]
+    paths = [workspace.path(kind, f"{name}.json") for kind in ("models", "banded")]
+    key = [
+        name,
+        workspace.digest(),
+        *(path.is_file() and path.stat().st_mtime_ns for path in paths),
+    ]
     if tab == "parameters":
         fitted = [run for run in train if {*inputs, *outputs} <= {*run.channels}]
         on = fitted or [run for run, *_ in runs.values()]
@@ -363,20 +352,18 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
 def _shade(run: Recording, low: Array, high: Array) -> Json:
     """Return a band about the residual over time, as a trace."""
     (t, lower), (back, upper) = (over_time(run.time, end, POINTS) for end in (low, high))
-    x, y = np.append(t, back[::-1]), np.append(lower, upper[::-1])
+    outline = {"x": np.append(t, back[::-1]), "y": np.append(lower, upper[::-1])}
     trace = {"type": "scatter", "mode": "lines", "name": "band", "fill": "toself", "opacity": 0.3}
-    trace |= {"x": interactive.packed(x), "y": interactive.packed(y), "hoverinfo": "skip"}
-    return trace | {"fillcolor": "--series-1", "line": {"width": 0}}
+    trace |= {"hoverinfo": "skip", "fillcolor": "--series-1", "line": {"width": 0}}
+    return trace | outline
 
 
 def _parameters(found: ModelDescription) -> None:
-    for item in results.description(found):
-        if isinstance(item, Table):  # symbols belong to equations, which the report has
-            heads, rows = (
-                [[a, *rest] for a, _, *rest in some] for some in ([item.headings], item.rows)
-            )
-            item = replace(item, headings=heads[0], rows=rows)
-        with mark(ui.element("div").classes("stack"), "parameters"):
+    with mark(ui.element("div").classes("stack"), "parameters"):
+        for item in results.description(found):
+            if isinstance(item, Table):  # symbols belong to equations, which the report has
+                head, *rows = ([a, *rest] for a, _, *rest in (item.headings, *item.rows))
+                item = replace(item, headings=head, rows=rows)
             widgets.items([item])
 
 

@@ -15,17 +15,28 @@ from mckibben.app.terms import said
 from mckibben.app.widgets import mark
 
 
-def steady(key: Callable[[State], Any]) -> Callable[[Callable[[State], None]], Any]:
-    """Make a part of a page that is built again only when its key is another.
+def steady(
+    *kinds: str, jobs: Sequence[str] = (), own: bool = False
+) -> Callable[[Callable[[State], None]], Any]:
+    """Make a part of a page that is built again only when it must be; `refresh` does so at once.
 
-    Fields in it outlive what happens to jobs, and no click on it is lost. `refresh` builds it at once.
+    That is where the model, channels or data are others, or files of some kinds (with ``own`` only
+    those of the model), or jobs. Fields in it outlive what happens else, and no click on it is lost.
     """
+
+    def now(state: State) -> Any:
+        files = [
+            (kind, name, state.workspace.path(kind, f"{name}.json").stat().st_mtime_ns)
+            for kind in kinds
+            for name in state.workspace.names(kind)
+            if name == state.model or not own
+        ]
+        going = [(job.name, job.state) for job in jobs_of(state, jobs)]
+        sides = state.model, (*state.inputs,), (*state.outputs,), state.load
+        return widgets.theme.dark, sides, state.workspace.digest(), files, going
 
     def decorate(build: Callable[[State], None]) -> Any:
         known: list[Any] = [None]
-
-        def now(state: State) -> Any:
-            return widgets.theme.dark, key(state)
 
         @ui.refreshable
         @widgets.shielded
@@ -50,26 +61,9 @@ def steady(key: Callable[[State], Any]) -> Callable[[Callable[[State], None]], A
     return decorate
 
 
-def sides(state: State) -> Any:
-    """Return the channels that are chosen, as a key."""
-    return (*state.inputs,), (*state.outputs,), state.load
-
-
-def versions(state: State) -> list[int]:
-    """Return when the files of the chosen model were written; 0 for one that is not there."""
-    kinds = ("models", "banded", "results")
-    paths = [state.workspace.path(kind, f"{state.model}.json") for kind in kinds]
-    return [path.stat().st_mtime_ns if path.is_file() else 0 for path in paths]
-
-
 def jobs_of(state: State, kinds: Sequence[str]) -> list[Job]:
     """Return the jobs of some kinds that are not done."""
     return [job for job in state.jobs.jobs.values() if job.kind in kinds and job.state != "done"]
-
-
-def made(state: State, kind: str, work: str) -> Any:
-    """Return what is known of the results of a kind, and of the jobs that make them, as a key."""
-    return state.workspace.names(kind), [(job.name, job.state) for job in jobs_of(state, [work])]
 
 
 # -- choices ----------------------------------------------------------------------------------------

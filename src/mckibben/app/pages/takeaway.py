@@ -29,11 +29,7 @@ def build(state: State) -> None:
         widgets.next_step("Run it on your rig, then review its log.", "Compensate", "/compensate")
 
 
-def _key(state: State) -> Any:
-    return state.workspace.models(), state.model, [one.name for one in state.workspace.entries()]
-
-
-@parts.steady(_key)
+@parts.steady("models", "recordings")
 def page(state: State) -> None:
     """Show the list."""
     models, use = state.workspace.models(), ""

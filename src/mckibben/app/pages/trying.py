@@ -38,7 +38,7 @@ def force(state: State, names: list[str]) -> None:
             parts.select(state, "compensate.recording", of, "Recording", estimated.refresh)
 
 
-@parts.steady(lambda state: (parts.versions(state), state.workspace.digest()))
+@parts.steady("models", own=True)
 def estimated(state: State) -> None:
     """Show a force that is estimated over a recording, beside what was measured."""
     workspace, recording = state.workspace, str(state.chosen.get("compensate.recording") or "")
@@ -63,7 +63,8 @@ def estimated(state: State) -> None:
 
     with widgets.card("Estimated force"):
         if recording:
-            key = "force", name, *parts.versions(state), recording, workspace.digest()
+            written = workspace.path("models", f"{name}.json").stat().st_mtime_ns
+            key = "force", name, written, recording, workspace.digest()
             later(key, lambda: following.estimate(workspace, name, recording), show, height=420)
         else:
             text = (
@@ -110,7 +111,7 @@ async def received(state: State, event: events.UploadEventArguments) -> tuple[An
     return path, found[0]
 
 
-@parts.steady(lambda state: parts.made(state, "reviews", "review"))
+@parts.steady("reviews", jobs=["review"])
 def reviewed(state: State) -> None:
     """Show where the error of a logged loop comes from."""
     found = following.newest(state.workspace, "reviews")

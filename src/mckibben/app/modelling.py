@@ -179,7 +179,7 @@ def fit(
     )
     board, (row,) = last.board, last.board.rows
     if row.reason is not None or row.block is None:
-        raise ModelError(row.reason or "it gave no model", remedy="try other settings")
+        raise ModelError((row.reason or "it gave no model: try other settings").rstrip("."))
     about: Json = {"model": model, "input": board.input, "output": board.output, "load": load}
     about["settings"] = settings or {}
     olds = {name: workspace.read("results", name) or {} for name in workspace.names("results")}

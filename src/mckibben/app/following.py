@@ -97,12 +97,12 @@ def uses(workspace: Workspace, name: str) -> dict[str, str]:
     from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 
     def able(use: str) -> bool:
-        if use == "learned":  # training takes minutes
-            parts = getattr(workspace.model(name), "parts", ())
-            return any(type(part) is FuzzyNetwork for part in parts)
         with suppress(MckibbenError):
-            return use == "model" or bool(made(workspace, name, use, {}))
-        return False
+            block = workspace.model(name)
+            if use == "learned":  # training takes minutes
+                return any(type(part) is FuzzyNetwork for part in getattr(block, "parts", ()))
+            return bool(made(workspace, name, use, {}))
+        return use == "model"
 
     tried = [use for use in USES if use != "banded"]
     known = {*of_model(workspace, name, "uses", lambda: [*filter(able, tried)])}

@@ -155,15 +155,16 @@ def guarded(action: Callable[..., Any]) -> Callable[..., Awaitable[None]]:
 
     @wraps(action)  # so that it is called with an event if the action takes one
     async def act(*given: Any) -> None:
-        try:
-            found = action(*given)
-            if inspect.iscoroutine(found):
-                await found
-        except MckibbenError as error:
-            error_toast(error)
-        except Exception as error:
-            traceback.print_exception(error)
-            error_toast(unforeseen(error))
+        with context.client:  # what was clicked may be gone before this is done
+            try:
+                found = action(*given)
+                if inspect.iscoroutine(found):
+                    await found
+            except MckibbenError as error:
+                error_toast(error)
+            except Exception as error:
+                traceback.print_exception(error)
+                error_toast(unforeseen(error))
 
     return act
 
@@ -226,10 +227,9 @@ def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endi
     return found.props(f'flat accept="{endings}"').classes("upload")
 
 
-async def download(path: Path, client: Any = None) -> None:
-    """Hand a file over to the browser of a client; that of the click by default."""
-    client = client or context.client  # what was clicked may be built again meanwhile
-    client.download(await run.io_bound(path.read_bytes) or b"", path.name)
+async def download(path: Path) -> None:
+    """Hand a file over to the browser, through the page's own connection."""
+    ui.download.content(await run.io_bound(path.read_bytes) or b"", path.name)
 
 
 # -- what is shown -----------------------------------------------------------------------------------

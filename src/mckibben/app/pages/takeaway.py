@@ -6,7 +6,7 @@ import asyncio
 from functools import partial
 from typing import Any
 
-from nicegui import context, ui
+from nicegui import ui
 
 from mckibben.app import following, forms, taking, widgets
 from mckibben.app.pages import parts
@@ -86,7 +86,6 @@ def _button(state: State, key: str, thing: Thing) -> None:
     """Make the button that writes a thing in a job, and hands it over when it is done."""
 
     async def take() -> None:
-        client = context.client  # the button may be gone when it is done
         values, of = state.chosen[f"takeaway.{key}"], _of(state)
         options = forms.given(thing.kind, values) if thing.kind else {}
         plain = vars(thing.kind()) if thing.kind else {}
@@ -103,7 +102,7 @@ def _button(state: State, key: str, thing: Thing) -> None:
         if job.state != "done":
             problem = f"{thing.title}: {job.message or job.state}"
             raise DataError(problem, remedy="see its options")
-        await widgets.download(path, client)
+        await widgets.download(path)
 
     make = widgets.primary if key == "report" else widgets.button
     button = widgets.labelled(make("Download", take, "download"), f"Download {thing.title}")

@@ -64,33 +64,22 @@ def against(rows: Sequence[Json]) -> str:
         return SimpleNamespace(reason=None, skill_least=row.get("skill_least"), test_error=error)
 
     current = [row for row in rows if row["current"] and row.get("constant")]
-    if not current:
-        return ""
-    first, mean = current[0], current[0]["constant"]
-    where = recommended([*map(judged, current)], judged(mean))[1]
-    return "" if where is None else words.not_recommended(where, first, mean, first["unit"])
+    for first in current[:1]:
+        mean = first["constant"]
+        where = recommended([*map(judged, current)], judged(mean))[1]
+        if where is not None:
+            return words.not_recommended(where, first, mean, first["unit"])
+    return ""
 
 
 @dataclass(frozen=True)
 class Offered:
-    """The models that apply to the recordings.
-
-    Parameters
-    ----------
-    needs : tuple of Need
-        By what they are for, those tried first to the front.
-    others : dict of str to str
-        The others by full name, and why not.
-    split : str
-        What is fitted to, and tested on.
-    work : float
-        Samples of a fit with its cross-validation, times inputs and outputs.
-    """
+    """The models that apply to the recordings by what they are for, and why the others do not."""
 
     needs: tuple[Need, ...]
     others: dict[str, str]
-    split: str
-    work: float
+    split: str  # what is fitted to, and tested on
+    work: float  # samples of a fit with its cross-validation, times inputs and outputs
 
     @property
     def models(self) -> list[str]:

@@ -278,7 +278,7 @@ def _compensator(state: State, name: str) -> None:
                 forms.fields(InvertOptions, asked, values_of(state, form))
         plants = following.plants(workspace, name)
         plant = parts.select(state, "compensate.plant", plants, "Tried on", page.refresh)
-        fitting = following.laws(workspace, name, plant)
+        fitting = following.laws(workspace, name, plant) if plant else {}
         chosen = [x for x in state.chosen.get("compensate.laws", USUAL) if x in fitting]
         state.chosen["compensate.laws"] = chosen or [*fitting][:1]
         laws = ui.select(fitting, multiple=True, label="Controllers").props("dense outlined")

@@ -47,13 +47,6 @@ class FigureOptions:
     format: Annotated[Literal["pdf", "svg", "png"], Option("Of the file.")] = "pdf"
 
 
-@dataclass(frozen=True)
-class RecordingOptions:
-    """Options of recordings."""
-
-    format: Annotated[Literal["csv", "parquet"], Option("Of the files.")] = "csv"
-
-
 # -- jobs -------------------------------------------------------------------------------------------
 
 
@@ -118,8 +111,7 @@ def recordings(workspace: Workspace, tell: Tell, *, file: str, options: Json, of
         for role in ("train", "test"):
             (folder / role).mkdir()
             for run in workspace.with_role(role):
-                ending = options.get("format", RecordingOptions.format)
-                write(run, folder / role / f"{run.name}.{ending}")
+                write(run, folder / role / f"{run.name}.csv")
 
     _zip(workspace.path("takeaway", file), fill)
     return f"{file} is written"
@@ -183,7 +175,7 @@ THINGS = {
     ),
     "recordings": Thing(
         "Recordings", "As they are after cuts and filters, by role, with units.",
-        *(recordings, "recordings.zip", RecordingOptions, ("format",)),
+        *(recordings, "recordings.zip"),
     ),
 }  # fmt: skip
 

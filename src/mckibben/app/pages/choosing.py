@@ -39,7 +39,9 @@ def choose(state: State) -> None:
     ):
         mark(place, "drawer")
         with widgets.row(classes="spread"):
-            ui.label("Fit models").classes("subtitle").props('role=heading aria-level="2"')
+            with ui.element("div"):
+                ui.label("Fit models").classes("subtitle").props('role=heading aria-level="2"')
+                ui.link("Change recordings for training and test, or channels →", "/")
             mark(widgets.icon_button("close", "Close", drawer.close), "close-drawer")
         key = "offered", state.workspace.digest(), sides
         offer = partial(modelling.offered, state.workspace, sides)
@@ -62,7 +64,6 @@ class _Choice:
             with ui.element("div"):
                 ui.label(f"{', '.join(sides.outputs)} of {', '.join(sides.inputs)}{told}")
                 ui.label(f"{offered.split[:1].upper()}{offered.split[1:]}.").classes("muted")
-                ui.link("Change recordings for training and test, or channels →", "/")
             shared = ui.checkbox("Allow the same data in training and test").props("dense")
             shared.bind_value(state.chosen, "models.shared")
             with widgets.row():

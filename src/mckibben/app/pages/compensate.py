@@ -331,10 +331,9 @@ def followed(state: State) -> None:
     chosen = state.chosen.get("compensate.run")
     chosen = chosen if chosen in of_it else next(iter(of_it), "")
     with widgets.card("What is wanted, and what came of it" if chosen else "What is wanted"):
-        order = [*dict.fromkeys([chosen, *of_it])][:DRAWN] if chosen else []
-        _plot(state, reference, reach, {run: runs[run] for run in order})
-        doubt = modelling.against(modelling.comparable(state.workspace, state.sides))
-        if doubt:
+        drawn = sorted(of_it, key=lambda run: run != chosen)[:DRAWN]
+        _plot(state, reference, reach, {run: runs[run] for run in drawn})
+        if doubt := modelling.against(modelling.comparable(state.workspace, state.sides)):
             widgets.error_box(doubt)
         together = "; each channel by itself, all at once less" if len(reach) > 1 else ""
         ui.label(f"Shaded: what the model reaches{together}.").classes("muted")

@@ -296,12 +296,7 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
         ui.label(text).classes("muted")
         return
     train = workspace.with_role("train")
-    paths = [workspace.path(kind, f"{name}.json") for kind in ("models", "banded")]
-    key = [
-        name,
-        workspace.digest(),
-        *(path.is_file() and path.stat().st_mtime_ns for path in paths),
-    ]
+    key = workspace.digest(), parts.stamps(workspace, "models", "banded", of=name)
     if tab == "parameters":
         fitted = [run for run in train if {*inputs, *outputs} <= {*run.channels}]
         on = fitted or [run for run, *_ in runs.values()]

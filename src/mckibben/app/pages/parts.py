@@ -13,6 +13,7 @@ from mckibben.app.jobs import Job, Work
 from mckibben.app.state import State, view
 from mckibben.app.terms import said
 from mckibben.app.widgets import mark
+from mckibben.app.workspace import Workspace
 
 
 def steady(
@@ -25,12 +26,7 @@ def steady(
     """
 
     def now(state: State) -> Any:
-        files = [
-            (kind, name, state.workspace.path(kind, f"{name}.json").stat().st_mtime_ns)
-            for kind in kinds
-            for name in state.workspace.names(kind)
-            if name == state.model or not own
-        ]
+        files = stamps(state.workspace, *kinds, of=state.model if own else "")
         going = [(job.name, job.state) for job in jobs_of(state, jobs)]
         sides = state.model, (*state.inputs,), (*state.outputs,), state.load
         return widgets.theme.dark, sides, state.workspace.digest(), files, going
@@ -59,6 +55,16 @@ def steady(
         return made
 
     return decorate
+
+
+def stamps(workspace: Workspace, *kinds: str, of: str = "") -> tuple[Any, ...]:
+    """Return when files of some kinds were written, or those of one name, as a key."""
+    return tuple(
+        (kind, name, workspace.path(kind, f"{name}.json").stat().st_mtime_ns)
+        for kind in kinds
+        for name in workspace.names(kind)
+        if of in ("", name)
+    )
 
 
 def jobs_of(state: State, kinds: Sequence[str]) -> list[Job]:

@@ -63,8 +63,8 @@ def estimated(state: State) -> None:
 
     with widgets.card("Estimated force"):
         if recording:
-            written = workspace.path("models", f"{name}.json").stat().st_mtime_ns
-            key = "force", name, written, recording, workspace.digest()
+            stamps = parts.stamps(workspace, "models", of=name)
+            key = "force", stamps, recording, workspace.digest()
             later(key, lambda: following.estimate(workspace, name, recording), show, height=420)
         else:
             text = (

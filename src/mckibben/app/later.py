@@ -33,7 +33,9 @@ def later(
 
     async def fill() -> None:
         try:
-            _made[key] = await run.io_bound(make)
+            if (made := await run.io_bound(make)) is None:
+                return  # the page was left
+            _made[key] = made
         except MckibbenError as error:
             _made[key] = error
         while len(_made) > MOST:

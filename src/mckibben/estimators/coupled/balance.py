@@ -351,7 +351,8 @@ class BalanceEstimator(CoupledEstimator):
         if belief is not None:
             starts = (search.descend(one, TOWARDS, Tracker()) for one in (z, self._likely(search)))
             z = min(starts, key=search.cost)
-        tried = np.array([self._tried(term) for term in structure.terms])
+        timeless = () if structure.bench.step else ("filling", "venting")
+        tried = np.array([self._tried(t) and t.kind not in timeless for t in structure.terms])
         last = np.array([term.kind in LAST for term in structure.terms])
         pushed = structure.n > 1 or any(held(data, run) for run in data.runs)
         for number in range(ROUNDS):

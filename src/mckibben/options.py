@@ -252,6 +252,9 @@ class ReadOptions:
         float | None,
         Option("Length at displacement 0: converts contraction, displacement, length.", "MM"),
     ] = None
+    header: Annotated[int, Option("Line of a text with the names of columns.", "LINE")] = 0
+    skip: Annotated[int, Option("Lines after the header that are left out.", "N")] = 0
+    encoding: Annotated[str | None, Option("Encoding of a text. Default: as found.", "NAME")] = None
     between: Annotated[
         tuple[float, float] | None,
         Option("Part of every recording [s]; either may be left out.", "START:END", "", span),
@@ -282,6 +285,9 @@ class ReadOptions:
             "raw": self.raw,
             "rest_length": self.rest_length,
             "most": self.most,
+            "header": self.header,
+            "skip": self.skip,
+            "encoding": self.encoding,
         }
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from mckibben import Recording, example, workflow
-from mckibben.app.workspace import Role, Workspace
+from mckibben.app.steps import Role
+from mckibben.app.workspace import Workspace
 from mckibben.arrays import Array
 from mckibben.rigs import load_rig
 

@@ -79,9 +79,9 @@ def test_a_file_that_is_not_understood_is_corrected(
         seen(page, "importing")
         page.keyboard.press("Escape")
         upload(page, "another.csv", table(gap=True))
-        page.get_by_text("How is it read?").nth(1).wait_for(timeout=SLOW)
+        page.get_by_text("Not read yet either: another.csv").wait_for(timeout=SLOW)
         gone(page, "importing")
-        page.get_by_text("How is it read?").first.click()
+        page.get_by_text("How is it read?").click()
         dialog = seen(page, "importing")
         assert not seen(page, "import").is_enabled()
         dialog.locator(".q-select").filter(has_text="Gaps").click()
@@ -93,10 +93,10 @@ def test_a_file_that_is_not_understood_is_corrected(
         seen(page, "over-time")
         gone(page, "importing")
         entry, other = sorted(Workspace(folder).entries(), key=lambda one: one.name != "réglé-1")
-        assert other.way == entry.way
+        assert other.reading == entry.reading
         found = Workspace(folder).recording(entry.name)
         assert entry.upload == "réglé-1.csv"
-        assert entry.way.gaps == "interpolate"
+        assert entry.reading.gaps == "interpolate"
         assert list(found.channels) == ["pressure", "displacement"]
         assert found["pressure"].max() == pytest.approx(5.9)
         # and it can be read in another way later
@@ -124,8 +124,8 @@ def test_errors_are_said_and_keys_suffice(browser: Any, bench: Workbench) -> Non
 SLOW_READING = """
 import time
 from mckibben.app import workspace
-read = workspace.read_file
-workspace.read_file = lambda *given: time.sleep(5) or read(*given)
+read = workspace.understand
+workspace.understand = lambda *given: time.sleep(5) or read(*given)
 """
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mckibben.app.guard import BODY, HEAD, PRECAUTIONS
+from mckibben.app.guard import BODY, HEAD
 from tests.app.browsing import Workbench, workbench
 
 
@@ -69,7 +69,7 @@ def test_it_listens_on_loopback_alone(bench: Workbench) -> None:
     "host", ["evil.example", "evil.example:{port}", "127.0.0.1.evil.example", "["]
 )
 def test_other_hosts_are_refused(bench: Workbench, cookie: str, host: str) -> None:
-    assert ask(bench, Cookie=cookie, Host=host.format(port=bench.port)).status == 403
+    assert ask(bench, Cookie=cookie, Host=host.format(port=bench.port)).status == 400
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", "null"])
@@ -92,27 +92,11 @@ def test_heads_are_bounded_before_the_token(bench: Workbench) -> None:
     assert answer == b"" or answer.startswith(b"HTTP/1.1 400")
 
 
-def test_every_answer_forbids_what_is_foreign(bench: Workbench, cookie: str) -> None:
-    static = next(
-        word for word in ask(bench, Cookie=cookie).body.decode().split('"') if word.endswith(".css")
-    )
-    for path, headers in (("/", {"Cookie": cookie}), (static, {"Cookie": cookie}), ("/", {})):
-        answer = ask(bench, path, **headers)
-        for name, value in PRECAUTIONS.items():
-            assert answer.headers.get_all(name.decode()) == [value.decode()]
-        (policy,) = answer.headers.get_all("content-security-policy") or []
-        rules = {rule.split()[0]: rule.split()[1:] for rule in policy.split("; ")}
-        own = {"'self'", "'none'", "'unsafe-inline'", "'unsafe-eval'", "data:", "blob:"}
-        own |= {f"ws://{host}:{bench.port}" for host in ("127.0.0.1", "localhost")}
-        assert {source for sources in rules.values() for source in sources} <= own
-        assert {"default-src", "connect-src", "script-src", "frame-ancestors"} <= {*rules}
-
-
 def test_bodies_are_bounded(bench: Workbench, cookie: str) -> None:
     with socket.create_connection(("127.0.0.1", bench.port), timeout=30) as link:
         head = f"POST / HTTP/1.1\r\nHost: 127.0.0.1:{bench.port}\r\nCookie: {cookie}\r\n"
         link.sendall(f"{head}Content-Length: {BODY + 1}\r\n\r\n".encode())
-        assert link.recv(100).startswith((b"HTTP/1.1 413", b"HTTP/1.1 405"))
+        assert link.recv(100).startswith(b"HTTP/1.1 413")
 
 
 def test_files_of_the_folder_are_not_served(bench: Workbench, cookie: str) -> None:

@@ -35,6 +35,8 @@ HARMLESS = {
         for name in ("--rate", "--rest-length", "--resample")
         for value in NUMBERS
     ),
+    *(("invert", name, value) for name in ("--header", "--skip") for value in WHOLE[:3]),
+    *(("invert", "--encoding", value) for value in WORDS),
     ("track", "--slew", "1e300"),
     ("export c", "--sample-time", "1e300"),
     ("export fmu", "--sample-time", "1e300"),

@@ -303,3 +303,13 @@ def test_what_is_below_a_table_is_left_out(tmp_path: Path, below: str) -> None:
     recording = one(file(tmp_path, f"Zeit (s);Druck (bar);Weg (mm)\n{samples}\n\n{below}\n"))
     assert recording.n_samples == N
     assert any(below[:4] in note for note in recording.notes)
+
+
+def test_header_lines_after_it_and_encoding_can_be_given(tmp_path: Path) -> None:
+    head = "Prüfstand\na,b\ndruck [bar],weg [mm]\nx,y\n\n".encode("cp1252")
+    body = "\n".join(f"{p},{x}" for p, x in zip(P, X, strict=True))
+    path = file(tmp_path, head + body.encode())
+    found = one(path, header=3, skip=2, encoding="cp1252")
+    assert found["pressure"].tolist() == P
+    for wrong in ({"header": 1000}, {"skip": 1000}, {"encoding": "none"}, {"header": -1}):
+        refused(path, **wrong)

@@ -7,33 +7,28 @@ reviews of logs gave is in ``runs`` and ``reviews``: numbers as JSON, samples as
 from __future__ import annotations
 
 import math
-import warnings
+import zlib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mckibben import registry
 from mckibben.app.jobs import Tell
+from mckibben.app.modelling import Json, stored_items
 from mckibben.app.workspace import Workspace
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
-from mckibben.errors import DataError, MckibbenError, MckibbenWarning, ModelError
+from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.recording import Recording
 
 if TYPE_CHECKING:
     from mckibben.studying.simulating import Simulation
 
-Json = dict[str, Any]
-
 Points = list[tuple[float, float]]
 """Time [s] and value, times rising."""
-
-Ends = tuple[float, float]
-"""Lowest and highest."""
 
 MOTIONS = {"sine": "Sine", "triangle": "Triangle", "steps": "Staircase", "random": "Random"}
 
@@ -61,9 +56,6 @@ SETTINGS = {
 
 STEP = 0.02
 """Time between steps, where neither a model nor a recording has one [s]."""
-
-LEAST = 40
-"""Steps that a motion has by default, or more."""
 
 MOST_SAMPLES = 1_000_000
 """Of a reference."""
@@ -106,16 +98,16 @@ def uses(workspace: Workspace, name: str) -> dict[str, str]:
 
     def able(use: str) -> bool:
         with suppress(MckibbenError):
+            block = workspace.model(name)
             if use == "learned":  # training takes minutes
-                parts = getattr(workspace.model(name), "parts", ())
-                return any(type(part) is FuzzyNetwork for part in parts)
+                return any(type(part) is FuzzyNetwork for part in getattr(block, "parts", ()))
             return bool(made(workspace, name, use, {}))
-        return False
+        return use == "model"
 
-    tried = [use for use in USES if use not in ("model", "banded")]
-    known = ["model", *of_model(workspace, name, "uses", lambda: [*filter(able, tried)])]
+    tried = [use for use in USES if use != "banded"]
+    known = {*of_model(workspace, name, "uses", lambda: [*filter(able, tried)])}
     if workspace.path("banded", f"{name}.json").is_file():
-        known = [*known, "banded"]
+        known.add("banded")
     return {use: words for use, words in USES.items() if use in known}
 
 
@@ -140,8 +132,8 @@ def asked_for(workspace: Workspace, name: str) -> tuple[dict[str, Channel], dict
     def make() -> Any:
         block = made(workspace, name, "inverse", {})
         channels = {channel.name: channel for channel in block.inputs}
-        held = {key: channels[key] for key in block.scheduling if key in channels}
-        return {key: one for key, one in channels.items() if key not in held}, held
+        held = {key: channels.pop(key) for key in block.scheduling if key in channels}
+        return channels, held
 
     channels, held = of_model(workspace, name, "asked", make)
     return channels, held
@@ -171,14 +163,13 @@ def recorded(workspace: Workspace, name: str) -> Array:
     return np.concatenate(runs) if runs else np.array([0.0, 1.0])
 
 
-def reach(workspace: Workspace, name: str) -> dict[str, Ends]:
+def reach(workspace: Workspace, name: str) -> dict[str, tuple[float, float]]:
     """Return what of every channel of a reference can be reached; what is not known was recorded."""
 
-    def make() -> dict[str, Ends]:
+    def make() -> dict[str, tuple[float, float]]:
         block = workspace.model(name)
-        ends = zip(*block.reachable(), strict=True)
-        known = dict(zip((c.name for c in block.outputs), ends, strict=True))
-        found = {}
+        names = [channel.name for channel in block.outputs]
+        known, found = dict(zip(names, zip(*block.reachable(), strict=True), strict=True)), {}
         for channel in asked_for(workspace, name)[0]:
             low, high = map(float, known.get(channel, (np.nan, np.nan)))
             if not -np.inf < low < high < np.inf:
@@ -197,25 +188,16 @@ def wish(workspace: Workspace, name: str) -> Json:
     """Return a motion of the first channel that a model is asked for, from rest, well within reach."""
     step, cycle = pace(workspace, name)
     channels, held = asked_for(workspace, name)
-    middles = {key: float(f"{np.median(recorded(workspace, key)):.4g}") for key in held}
-    found: Json = {
-        "seconds": float(f"{max(2 * cycle, LEAST * step):.2g}"),
-        "cycles": 2,
-        "step": step,
-        "stored": "",
-    }
-    found |= {"held": middles, "now": next(iter(channels)), "channels": {}}
+    found: Json = {"seconds": float(f"{max(2 * cycle, 40 * step):.2g}"), "cycles": 2, "step": step}
+    found |= {"stored": "", "now": next(iter(channels)), "channels": {}}
+    found["held"] = {key: float(f"{np.median(recorded(workspace, key)):.4g}") for key in held}
     for channel, (low, high) in reach(workspace, name).items():
-        rest, margin = recorded(workspace, channel)[0], 0.1 * (high - low)
-        digits = 2 - math.floor(math.log10(high - low))
-        low, high = low + margin, high - margin
-        first = float(np.clip(rest, low, high))
-        ends = first, high if high - first >= first - low else low
-        own = dict(
-            zip(("first", "other"), (round(float(end), digits) for end in ends), strict=True)
-        )
+        digits, margin = 2 - math.floor(math.log10(high - low)), 0.1 * (high - low)
+        first = float(np.clip(recorded(workspace, channel)[0], low + margin, high - margin))
+        other = high - margin if high - first >= first - low else low + margin
+        own = {"first": round(first, digits), "other": round(other, digits), "points": []}
         kind = "sine" if channel == found["now"] else "hold"
-        found["channels"][channel] = {"kind": kind, **own, "points": []}
+        found["channels"][channel] = {"kind": kind, **own}
     shape(found)
     return found
 
@@ -269,10 +251,10 @@ def reference(
         if arrays[name].shape[1] < 2 or np.any(np.diff(arrays[name][0]) <= 0):
             problem = "a reference needs two points or more, with rising times"
             raise DataError(problem, channel=name, remedy="use a ready-made motion, or a file")
-    ends = [float(times[-1]) for times, _ in arrays.values()]
-    if not step > 0 or not 0 < max(ends, default=0.0) / step <= MOST_SAMPLES:
+    end = max((float(times[-1]) for times, _ in arrays.values()), default=0.0)
+    if not step > 0 or not 0 < end / step <= MOST_SAMPLES:
         raise DataError("the reference is too long", remedy="shorten it, or take longer steps")
-    grid = np.arange(0.0, max(ends) + 0.5 * step, step)
+    grid = np.arange(0.0, end + 0.5 * step, step)
     channels = {name: np.interp(grid, *own) for name, own in arrays.items()}
     channels |= {name: np.full(grid.size, value) for name, value in held.items()}
     return Recording(channels, step, {name: units[name] for name in channels if name in units})
@@ -282,14 +264,13 @@ def of_file(run: Recording, wanted: Collection[str]) -> dict[str, Points]:
     """Return a recording as points for channels that are asked for."""
     if run.sample_time is None:
         raise DataError("it has no time", remedy="add a column time_s")
-    found = {}
+    found, times = {}, (run.time - run.time[0]).tolist()
     for name in wanted:
         column = next((own for own in (f"reference_{name}", name) if own in run), None)
         if column is None:
             problem = "the compensator is asked for it, and the file has no such column"
             raise DataError(problem, channel=name, remedy=f"name a column {name}")
-        pairs = zip((run.time - run.time[0]).tolist(), run[column].tolist(), strict=True)
-        found[name] = list(pairs)
+        found[name] = [*zip(times, run[column].tolist(), strict=True)]
     return found
 
 
@@ -333,7 +314,7 @@ def plant_of(workspace: Workspace, plant: str) -> Any:
 
 
 def plants(workspace: Workspace, name: str) -> dict[str, str]:
-    """Return what a compensator can be tried on, in words; its own model comes last of the plants."""
+    """Return what a compensator can be tried on, in words; its own model comes last."""
     from mckibben.rigs import rig_names
 
     block = workspace.model(name)
@@ -353,8 +334,7 @@ def plants(workspace: Workspace, name: str) -> dict[str, str]:
     found[f"model {name}"] = f"{name} (itself: proves nothing)"
     key = f"plants {models} {workspace.channels()}"
     fitting = of_model(workspace, name, key, lambda: [*filter(fits, found)])
-    last = {"": "nothing: the commands alone, for your rig"}
-    return {plant: found[plant] for plant in fitting} | last
+    return {plant: found[plant] for plant in fitting}
 
 
 def laws(workspace: Workspace, name: str, plant: str) -> dict[str, str]:
@@ -378,6 +358,11 @@ def titled(law: str) -> str:
 # -- jobs -------------------------------------------------------------------------------------------
 
 
+def named(title: str, asked: Json) -> str:
+    """Return the name of a result, which is the same where the same is asked for again."""
+    return f"{title[:60]}-{zlib.crc32(repr(asked).encode()):08x}"
+
+
 def loop(workspace: Workspace, tell: Tell, *, name: str, asked: Json) -> str:
     """Let a controller follow a reference on a model or a virtual rig, beside no compensation."""
     from mckibben.files import write
@@ -391,7 +376,7 @@ def loop(workspace: Workspace, tell: Tell, *, name: str, asked: Json) -> str:
     run = track(block, wanted, controller=asked["controller"], progress=tell, **there)
     recording = run.uncompensated.beside(run.tracked.recording).with_meta(name=name)
     write(recording, workspace.path("runs", f"{name}.csv"))
-    content = run.to_dict() | asked | {"shown": kept(results.tracking(run))}
+    content = run.to_dict() | asked | {"items": stored_items(results.tracking(run))}
     content["units"] = {key: recording.units[key] for key in run.tracked.rmse}
     workspace.write("runs", name, content)
     if isinstance(run.controller, Block):
@@ -399,76 +384,26 @@ def loop(workspace: Workspace, tell: Tell, *, name: str, asked: Json) -> str:
     return "It is done"
 
 
-def commands(workspace: Workspace, tell: Tell, *, name: str, asked: Json) -> str:
-    """Write what a compensator commands for a reference, for a rig that is elsewhere."""
-    from mckibben.files import write
-    from mckibben.report.builder import Text
-
-    form, whole, notes = asked["form"], read_run(workspace, asked["reference"]), []
-    if form == "adaptive":
-        form = "inverse"
-        notes.append("These are the commands that it begins with: it learns from measurements.")
-    block = made(workspace, asked["model"], form, asked["settings"] if form != "inverse" else {})
-    ahead = block.samples_ahead  # it is given what is wanted so many samples early
-    names = [channel.name for channel in block.inputs]
-    given = {key: np.append(whole[key], np.repeat(whole[key][-1:], ahead)) for key in names}
-    units = {key: whole.units[key] for key in names}
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        found = block.simulate(Recording(given, whole.sample_time, units))
-    notes += [str(one.message) for one in caught if issubclass(one.category, MckibbenWarning)]
-    channels = {f"reference_{key}": whole[key] for key in whole.channels}
-    units = {f"reference_{key}": unit for key, unit in whole.units.items()} | dict(found.units)
-    channels |= {key: found[key][ahead:] for key in found.channels}
-    run = Recording(channels, whole.sample_time, units, meta={"name": name})
-    write(run, workspace.path("runs", f"{name}.csv"))
-    shown = [Text(list(dict.fromkeys(notes)), "note")]
-    workspace.write("runs", name, asked | {"shown": kept(shown)})
-    return "It is done"
-
-
-def review(workspace: Workspace, tell: Tell, *, name: str, asked: Json, refit: bool = False) -> str:
-    """Say how far a logged loop was off its reference, and why; with a refit, save that too."""
-    from mckibben.diagnosis.refit import Refit
+def review(workspace: Workspace, tell: Tell, *, name: str, asked: Json) -> str:
+    """Say how far a logged loop was off its reference, and why."""
     from mckibben.files import read
     from mckibben.report import results, words
     from mckibben.workflow import review as find
 
     runs = list(read(workspace.path("uploads", asked["log"]), informative=False))
-    block = workspace.model(asked["model"])
-    if refit:
-        needed = {channel.name for channel in (*block.inputs, *block.outputs)}
-        older = [run for run in workspace.with_role("train") if needed <= {*run.channels}]
-        runs += [r for r in older if not any(c.startswith("reference_") for c in r.channels)]
     ran = made(workspace, asked["model"], asked["form"], {})
-    found = find(runs, model=block, compensator=ran, refit=refit)
-    content = found.to_dict() | asked | {"shown": kept(results.review(found, DRAWN))}
-    if isinstance(found.refit, Refit):
-        found.refit.model.save(workspace.path("reviews", f"{name}-refit.json"))
-        content["refitted"] = True
-    workspace.write("reviews", name, content)
+    found = find(runs, model=workspace.model(asked["model"]), compensator=ran, refit=False)
+    items = stored_items(results.review(found, DRAWN))
+    workspace.write("reviews", name, found.to_dict() | asked | {"items": items})
     return words.reviewed(found)[0]
-
-
-def kept(items: Sequence[Any]) -> list[Json]:
-    """Return what is shown of a result as JSON; see `shown`."""
-    return [asdict(item) for item in items if item is not None]
-
-
-def shown(one: Mapping[str, Any]) -> list[Any]:
-    """Return what is shown of a stored result, or the sentences of one of an earlier version."""
-    from mckibben.report.builder import Figure, Table, Text
-
-    known: dict[str, Any] = {"text": Text, "table": Table, "figure": Figure}
-    sentences = one.get("sentences") or one.get("notes") or []
-    return [known[i["kind"]](**i) for i in one.get("shown", [])] or [Text(sentences)]
 
 
 def newest(workspace: Workspace, kind: str) -> dict[str, Json]:
     """Return runs or reviews by name, the newest first."""
-    names = sorted(
-        workspace.names(kind),
-        key=lambda name: -workspace.path(kind, f"{name}.json").stat().st_mtime_ns,
-    )
-    found = {name: workspace.read(kind, name) for name in names}
-    return {name: one for name, one in found.items() if one and {"log", "reference"} & {*one}}
+    written = {
+        n: workspace.path(kind, f"{n}.json").stat().st_mtime_ns for n in workspace.names(kind)
+    }
+    every = {
+        name: workspace.read(kind, name) for name in sorted(written, key=lambda n: -written[n])
+    }
+    return {name: one for name, one in every.items() if one and {"log", "reference"} & {*one}}

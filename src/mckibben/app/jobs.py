@@ -12,12 +12,11 @@ import time
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any
 
 from pydantic import Field, ValidationError
 
-from mckibben.app.steps import Plain, Text
+from mckibben.app.steps import Plain
 from mckibben.app.terms import said
 from mckibben.app.workspace import Workspace
 from mckibben.errors import MckibbenError, MckibbenWarning, unforeseen
@@ -42,45 +41,21 @@ Tell = Callable[..., None]
 Work = Callable[..., str]
 
 
-class Note(Plain):
-    """What a folder keeps of a job."""
+class Job(Plain):
+    """A job: ``kind`` is the name of its work, ``given`` the arguments of that, ``title`` for people.
 
-    kind: Text
-    state: Text
-    message: Text = ""
-    given: dict[str, Any] = Field(default_factory=dict)
-
-
-@dataclass
-class Job:
-    """A job: what it does, how far it is, how it went.
-
-    Parameters
-    ----------
-    name : str
-        Of its file.
-    kind : str
-        Name of the work, such as ``"fit"``.
-    title : str
-        What a person calls it.
-    given : dict
-        Arguments of the work.
-    state : {"waiting", "running", "done", "failed", "cancelled", "interrupted"}
-    message : str
-        How it went.
-    progress : list of (seconds, share, words or cost)
+    ``progress`` has seconds, shares, and words or costs; ``message`` says how it went.
     """
 
-    name: str
+    name: str = Field(exclude=True)
     kind: str
-    title: str
-    given: dict[str, Any] = field(default_factory=dict)
+    title: str = ""
+    given: dict[str, Any] = Field(default_factory=dict)
     state: str = WAITING
     message: str = ""
-    progress: list[tuple[float, float, Any]] = field(default_factory=list)
-    work: Work | None = field(default=None, repr=False)
-    process: Any = field(default=None, repr=False)
-    pipe: Any = field(default=None, repr=False)
+    progress: list[tuple[float, float, Any]] = Field(default_factory=list, exclude=True)
+    _process: Any = None
+    _pipe: Any = None
 
     @property
     def active(self) -> bool:
@@ -94,44 +69,31 @@ class Job:
 
 
 class Jobs:
-    """The jobs of a folder; unfinished ones of an earlier server are interrupted.
-
-    Parameters
-    ----------
-    workspace : Workspace
-    at_once : int, optional
-        How many run at the same time; default as many as cores.
-    """
+    """The jobs of a folder, some ``at_once``; unfinished ones of an earlier server are interrupted."""
 
     def __init__(self, workspace: Workspace, at_once: int | None = None) -> None:
         self.workspace, self.at_once = workspace, at_once or cores()
         self.jobs: dict[str, Job] = {}
+        self._works: dict[str, Work] = {}
         for name in workspace.names("jobs"):
             with suppress(ValidationError):
-                note = Note.model_validate(workspace.read("jobs", name))
-                title = str(note.given.get("title") or note.given.get("name") or note.kind)
-                job = Job(name, note.kind, title, note.given, note.state, note.message)
+                job = Job.model_validate((workspace.read("jobs", name) or {}) | {"name": name})
+                before = (job.given.get(key) for key in ("title", "name"))  # of earlier versions
+                job.title = next(filter(None, [job.title, *before]), job.kind)
                 if job.active:
-                    job.state = INTERRUPTED
-                    job.message = "the workbench was closed before it was done"
-                    _write(workspace, job)
+                    self._now(job, INTERRUPTED, "the workbench was closed before it was done")
                 self.jobs[name] = job
 
     def submit(self, work: Work, title: str, **given: Any) -> Job:
-        """Queue a job; one that is the same as one that waits or runs is returned instead.
-
-        Raises
-        ------
-        DataError
-            If the folder cannot be written to.
-        """
+        """Queue a job; one that is the same as one that waits or runs is returned instead."""
         kind = work.__name__
         for job in self.active():
             if (job.kind, job.title, job.given) == (kind, title, given):
                 return job
-        job = Job(self.workspace.new_name("jobs", f"{kind}-{title}"), kind, title, given, work=work)
-        _write(self.workspace, job)
-        self.jobs[job.name] = job
+        name = self.workspace.new_name("jobs", f"{kind}-{title}")
+        job = self.jobs[name] = Job(name=name, kind=kind, title=title, given=given)
+        self._works[name] = work
+        self._now(job, WAITING)
         self.poll()
         return job
 
@@ -145,49 +107,48 @@ class Jobs:
         free = self.at_once - sum(job.state == RUNNING for job in self.active())
         waiting = [job for job in self.active() if job.state == WAITING]
         waiting.sort(key=lambda job: job.kind == "fit")  # what else there is takes seconds
-        begun = waiting[: max(free, 0)]
-        for job in begun:
+        for job in (begun := waiting[: max(free, 0)]):
             self._start(job)
         return any(ended) or bool(begun)
 
     def _hear(self, job: Job) -> bool:
-        ended = not job.process.is_alive()  # before the last words, so that none is missed
+        ended = not job._process.is_alive()  # before the last words, so that none is missed
         with suppress(EOFError, OSError):
-            while job.pipe.poll():
-                job.progress.append(job.pipe.recv())
+            while job._pipe.poll():
+                job.progress.append(job._pipe.recv())
         if ended:
             note = self.workspace.read("jobs", job.name) or {}
             job.state, job.message = str(note.get("state")), str(note.get("message", ""))
             if job.state not in (DONE, FAILED):
-                job.state, job.message = FAILED, "its process ended early; is memory or disk full?"
-                _write(self.workspace, job)
-            job.pipe.close()
-            job.process = job.pipe = None
+                self._now(job, FAILED, "its process ended early; is memory or disk full?")
+            job._pipe.close()
         return ended
 
     def _start(self, job: Job) -> None:
         prepare(PRELOADED)
-        job.pipe, there = context(PRELOADED).Pipe(duplex=False)
-        arguments = (str(self.workspace.folder), job.name, job.title, job.work, job.given, there)
-        job.process = context(PRELOADED).Process(target=_run, args=arguments, daemon=True)
-        job.process.start()
+        pipe, there = context(PRELOADED).Pipe(duplex=False)
+        arguments = (str(self.workspace.folder), job, self._works[job.name], there)
+        process = context(PRELOADED).Process(target=_run, args=arguments, daemon=True)
+        process.start()
         there.close()
-        job.state = RUNNING
+        job._process, job._pipe, job.state = process, pipe, RUNNING
+
+    def _now(self, job: Job, state: str, message: str = "") -> None:
+        job.state, job.message = state, message
+        self.workspace.write("jobs", job.name, job.model_dump())
 
     def cancel(self, name: str) -> None:
         """End a job; what it wrote before stays."""
         job = self.jobs[name]
         if not job.active:
             return
-        if job.process is not None:
-            job.process.terminate()
-            job.process.join(2.0)
-            if job.process.is_alive():
-                job.process.kill()
-            job.pipe.close()
-        job.process = job.pipe = None
-        job.state = CANCELLED
-        _write(self.workspace, job)
+        if job.state == RUNNING:
+            job._process.terminate()
+            job._process.join(2.0)
+            if job._process.is_alive():
+                job._process.kill()
+            job._pipe.close()
+        self._now(job, CANCELLED)
         self.poll()
 
     def forget(self, name: str) -> None:
@@ -204,8 +165,8 @@ class Jobs:
     def close(self) -> None:
         """End all jobs."""
         for job in self.active():
-            if job.process is not None:
-                job.process.terminate()
+            if job.state == RUNNING:
+                job._process.terminate()
 
 
 def warm() -> None:
@@ -216,13 +177,7 @@ def warm() -> None:
     first.join()
 
 
-def _write(workspace: Workspace, job: Job) -> None:
-    given = job.given | {"title": job.title}
-    note = Note(kind=job.kind, state=job.state, message=job.message[:5000], given=given)
-    workspace.write("jobs", job.name, note.model_dump(mode="json"))
-
-
-def _run(folder: str, name: str, title: str, work: Work, given: dict[str, Any], pipe: Any) -> None:
+def _run(folder: str, job: Job, work: Work, pipe: Any) -> None:
     """Do the work; this runs in the job's process."""
     end_with_parent()
     if hasattr(os, "nice"):
@@ -239,12 +194,11 @@ def _run(folder: str, name: str, title: str, work: Work, given: dict[str, Any], 
 
     warnings.simplefilter("ignore", MckibbenWarning)  # results have notes
     workspace = Workspace(folder)
-    job = Job(name, work.__name__, title, given)
     try:
         tell(0.0)
-        job.message, job.state = work(workspace, tell, **given), DONE
+        job.message, job.state = work(workspace, tell, **job.given), DONE
     except MckibbenError as error:
         job.message, job.state = said(error), FAILED
     except Exception as error:
         job.message, job.state = str(unforeseen(error)), FAILED
-    _write(workspace, job)
+    workspace.write("jobs", job.name, job.model_dump())

@@ -21,31 +21,21 @@ _made: dict[Hashable, Any] = {}
 def later(
     key: Hashable, make: Callable[[], T], show: Callable[[T], Any], *, height: int = 0
 ) -> None:
-    """Show what ``make`` returns, which is called in a thread, and once for a key.
+    """Show what ``make`` returns, or its error; it is called in a thread, and once for a key.
 
-    Parameters
-    ----------
-    key : hashable
-        All that it depends on.
-    make : callable
-        Makes it. Its errors are shown in its place.
-    show : callable
-        Makes elements of it.
-    height : int
-        Room that is left for it meanwhile [px].
+    The key is all that it depends on, and ``height`` [px] the room that is left for it meanwhile.
     """
 
     def shown() -> None:
         found = _made[key] = _made.pop(key)  # the last used goes last
         with place:
-            if isinstance(found, MckibbenError):
-                widgets.error_box(found)
-            else:
-                show(found)
+            (widgets.error_box if isinstance(found, MckibbenError) else show)(found)
 
     async def fill() -> None:
         try:
-            _made[key] = await run.io_bound(make)
+            if (made := await run.io_bound(make)) is None:
+                return  # the page was left
+            _made[key] = made
         except MckibbenError as error:
             _made[key] = error
         while len(_made) > MOST:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import logging
 import os
 import socket
 import threading
@@ -12,26 +10,32 @@ import time
 import warnings
 import webbrowser
 from collections.abc import Callable
-from html import escape
-from importlib import import_module
-from importlib.util import find_spec
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from nicegui import app, context, ui
+from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from mckibben.app import jobs, widgets
-from mckibben.app.guard import HEAD, Guard, Links
+from mckibben.app.guard import HEAD, HOSTS, Guard, Links
 from mckibben.app.jobs import Jobs
+from mckibben.app.pages import compensate, data, look, models, takeaway
 from mckibben.app.state import State, view
 from mckibben.app.workspace import Workspace
-from mckibben.errors import DataError, MckibbenError, MckibbenWarning
-from mckibben.system.atomic import write_text
+from mckibben.errors import DataError, MckibbenWarning
 
-PAGES = ("data", "look", "models", "compensate", "takeaway")
-"""Modules of `mckibben.app.pages`, in the order of tabs; those that do not exist have none."""
+PAGES: dict[str, Any] = {
+    "/": data,
+    "/look": look,
+    "/models": models,
+    "/compensate": compensate,
+    "/takeaway": takeaway,
+}
+"""In the order of tabs."""
 
-HOST = "127.0.0.1"
+HOST = HOSTS[0]
 
 TICK = 0.3
 """How often jobs are asked how far they are [s]."""
@@ -64,11 +68,6 @@ def serve(
         Whether to open a browser.
     announce : callable
         Called with every one-time link, in words.
-
-    Raises
-    ------
-    DataError
-        If the folder cannot be used or is open in another workbench, or the port is taken.
     """
     os.umask(0o077)  # what is written is its user's alone
     workspace = Workspace(folder)
@@ -77,9 +76,9 @@ def serve(
     links = Links(f"http://{HOST}:{port}", lambda link: announce(f"Another browser: {link}"))
     state = State(workspace, Jobs(workspace))
     app.add_middleware(Guard, port=port, links=links)
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=HOSTS)
     app.on_shutdown(state.jobs.close)
     app.timer(TICK, lambda: state.changed() if state.jobs.poll() else None)
-    logging.getLogger("nicegui").addFilter(_unforeseen)
     warnings.simplefilter("ignore", MckibbenWarning)  # pages show the notes of recordings
 
     @ui.page("/")
@@ -91,40 +90,29 @@ def serve(
     def ready() -> None:
         """Say where it is once it listens, and load what the first job needs."""
         for _ in range(200):
-            with contextlib.suppress(OSError), socket.create_connection((HOST, port)):
+            with suppress(OSError), socket.create_connection((HOST, port)):
                 break
             time.sleep(0.05)
         announce(f"Workbench over {workspace.folder}: {links.link} (Ctrl-C ends it)")
+        if show:
+            webbrowser.open(links.link)
         jobs.warm()
 
     app.on_startup(lambda: threading.Thread(target=ready, daemon=True).start())
-    door = workspace.folder / ".open.html"
-    with contextlib.suppress(KeyboardInterrupt):
-        try:
-            if show:
-                _open(door, links.link)
-            ui.run(
-                host=HOST,
-                port=port,
-                title="mckibben",
-                show=False,
-                reload=False,
-                show_welcome_message=False,
-                reconnect_timeout=ABSENCE,
-                favicon="🦾",
-                gzip_middleware_factory=None,
-                http="h11",
-                h11_max_incomplete_event_size=HEAD,
-            )
-        finally:
-            door.unlink(missing_ok=True)
-
-
-def pages() -> dict[str, Any]:
-    """Return the pages that exist, by their paths; the first is at ``/``."""
-    names = [name for name in PAGES if find_spec(f"mckibben.app.pages.{name}")]
-    modules = [import_module(f"mckibben.app.pages.{name}") for name in names]
-    return {"/" if at == 0 else f"/{names[at]}": one for at, one in enumerate(modules)}
+    with suppress(KeyboardInterrupt):
+        ui.run(
+            host=HOST,
+            port=port,
+            title="mckibben",
+            show=False,
+            reload=False,
+            show_welcome_message=False,
+            reconnect_timeout=ABSENCE,
+            favicon="🦾",
+            gzip_middleware_factory=None,
+            http="h11",
+            h11_max_incomplete_event_size=HEAD,
+        )
 
 
 def build(state: State) -> None:
@@ -132,12 +120,12 @@ def build(state: State) -> None:
     ui.add_css(widgets.style())
     ui.add_head_html(f"<script>{LEFT}</script>")
     ui.dark_mode().bind_value_from(widgets.theme, "dark")
-    known, router = pages(), context.client.sub_pages_router
+    router = context.client.sub_pages_router
     with ui.header().classes("bar"):
         ui.link("Skip to the content", "#content").classes("skip")
         ui.label("mckibben").classes("brand").props('role=heading aria-level="1"')
         with ui.element("nav").props('aria-label="Pages"'):
-            tabs = {path: _tab(path, page) for path, page in known.items()}
+            tabs = {path: _tab(path, page) for path, page in PAGES.items()}
         ui.space()
         running(state)
         widgets.icon_button("contrast", "Light or dark", lambda: _switch(state))
@@ -149,7 +137,7 @@ def build(state: State) -> None:
     router.on_path_changed(choose)
     choose(router.current_path)
     with ui.element("div").props('id=content tabindex="-1"'):
-        ui.sub_pages({path: _builder(page, state) for path, page in known.items()})
+        ui.sub_pages({path: partial(page.build, state) for path, page in PAGES.items()})
     ui.timer(0.1, lambda: _prefer(state), once=True)
 
 
@@ -158,10 +146,6 @@ def _tab(path: str, page: Any) -> Any:
         ui.icon(page.ICON)
         ui.label(page.TITLE)
     return widgets.mark(tab, f"tab-{page.TITLE.split()[0].lower()}")
-
-
-def _builder(page: Any, state: State) -> Callable[[], Any]:
-    return lambda: page.build(state)
 
 
 @view
@@ -184,24 +168,11 @@ async def _prefer(state: State) -> None:
     """Take the first browser's preference for light or dark."""
     if not widgets.theme.known:
         widgets.theme.known = True
-        with contextlib.suppress(TimeoutError):
+        with suppress(TimeoutError):
             query = "matchMedia('(prefers-color-scheme: dark)').matches"
             if await ui.run_javascript(query, timeout=5.0):
                 widgets.theme.dark = True
                 state.changed()
-
-
-def _open(door: Path, link: str) -> None:
-    """Open the browser by a file that only its user can read: commands are seen by all users."""
-    refresh = f'<meta http-equiv="refresh" content="1;url={escape(link)}">'
-    write_text(door, f"<!doctype html><meta charset=utf-8>{refresh}<p>Starting the workbench …</p>")
-    threading.Thread(target=webbrowser.open, args=(door.as_uri(),), daemon=True).start()
-
-
-def _unforeseen(record: logging.LogRecord) -> bool:
-    """Return whether what is logged is no error that a page shows with its remedy."""
-    error = record.exc_info[1] if record.exc_info else record.msg
-    return not isinstance(error, MckibbenError)
 
 
 def _free(port: int) -> int:

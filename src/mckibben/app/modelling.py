@@ -64,33 +64,22 @@ def against(rows: Sequence[Json]) -> str:
         return SimpleNamespace(reason=None, skill_least=row.get("skill_least"), test_error=error)
 
     current = [row for row in rows if row["current"] and row.get("constant")]
-    if not current:
-        return ""
-    first, mean = current[0], current[0]["constant"]
-    where = recommended([*map(judged, current)], judged(mean))[1]
-    return "" if where is None else words.not_recommended(where, first, mean, first["unit"])
+    for first in current[:1]:
+        mean = first["constant"]
+        where = recommended([*map(judged, current)], judged(mean))[1]
+        if where is not None:
+            return words.not_recommended(where, first, mean, first["unit"])
+    return ""
 
 
 @dataclass(frozen=True)
 class Offered:
-    """The models that apply to the recordings.
-
-    Parameters
-    ----------
-    needs : tuple of Need
-        By what they are for, those tried first to the front.
-    others : dict of str to str
-        The others by full name, and why not.
-    split : str
-        What is fitted to, and tested on.
-    work : float
-        Samples of a fit with its cross-validation, times inputs and outputs.
-    """
+    """The models that apply to the recordings by what they are for, and why the others do not."""
 
     needs: tuple[Need, ...]
     others: dict[str, str]
-    split: str
-    work: float
+    split: str  # what is fitted to, and tested on
+    work: float  # samples of a fit with its cross-validation, times inputs and outputs
 
     @property
     def models(self) -> list[str]:
@@ -179,7 +168,7 @@ def fit(
     )
     board, (row,) = last.board, last.board.rows
     if row.reason is not None or row.block is None:
-        raise ModelError(row.reason or "it gave no model", remedy="try other settings")
+        raise ModelError((row.reason or "it gave no model: try other settings").rstrip("."))
     about: Json = {"model": model, "input": board.input, "output": board.output, "load": load}
     about["settings"] = settings or {}
     olds = {name: workspace.read("results", name) or {} for name in workspace.names("results")}
@@ -222,7 +211,7 @@ def check(workspace: Workspace, tell: Tell, *, name: str) -> str:
 
 def _add(workspace: Workspace, name: str, what: str, items: Sequence[Item], on: str) -> str:
     """Write what is shown of a model beside the results of its fit; return its first sentence."""
-    more = {"items": stored(items), "on": on, "data": workspace.digest()}
+    more = {"items": stored_items(items), "on": on, "data": workspace.digest()}
     workspace.write("results", name, (workspace.read("results", name) or {}) | {what: more})
     return next(one.sentences[0] for one in items if isinstance(one, Text))
 
@@ -232,7 +221,7 @@ def plan(workspace: Workspace, tell: Tell, **given: Any) -> str:
     train, test = workspace.train_and_test()
     out = workspace.path("takeaway", f"{PLAN}.csv")
     found = workflow.plan([*train, *test], out=out, force=True, **given)
-    workspace.write("takeaway", PLAN, {"items": stored(results.plan(found))})
+    workspace.write("takeaway", PLAN, {"items": stored_items(results.plan(found))})
     return words.plan_sentences(found)[0]
 
 
@@ -247,18 +236,18 @@ def last_plan(workspace: Workspace) -> tuple[Json, Path] | None:
 KINDS: Mapping[str, type[Text | Table | Figure]] = {"text": Text, "table": Table, "figure": Figure}
 
 
-def stored(items: Iterable[Item]) -> list[Json]:
+def stored_items(items: Iterable[Item]) -> list[Json]:
     """Return what is shown of a result as JSON."""
     return [asdict(one) for one in items if one is not None and one.kind in KINDS]
 
 
-def restored(found: Mapping[str, Any] | None) -> list[Item]:
-    """Return what `stored` made; of earlier versions, which kept other things, their sentences."""
-    known = found or {}
-    if "items" not in known:
-        said = known.get("sentences", ())
-        return [Text([str(known.get("verdict", "")), *map(str, said)])] if said else []
+def restored(found: Mapping[str, Any]) -> list[Item]:
+    """Return what `stored_items` made; of earlier versions, which had others, their sentences."""
+    items = found.get("items", found.get("shown"))
+    if items is None:
+        said = found.get("verdict"), *(found.get("sentences") or found.get("notes") or ())
+        return [Text([str(one) for one in said if one])]
     try:
-        return [KINDS[one["kind"]](**one) for one in known["items"]]
+        return [KINDS[one["kind"]](**one) for one in items]
     except (KeyError, TypeError):
         raise DataError("its file is damaged", remedy="do it again") from None

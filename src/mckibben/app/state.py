@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import field
 from functools import wraps
 from typing import Any
@@ -47,20 +48,7 @@ def view(build: Callable[..., None]) -> Any:
 class State:
     """What is chosen, for all windows; what is known is in ``workspace`` and ``jobs``.
 
-    Parameters
-    ----------
-    workspace : Workspace
-    jobs : Jobs
-    recording : str
-        Name of the recording that is shown.
-    inputs, outputs : list of str
-        Channels that are modelled.
-    load : str
-        Channel of the load, or empty.
-    model : str
-        Name of the model that is chosen.
-    chosen : dict
-        What else pages choose, by names that begin with the page's.
+    ``chosen`` is what else pages choose, by names that begin with the page's.
     """
 
     workspace: Workspace
@@ -74,20 +62,7 @@ class State:
 
     def __post_init__(self) -> None:
         self.ready = threading.Event()
-        self._reading: threading.Thread | None = None
-
-    def settle(self) -> None:
-        """Choose what is not chosen, or not there any more.
-
-        Of a folder that is long to read at first, it goes on in the background; see `view`.
-        """
-        if self.ready.is_set():
-            self._settle()
-            return
-        if self._reading is None:
-            self._reading = threading.Thread(target=self._begin, daemon=True)
-            self._reading.start()
-        self.ready.wait(PATIENCE)
+        threading.Thread(target=self._begin, daemon=True).start()
 
     def _begin(self) -> None:
         try:
@@ -96,23 +71,29 @@ class State:
         finally:
             self.ready.set()
 
+    def settle(self) -> None:
+        """Choose what is not chosen, or not there any more.
+
+        Of a folder that is long to read at first, it goes on in the background; see `view`.
+        """
+        if self.ready.wait(PATIENCE):
+            self._settle()
+
     def _settle(self) -> None:
-        names = [entry.name for entry in self.workspace.entries()]
-        if self.recording not in names:
-            self.recording = next(iter(names), "")
+        recordings = [entry.name for entry in self.workspace.entries()]
         models = self.workspace.models()
+        if self.recording not in recordings:
+            self.recording = next(iter(recordings), "")
         if self.model not in models:
             self.model = next(iter(models), "")
         known = self.workspace.channels()
         if not self.inputs or not self.outputs or {*self.inputs, *self.outputs} - {*known}:
             self.inputs, self.outputs = [], []
-            used = list(self.workspace.used().values())
-            if known and used:
-                try:
-                    sides = channels_of([one.select(known) for one in used], None, None, None)
-                except DataError:
-                    return
-                self.inputs, self.outputs = list(sides.inputs), list(sides.outputs)
+            with suppress(DataError):
+                if known:
+                    used = [one.select(known) for one in self.workspace.used().values()]
+                    sides = channels_of(used)
+                    self.inputs, self.outputs = list(sides.inputs), list(sides.outputs)
 
     @property
     def sides(self) -> Channels:
@@ -121,7 +102,7 @@ class State:
 
     def changed(self) -> None:
         """Build every `view` again, in all windows; call it after the folder or a choice has changed."""
-        if self.ready.is_set() or self._reading is None:
-            self.settle()
+        if self.ready.is_set():
+            self._settle()
         for one in _VIEWS:
             one.refresh()

@@ -2,38 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from operator import attrgetter
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
-from mckibben import signals
-from mckibben.errors import DataError, TooLargeError
+import mckibben
+from mckibben.errors import DataError
 from mckibben.files.choosing import Seen
-from mckibben.files.reading import columns_of, look
+from mckibben.files.reading import look
 from mckibben.recording import Recording
+
+Role = Literal["train", "test", "unused"]
 
 LARGEST = 512 * 2**20
 """Bytes of an uploaded file."""
-
-MOST_CELLS = 40_000_000
-"""Samples times channels of the recordings in a file."""
-
-TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
-"""Endings of files with lines, of which some can be left out."""
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-Text = Annotated[str, Field(max_length=10_000)]
-Number = Annotated[float | None, BeforeValidator(_finite)]
-Count = Annotated[int, Field(ge=0, le=2**53)]
 
 
 class Plain(BaseModel):
@@ -43,101 +28,101 @@ class Plain(BaseModel):
 
 
 class Reading(Plain):
-    """How a file is read: the options of `mckibben.read`, and the layout of a text.
+    """How a file is read: options of `mckibben.read`; of ``channels``, no others are used."""
 
-    Parameters
-    ----------
-    channels : list of str, optional
-        Channels to use; default all.
-    header : int
-        Line of the names of columns, from 1; 0 where it is found.
-    skip : int
-        Lines after it that are left out.
-    encoding : str
-        Of a text; empty where it is found.
-    """
-
-    columns: dict[Text, Text] = {}
-    units: dict[Text, Text] = {}
-    calibration: dict[Text, tuple[float, float]] = {}
-    constants: dict[Text, tuple[float, Text]] = {}
-    rate: Number = None
-    rest_length: Number = None
+    columns: dict[str, str] = {}
+    units: dict[str, str] = {}
+    calibration: dict[str, tuple[float, float]] = {}
+    constants: dict[str, tuple[float, str]] = {}
+    rate: float | None = None
+    rest_length: float | None = None
     gaps: Literal["error", "split", "interpolate"] = "error"
     raw: bool = False
-    channels: list[Text] | None = None
-    header: Count = 0
-    skip: Count = 0
-    encoding: Text = ""
+    channels: list[str] | None = None
+    header: int = 0
+    skip: int = 0
+    encoding: str | None = None
 
     def options(self) -> dict[str, Any]:
-        """Return the options of `mckibben.read`; there, other channels are not looked at."""
-        return self.model_dump(exclude_defaults=True, exclude={"header", "skip", "encoding"})
-
-    @property
-    def amends(self) -> bool:
-        """Whether lines are left out or the encoding is given."""
-        return bool(self.header > 1 or self.skip or self.encoding)
+        """Return the options that are given."""
+        return self.model_dump(exclude_defaults=True)
 
 
-TAKES = {
-    "slice": ("start", "stop"),
-    "low_pass": ("cutoff", "channels"),
-    "detrend": ("channels",),
-    "resample": ("sample_time",),
-    "zero": ("channels", "over"),
+FUNCTIONS = {
+    "slice": ("Recording.slice", ("start", "stop")),
+    "low_pass": ("signals.low_pass", ("cutoff", "channels")),
+    "detrend": ("signals.detrend", ("channels",)),
+    "resample": ("signals.resample", ("sample_time",)),
+    "zero": ("signals.zeroed", ("channels", "over")),
 }
-"""What steps take."""
-
-CALLED = {"zero": "zeroed"}
-"""Functions of `mckibben.signals` that are called otherwise than their steps."""
+"""Step -> its function in `mckibben`, and what that takes after the recording."""
 
 
 class Step(Plain):
-    """What is done to a recording after it was read: a function of `mckibben.signals`, or a cut."""
+    """What is done to a recording after it was read."""
 
     do: Literal["slice", "low_pass", "detrend", "resample", "zero"]
-    start: Count = 0
-    stop: Count = 0
-    cutoff: Number = None
-    sample_time: Number = None
-    over: Text | None = None
-    channels: list[Text] | None = None
+    start: int = 0
+    stop: int = 0
+    cutoff: float | None = None
+    sample_time: float | None = None
+    over: str | None = None
+    channels: list[str] | None = None
 
-    @property
-    def arguments(self) -> list[Any]:
-        """What the function takes after the recording."""
-        return [value for name in TAKES[self.do] if (value := getattr(self, name)) is not None]
+    def _call(self) -> tuple[str, list[Any]]:
+        """Return the function, and its arguments after the recording."""
+        function, names = FUNCTIONS[self.do]
+        for name in names:
+            if getattr(self, name) is None and (name != "channels" or self.do == "zero"):
+                raise DataError(f"{self.do} needs a value", parameter=name, remedy="give one")
+        values = [getattr(self, name) for name in names]
+        return function, [value for value in values if value is not None]
 
     def apply(self, recording: Recording) -> Recording:
         """Return a recording after it; errors are those of the function."""
-        for name in TAKES[self.do]:
-            if getattr(self, name) is None and (name != "channels" or self.do == "zero"):
-                raise DataError(f"{self.do} needs a value", parameter=name, remedy="give one")
-        if self.do == "slice":
-            return recording.slice(*self.arguments)
-        found: Recording = getattr(signals, CALLED.get(self.do, self.do))(
-            recording, *self.arguments
-        )
+        function, values = self._call()
+        found: Recording = attrgetter(function)(mckibben)(recording, *values)
         return found
 
     def code(self, recording: str) -> str:
         """Return the Python that does it to an expression."""
-        values = [repr(one) for one in self.arguments]
-        if self.do == "slice":
-            return f"{recording}.slice({', '.join(values)})"
-        name = CALLED.get(self.do, self.do)
-        return f"mckibben.signals.{name}({', '.join([recording, *values])})"
+        function, values = self._call()
+        return f"mckibben.{function}({', '.join([recording, *map(repr, values)])})"
 
     def __str__(self) -> str:
         of = f" of {', '.join(self.channels)}" if self.channels else ""
         return {
             "slice": f"Keep samples {self.start} to {self.stop}",
-            "low_pass": f"Low-pass {self.cutoff:g} Hz{of}" if self.cutoff else "Low-pass",
+            "low_pass": f"Low-pass {self.cutoff or 0:g} Hz{of}",
             "detrend": f"Remove drift{of}",
-            "resample": f"Resample to {self.sample_time:g} s" if self.sample_time else "Resample",
+            "resample": f"Resample to {self.sample_time or 0:g} s",
             "zero": f"Zero{of} where {self.over} is lowest",
         }[self.do]
+
+
+class Entry(Plain):
+    """A recording of the folder: recording number ``part`` of the raw file ``upload``.
+
+    That is among the uploads; earlier versions had some among the recordings, and notes here.
+    """
+
+    name: str = ""
+    role: Role
+    kind: Literal["uploads", "recordings"] = "uploads"
+    upload: str = ""
+    part: int = 0
+    notes: list[str] = []
+    reading: Reading = Reading()
+    steps: list[Step] = []
+
+    def code(self) -> str:
+        """Return the Python that reads it and repeats its steps, in the folder."""
+        words = [f"{name}={value!r}" for name, value in self.reading.options().items()]
+        given = ", ".join([repr(f"{self.kind}/{self.upload}"), "informative=False", *words])
+        found = f"mckibben.read({given})[{self.part}]"
+        for step in self.steps:
+            found = step.code(found)
+        return found
 
 
 def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
@@ -147,74 +132,9 @@ def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
     return recording
 
 
-def read_file(path: Path, reading: Reading | None = None) -> list[Recording]:
-    """Return the recordings of a file.
-
-    Raises
-    ------
-    DataError
-        If it cannot be read so, or holds more numbers than `MOST_CELLS`.
-    """
-    return understand(path, reading or Reading())[0]
-
-
 def understand(path: Path, reading: Reading) -> tuple[list[Recording], list[Seen]]:
-    """Return the recordings of a file, and its columns; errors are those of `read_file`."""
-    options = reading.options()
-    chosen = options.pop("channels", None)
-    with _amended(path, reading) as file:
-        found, columns = look(file, informative=False, channels=chosen, **options)
-    if chosen is not None:
-        found = [one.select([c for c in one.channels if c in chosen]) for one in found]
-    if sum(len(one) * len(one.channels) for one in found) > MOST_CELLS:
-        problem = f"it holds more than {MOST_CELLS:,} numbers"
-        raise TooLargeError(problem, file=path, remedy="cut or thin it before")
-    return [one.with_meta(file=str(path)) for one in found], columns
-
-
-def columns_in(path: Path, reading: Reading) -> list[Seen]:
-    """Return the columns of a file that may not be readable as recordings; none if there is no table."""
-    options = reading.options()
-    options.pop("channels", None)
-    try:
-        with _amended(path, reading) as file:
-            return columns_of(file, **options)
-    except DataError:
-        return []
-
-
-@contextmanager
-def _amended(path: Path, reading: Reading) -> Iterator[Path]:
-    """Give a file as it is, or a copy of a text as it is to be read; errors name the file itself."""
-    with TemporaryDirectory() as folder:
-        file = path
-        if reading.amends:
-            file = Path(folder, path.name)
-            file.write_bytes(amend(path, reading))
-        try:
-            yield file
-        except DataError as error:
-            error.file = path
-            raise
-
-
-def amend(path: Path, reading: Reading) -> bytes:
-    """Return a text in UTF-8 with the lines blanked that are left out; the others keep their numbers.
-
-    Raises
-    ------
-    DataError
-        If it is not in that encoding, or no text.
-    """
-    if path.suffix.casefold() not in TEXT:
-        problem = "only text has lines and an encoding"
-        raise DataError(problem, file=path, remedy="leave both as found")
-    encoding = reading.encoding or "utf-8"
-    try:
-        lines = path.read_bytes().decode(encoding).splitlines()
-    except (LookupError, ValueError):
-        problem = f"it is no text in {encoding}"
-        raise DataError(problem, file=path, parameter="encoding", remedy="choose another") from None
-    header = max(reading.header, 1)
-    out = {*range(header - 1), *range(header, header + reading.skip)}
-    return "\n".join("" if at in out else line for at, line in enumerate(lines)).encode()
+    """Return the recordings of a file, and its columns; errors are those of `mckibben.read`."""
+    found, columns = look(path, informative=False, most=LARGEST, **reading.options())
+    if (chosen := reading.channels) is not None:
+        found = [one.select([name for name in one.channels if name in chosen]) for one in found]
+    return found, columns

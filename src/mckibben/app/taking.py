@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
 
-from mckibben.app.following import Json, made, pace
+from mckibben.app.following import made, pace
 from mckibben.app.jobs import Tell
+from mckibben.app.modelling import Json
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
 from mckibben.options import COptions, ExportOptions, FMUOptions, Option, StudyOptions
@@ -26,9 +27,6 @@ FIGURES = {
     "loop": "Loops of the recordings",
     "time": "Recordings over time",
 }
-
-C = ("name", "sample_time", "single", "check", "emulate", "link", "limits", "safe", "watchdog")
-"""Fields of `COptions` that are asked for."""
 
 FLAGS = {
     "inverse": "",
@@ -47,13 +45,6 @@ class FigureOptions:
     figure: Annotated[Literal["loops", "fit", "residuals", "weights", "loop", "time"],
                       Option("What is drawn, of the test recordings.")] = "loops"  # fmt: skip
     format: Annotated[Literal["pdf", "svg", "png"], Option("Of the file.")] = "pdf"
-
-
-@dataclass(frozen=True)
-class RecordingOptions:
-    """Options of recordings."""
-
-    format: Annotated[Literal["csv", "parquet"], Option("Of the files.")] = "csv"
 
 
 # -- jobs -------------------------------------------------------------------------------------------
@@ -82,12 +73,11 @@ def figure(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Js
     runs = workspace.with_role("test") or workspace.with_role("train")
     if not runs:
         raise DataError("there is no recording to draw", remedy="add one under Data")
-    kind: str = options.get("figure", FigureOptions.figure)
-    draw = partial(write_figure, path=workspace.path("takeaway", file), kind=kind)
+    kind, path = options.get("figure", FigureOptions.figure), workspace.path("takeaway", file)
     if kind in ("loop", "time"):
-        draw(runs, input=of["inputs"][0], output=of["outputs"][0])
+        write_figure(runs, path, kind, input=of["inputs"][0], output=of["outputs"][0])
     else:
-        draw(workspace.model(of["model"]), recording=runs)
+        write_figure(workspace.model(of["model"]), path, kind, recording=runs)
     return f"{file} is written"
 
 
@@ -95,22 +85,21 @@ def code(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json
     """Write a model, or what is made of it, as JSON or code; a folder becomes a zip."""
     from mckibben.workflow import export
 
-    found = made(workspace, of["model"], of["use"], of["settings"])
-    path = workspace.path("takeaway", file)
+    found, path = made(workspace, of["model"], of["use"], of["settings"]), Path(file)
+    to = workspace.path("takeaway", file)
     if path.suffix == ".json":
-        found.save(path)
+        found.save(to)
         return f"{file} is written"
     target: Any = next((x for x in ("c", "ros2") if file.endswith(f"-{x}.zip")), "fmu")
     name = "".join(c if c.isalnum() else "_" for c in path.stem).strip("_")
     given: Json = {"name": name.lower() if target == "ros2" else name, "force": True} | options
-    given.pop("sample_time", None)
+    given["sample_time"] = None
     if found.rate_dependent:
-        step = options.get("sample_time")
-        given["sample_time"] = step or pace(workspace, of["model"])[0]
-    to = path if target == "fmu" else path.with_suffix("")
-    export(found, to, target, **given)
-    if to != path:
-        _zip(path, to.parent, to)
+        given["sample_time"] = options.get("sample_time") or pace(workspace, of["model"])[0]
+    if target == "fmu":
+        export(found, to, target, **given)
+    else:
+        _zip(to, lambda folder: export(found, folder / path.stem, target, **given))
     return f"{file} is written"
 
 
@@ -118,25 +107,28 @@ def recordings(workspace: Workspace, tell: Tell, *, file: str, options: Json, of
     """Write the recordings in use as they are after their steps, by role, as a zip."""
     from mckibben.files import write
 
-    path = workspace.path("takeaway", file)
-    folder, ending = path.with_suffix(""), options.get("format", RecordingOptions.format)
-    for role in ("train", "test"):
-        (folder / role).mkdir(parents=True, exist_ok=True)
-        for run in workspace.with_role(role):
-            write(run, folder / role / f"{run.name}.{ending}")
-    _zip(path, folder, folder)
+    def fill(folder: Path) -> None:
+        for role in ("train", "test"):
+            (folder / role).mkdir()
+            for run in workspace.with_role(role):
+                write(run, folder / role / f"{run.name}.csv")
+
+    _zip(workspace.path("takeaway", file), fill)
     return f"{file} is written"
 
 
-def _zip(path: Path, base: Path, folder: Path) -> None:
+def _zip(path: Path, fill: Callable[[Path], Any]) -> None:
     from mckibben.export.folders import zipped
     from mckibben.system.atomic import replacing
 
-    files = [p for p in folder.rglob("*") if p.is_file() and not p.is_symlink()]
-    if not files:
+    with TemporaryDirectory() as folder:
+        fill(Path(folder))
+        files = [one for one in Path(folder).rglob("*") if one.is_file()]
+        held = {one.relative_to(folder).as_posix(): one.read_bytes() for one in files}
+    if not held:
         raise DataError("no recording is in use", remedy="add one under Data")
     with replacing(path) as new:
-        new.write_bytes(zipped({p.relative_to(base).as_posix(): p.read_bytes() for p in files}))
+        new.write_bytes(zipped(held))
 
 
 # -- the list ---------------------------------------------------------------------------------------
@@ -170,7 +162,8 @@ THINGS = {
     "json": Thing("JSON", "For this library again: mckibben.load(file).", code, "{stem}.json"),
     "c": Thing(
         "C99", "For a microcontroller or a PC: compiles as it is, with a self-test.",
-        *(code, "{stem}-c.zip", COptions, C),
+        *(code, "{stem}-c.zip", COptions),
+        ("name", "sample_time", "single", "check", "emulate", "link", "limits", "safe", "watchdog"),
     ),
     "fmu": Thing(
         "FMU", "For Simulink and other tools; it is compiled here, up to a minute.",
@@ -182,7 +175,7 @@ THINGS = {
     ),
     "recordings": Thing(
         "Recordings", "As they are after cuts and filters, by role, with units.",
-        *(recordings, "recordings.zip", RecordingOptions, ("format",)),
+        *(recordings, "recordings.zip"),
     ),
 }  # fmt: skip
 
@@ -201,18 +194,15 @@ def script(workspace: Workspace, of: Json) -> str:
     """Return a Python script: read, compare, save, invert, export."""
     models, settings = fitted(workspace)
     lines = ['"""What was done in the workbench; run it in its folder."""', ""]
-    if any(one.way.amends for one in workspace.entries()):
-        lines += ["from pathlib import Path", "", "from mckibben.app import steps", ""]
     lines += ["import mckibben", "from mckibben import workflow", ""]
     for role in ("train", "test"):
         runs = [f"    {one.code()}," for one in workspace.entries() if one.role == role]
         lines += [f"{role} = [", *runs, "]"]
+    given = {key: of[key] for key in ("inputs", "outputs", "load") if of[key]} | {"models": models}
+    given |= {"settings": settings} if settings else {}
     lines += ["board = mckibben.compare(", "    train,", "    test,"]
-    sides = {key: of[key] for key in ("inputs", "outputs", "load") if of[key]}
-    given = sides | {"models": models} | ({"settings": settings} if settings else {})
     lines += [*(f"    {key}={value!r}," for key, value in given.items()), ")", "print(board)"]
-    rows = [row["model"] for row in workspace.results() if row["name"] == of["model"]]
-    for chosen in rows:
+    for chosen in (row["model"] for row in workspace.results() if row["name"] == of["model"]):
         lines.append(f"model = next(row.block for row in board.rows if row.model == {chosen!r})")
         lines.append(f'model.save("{chosen}.json")')
         if (use := of["use"]) in FLAGS:

@@ -12,36 +12,28 @@ GAPS = {
 """What can be done about gaps."""
 
 CONTROLS = {
-    "approach": "the field Approach",
     "controller": "the field Controllers",
     "allow_shared": "“Allow the same data in training and test”",
     "calibration": "gain and offset",
     "columns": "the field Channel",
     "constants": "a held channel",
-    "encoding": "the field Encoding",
-    "force": "“Replace”",
-    "gaps": "the field Gaps",
     "input": "the field Inputs",
     "inputs": "the field Inputs",
-    "inverse": "“Its compensator”",
-    "load": "the field Load",
     "output": "the field Outputs",
     "outputs": "the field Outputs",
     "rate": "the field Samples per second",
     "plant": "the field Tried on",
-    "preview": "the field Preview",
     "raw": "“Codes and counters as measured”",
     "resample": "“Resample”",
     "reference": "the motion",
-    "rest_length": "the field Rest length",
-    "sample_time": "the field Sample time",
-    "slew": "the field Slew",
     "test": "a test recording",
     "units": "the field Unit",
     "zero": "“Zero”",
 }
 """Parameters of operations, and the controls that set them."""
 
+FIELDS = ("approach", "encoding", "gaps", "load", "preview", "rest_length", "sample_time", "slew")
+"""Those whose control is a field of the same name."""
 
 PLACES = {
     "calibrate": "the tab Band under Models",
@@ -76,7 +68,9 @@ def control(name: str, key: str | None = None, value: str | None = None) -> str:
         return f"“{GAPS[value]}”"
     of = f" of {key}" if key and not _placeholder(key) else ""
     given = f" ({value})" if value and not _placeholder(value) else ""
-    return f"{CONTROLS.get(name, name.replace('_', ' '))}{of}{given}"
+    words = name.replace("_", " ")
+    field = f"the field {words.capitalize()}" if name in FIELDS else words
+    return f"{CONTROLS.get(name, field)}{of}{given}"
 
 
 def _placeholder(word: str) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from mckibben.app.steps import Step
 from mckibben.app.workspace import Workspace
 
@@ -25,12 +27,21 @@ def pairs(workspace: Workspace) -> list[tuple[str, ...]]:
 
 
 def join(workspace: Workspace) -> list[str]:
-    """Make one recording of each of `pairs`, in a file of its own, and return their names."""
-    joined = []
+    """Make one recording of each of `pairs`, in a file of its own, and return their names.
+
+    Channels of later runs are called as those of the first, place by place.
+    """
+    joined: list[str] = []
+    first: dict[str, str] = {}
     for names in pairs(workspace):
         whole, *others = (workspace.recording(name) for name in names)
         for other in others:
             whole = whole.with_channels(other.units, **other.channels)
+        first = first or dict(whole.units)
+        alike = zip(whole.units.values(), first.values(), strict=False)
+        if len(whole.units) == len(first) and all(one in ("", other) for one, other in alike):
+            samples = dict(zip(first, whole.channels.values(), strict=True))
+            whole = replace(whole, channels=samples, units=first)
         role = workspace.entry(names[0]).role
         joined.append(workspace.add_recording(whole, name="-".join(names), role=role))
         for name in names:

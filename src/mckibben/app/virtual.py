@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from mckibben.app.jobs import Tell
-from mckibben.app.workspace import Role, Workspace
+from mckibben.app.steps import Role
+from mckibben.app.workspace import Workspace
 
 FIRST = "field-models"
 """The protocol that is offered first."""

@@ -16,7 +16,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from nicegui import binding, context, events, run, ui
 
 from mckibben.app.steps import LARGEST
@@ -98,27 +97,24 @@ def heading(title: str, explanation: str = "") -> None:
             ui.label(explanation).classes("muted")
 
 
-@contextmanager
-def card(title: str = "", *, classes: str = "") -> Iterator[Any]:
-    """Make a card; what is made inside stands in it."""
-    with ui.element("section").classes(f"card {classes}") as found:
-        if title:
+def card(title: str = "") -> Any:
+    """Make a card; what is made with it is in it."""
+    found = ui.element("section").classes("card")
+    if title:
+        with found:
             ui.label(title).classes("subtitle").props('role=heading aria-level="3"')
-        yield found
+    return found
 
 
-@contextmanager
-def row(*, classes: str = "") -> Iterator[Any]:
+def row(classes: str = "") -> Any:
     """Make a row of controls, which wraps."""
-    with ui.element("div").classes(f"controls {classes}") as found:
-        yield found
+    return ui.element("div").classes(f"controls {classes}")
 
 
-@contextmanager
-def details(title: str) -> Iterator[Any]:
+def details(title: str) -> Any:
     """Make a fold-out, closed at first, for what is rarely needed."""
-    with ui.expansion(title).classes("details").props("dense") as found, ui.element("div"):
-        yield found
+    with ui.expansion(title).classes("details").props("dense"):
+        return ui.element("div")
 
 
 @contextmanager
@@ -159,15 +155,16 @@ def guarded(action: Callable[..., Any]) -> Callable[..., Awaitable[None]]:
 
     @wraps(action)  # so that it is called with an event if the action takes one
     async def act(*given: Any) -> None:
-        try:
-            found = action(*given)
-            if inspect.iscoroutine(found):
-                await found
-        except MckibbenError as error:
-            error_toast(error)
-        except Exception as error:
-            traceback.print_exception(error)
-            error_toast(unforeseen(error))
+        with context.client:  # what was clicked may be gone before this is done
+            try:
+                found = action(*given)
+                if inspect.iscoroutine(found):
+                    await found
+            except MckibbenError as error:
+                error_toast(error)
+            except Exception as error:
+                traceback.print_exception(error)
+                error_toast(unforeseen(error))
 
     return act
 
@@ -204,14 +201,8 @@ def icon_button(icon: str, label: str, action: Callable[..., Any]) -> Any:
 
 def error_toast(error: Exception | str) -> None:
     """Show an error, with its remedy in terms of controls, until it is read or closed."""
-    ui.notify(
-        said(error),
-        type="negative",
-        multi_line=True,
-        timeout=20_000,
-        close_button="Close",
-        color="warning",
-    )
+    more: Any = {"multi_line": True, "timeout": 20_000, "close_button": "Close", "color": "warning"}
+    ui.notify(said(error), type="negative", **more)
 
 
 def error_box(error: Exception | str) -> None:
@@ -223,49 +214,37 @@ def error_box(error: Exception | str) -> None:
 
 def upload(text: str, action: Callable[[events.UploadEventArguments], Any], endings: str) -> Any:
     """Make a place to drop files, which are streamed to the disk, or to choose them."""
+    endings_said = endings.replace(",", ", ")
+    refused = f"A file is not {endings_said}, or has more than {LARGEST // 2**20} MiB"
     found = ui.upload(
         label=f"{text}, or click to choose",
         multiple=True,
         auto_upload=True,
         max_file_size=LARGEST,
         on_upload=guarded(action),
-        on_rejected=lambda: error_toast(
-            f"A file is of a kind that cannot be read here ({endings.replace(',', ', ')}), or has more "
-            f"than {LARGEST // 2**20} MiB"
-        ),
+        on_rejected=partial(error_toast, refused),
     )
     return found.props(f'flat accept="{endings}"').classes("upload")
 
 
 async def download(path: Path) -> None:
     """Hand a file over to the browser, through the page's own connection."""
-    client = context.client  # what was clicked may be built again meanwhile
-    content = await run.io_bound(path.read_bytes)
-    client.download(content or b"", path.name)
+    ui.download.content(await run.io_bound(path.read_bytes) or b"", path.name)
 
 
 # -- what is shown -----------------------------------------------------------------------------------
 
 
 def plot(drawing: Drawing, *, height: int = 320, dragged: str = "zoom") -> list[Any]:
-    """Show a drawing of `mckibben.report.figures.draw`; return its plots, one for each plane.
-
-    Axes, fonts and colours are the same everywhere; colours follow the theme.
-    """
-    return [
-        plot_of(figure, height=height, dragged=dragged) for figure in interactive.plots(drawing)
-    ]
+    """Show a drawing of `mckibben.report.figures.draw`; return its plots, one for each plane."""
+    return [plot_of(one, height=height, dragged=dragged) for one in interactive.plots(drawing)]
 
 
 def plot_of(figure: Json, *, height: int = 320, dragged: str = "zoom") -> Any:
-    """Show one figure as `mckibben.report.interactive` makes them."""
+    """Show one figure as `mckibben.report.interactive` makes them; its colours follow the theme."""
     layout = dict(figure["layout"])
-    axis = {
-        "automargin": True,
-        "gridcolor": "--grid",
-        "linecolor": "--rule",
-        "zerolinecolor": "--rule",
-    }
+    axis = {"automargin": True, "gridcolor": "--grid"}
+    axis |= dict.fromkeys(("linecolor", "zerolinecolor"), "--rule")
     for key in [key for key in layout if key.startswith(("xaxis", "yaxis"))]:
         layout[key] = axis | layout[key]
         _place_title(layout, key, height)
@@ -281,7 +260,7 @@ def plot_of(figure: Json, *, height: int = 320, dragged: str = "zoom") -> Any:
         "uirevision": "same",
     }
     config = interactive.CLOSED | {"displayModeBar": "hover", "responsive": True}
-    plain = _plain({"data": figure["data"], "layout": layout}, colours(theme.dark))
+    plain = interactive.resolved({"data": figure["data"], "layout": layout}, colours(theme.dark))
     return ui.plotly(plain | {"config": config}).classes("plot")
 
 
@@ -296,19 +275,6 @@ def _place_title(layout: Json, key: str, height: int) -> None:
         at |= {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": SIZE}}
         layout["annotations"] = [*layout.get("annotations", ()), at]
         layout[key]["title"] = {"text": ""}
-
-
-def _plain(value: Any, palette: dict[str, str]) -> Any:
-    if isinstance(value, dict):
-        if set(value) == {"base", "f4"}:
-            numbers = interactive.unpacked(value)
-            return [None if np.isnan(x) else float(f"{x:.7g}") for x in numbers]
-        return {key: _plain(item, palette) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item, palette) for item in value]
-    if isinstance(value, str) and value.startswith("--"):
-        return palette.get(value[2:], value)
-    return value
 
 
 SCROLL = """{const row = getHtmlElement(%d), list = row?.closest(".list");
@@ -330,33 +296,26 @@ def table(
     scrolls = "wide" if on_choose is None else "wide list"
     with ui.element("div").classes(scrolls), ui.element("table").classes("table") as found:
         with ui.element("thead"), ui.element("tr"):
-            for at, name in enumerate(columns):
-                kind = "number" if rows and isinstance(rows[0][at], int | float) else ""
-                with ui.element("th").classes(kind):
+            for name, first in zip(columns, rows[0] if rows else columns, strict=True):
+                with ui.element("th").classes("number" * isinstance(first, int | float)):
                     ui.label(name)
         with ui.element("tbody"):
             for at, cells in enumerate(rows):
                 line = ui.element("tr")
                 if on_choose is not None:
-                    choose = guarded(lambda at=at: on_choose(at))
+                    choose = guarded(partial(on_choose, at))
                     line.classes("choosable" + " chosen" * (at == chosen)).props("tabindex=0")
                     if at == chosen:
                         ui.run_javascript(SCROLL % line.id)
-                    line.on("click", lambda choose=choose: choose(), [])
-                    line.on("keydown.enter.self", lambda choose=choose: choose(), [])
-                with line:
-                    for cell in cells:
-                        _cell(cell)
+                    line.on("click", choose, []).on("keydown.enter.self", choose, [])
+                for cell in cells:
+                    number = isinstance(cell, int | float)
+                    with line, ui.element("td").classes("number" * number):
+                        if callable(cell):
+                            cell()
+                        else:
+                            ui.label(typeset(as_text(cell)) if number else as_text(cell))
     return found
-
-
-def _cell(cell: Any) -> None:
-    number = isinstance(cell, int | float)
-    with ui.element("td").classes("number" if number else ""):
-        if callable(cell):
-            cell()
-        else:
-            ui.label(typeset(as_text(cell)) if number else as_text(cell))
 
 
 def items(found: Sequence[Item]) -> None:
@@ -368,11 +327,11 @@ def items(found: Sequence[Item]) -> None:
         elif isinstance(item, Table):
             with details(item.summary) if item.summary else nullcontext():
                 titles = item.titles or [""] * len(item.rows)
-                rows = [
-                    [partial(_titled, as_text(line[0]), title), *line[1:]]
-                    for line, title in zip(item.rows, titles, strict=True)
-                ]
-                table(item.headings, rows)
+                lines = zip(item.rows, titles, strict=True)
+                table(
+                    item.headings,
+                    [[partial(_titled, as_text(x), title), *rest] for (x, *rest), title in lines],
+                )
         elif isinstance(item, Figure):
             for figure in item.plots[0]:
                 plot_of(figure)

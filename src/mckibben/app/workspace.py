@@ -1,14 +1,8 @@
 """The folder of a workbench: plain files that any editor opens, and nothing else.
 
-======================= =======================================================================
-``uploads/``            raw files, as they came
-``recordings/N.json``   a recording: raw file, how it is read, role, and the list of steps
-``models/N.json``       a model; ``banded/N.json`` is the same with its band
-``results/N.json``      what came of its fit
-``runs``, ``reviews``   closed loops, and reviews of logs
-``jobs/N.json``         a job and how it went; ``takeaway/`` has what jobs write for the user
-``history/``            recordings that were removed
-======================= =======================================================================
+``uploads`` has raw files as they came, ``recordings`` how each is read, its role and steps, ``history``
+those removed; ``models``, ``banded`` (the same with bands) and ``results`` what was fitted; ``runs`` and
+``reviews`` closed loops; ``jobs`` how jobs went, and ``takeaway`` what they write for the user.
 
 Files are written whole or not at all, names from a browser are made safe, and no path leaves the folder.
 """
@@ -25,30 +19,19 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
-from mckibben.app.steps import (
-    LARGEST,
-    MOST_CELLS,
-    Count,
-    Plain,
-    Reading,
-    Step,
-    Text,
-    applied,
-    read_file,
-)
+from mckibben.app.steps import LARGEST, Entry, Reading, Role, Step, applied, understand
 from mckibben.errors import DataError, MckibbenError
+from mckibben.files.formats import READERS
 from mckibben.system.atomic import PART, replacing, write_json, written
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
 if TYPE_CHECKING:  # loaded when first used, so that the page is there at once
     from mckibben.blocks.base import Block
     from mckibben.recording import Recording
-
-Role = Literal["train", "test", "unused"]
 
 KINDS = (
     *("uploads", "recordings", "history", "models", "banded", "results", "jobs", "runs"),
@@ -61,74 +44,14 @@ NAME = re.compile(r"[^\W_][\w.-]{0,79}")
 DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]", re.IGNORECASE)
 """Names that no file may have on Windows."""
 
-
-class Entry(Plain):
-    """A recording of the folder.
-
-    Parameters
-    ----------
-    role : {"train", "test", "unused"}
-    origin : str
-        Where it came from, in words.
-    upload : str
-        Raw file among the uploads.
-    part : int
-        Which recording of that file it is.
-    base : str
-        In folders of earlier versions, the file of what was read, among the recordings. It goes before
-        ``upload``, until the recording is read in another way.
-    reading : Reading
-    steps : list of Step
-    """
-
-    name: Text = ""
-    role: Role = "train"
-    origin: Text = ""
-    upload: Text = ""
-    part: Count = 0
-    base: Text = ""
-    file: Text = ""
-    notes: list[Text] = Field(default_factory=list)
-    reading: Reading | None = None
-    steps: list[Step] = Field(default_factory=list)
-
-    @property
-    def way(self) -> Reading:
-        """How it is read."""
-        return self.reading or Reading()
-
-    def code(self) -> str:
-        """Return the Python that reads it and repeats its steps, in the folder.
-
-        Of a text with another header or encoding, with ``steps`` of this package imported.
-        """
-        if self.base:
-            found = f"mckibben.read({f'recordings/{self.base}'!r}, informative=False)[0]"
-        elif self.way.amends:
-            way = self.way.model_dump(exclude_defaults=True)
-            path = f"Path({f'uploads/{self.upload}'!r})"
-            found = f"steps.read_file({path}, steps.Reading(**{way!r}))[{self.part}]"
-        else:
-            words = [f"{name}={value!r}" for name, value in self.way.options().items()]
-            given = ", ".join([repr(f"uploads/{self.upload}"), "informative=False", *words])
-            found = f"mckibben.read({given})[{self.part}]"
-        for step in self.steps:
-            found = step.code(found)
-        return found
+MOST_CACHED = 1000
+"""Recordings and models in memory."""
 
 
 class Workspace:
-    """Recordings, models and results of a folder.
+    """Recordings, models and results of a folder, which is made where it is missing.
 
-    Parameters
-    ----------
-    folder : path
-        Made where it is missing.
-
-    Raises
-    ------
-    DataError
-        If it cannot be made or written to, or a folder in it is a link.
+    `DataError` if it cannot be written to, or a folder in it is a link.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -138,17 +61,11 @@ class Workspace:
                 if path != self.folder and path.is_symlink():
                     raise DataError("this is a link", file=path, remedy="remove it")
                 path.mkdir(mode=0o700, parents=True, exist_ok=True)
-        self._cache: dict[Any, tuple[Any, int]] = {}
+        self._cache: dict[Any, Any] = {}
         self._lock = threading.RLock()
 
     def claim(self) -> None:
-        """Become the one server of this folder until this process ends.
-
-        Raises
-        ------
-        DataError
-            If there is another one, or the folder is another user's.
-        """
+        """Become the one server of this folder until this process ends; `DataError` if it cannot."""
         from filelock import FileLock, Timeout
 
         if os.name == "posix" and self.folder.stat().st_uid != os.getuid():
@@ -156,12 +73,12 @@ class Workspace:
             raise DataError(problem, file=self.folder, remedy="give one of your own")
         self._owner = FileLock(self.folder / ".owner", timeout=0, mode=0o600)
         with written(self.folder):
+            self.folder.chmod(0o700)
             try:
                 self._owner.acquire()
             except Timeout:
                 problem = "another workbench has this folder open"
                 raise DataError(problem, file=self.folder, remedy="use or close that") from None
-            self.folder.chmod(0o700)
         for path in self.folder.glob(f"*/{PART}*.part"):  # of a process that was killed
             path.unlink(missing_ok=True)
 
@@ -216,23 +133,17 @@ class Workspace:
     def receiving(self, name: str, size: int) -> Iterator[tuple[Path, Path]]:
         """Give where to write an uploaded file to, and where it then is, under a safe name.
 
-        Raises
-        ------
-        DataError
-            If it is empty, too large, or no file that is read.
+        `DataError` if it is empty, too large, or no file that is read.
         """
-        from mckibben.files.formats import READERS
-
-        given = Path(name.replace("\\", "/")).name
-        ending = Path(given).suffix.casefold()
+        given = Path(name.replace("\\", "/"))
+        ending = given.suffix.casefold()
         if ending not in READERS:
-            raise DataError(
-                f"{given!r:.80} is no file with recordings", remedy=f"give {', '.join(READERS)}"
-            )
+            problem = f"{given.name!r:.80} is no file with recordings"
+            raise DataError(problem, remedy=f"give {', '.join(READERS)}")
         if not 0 < size <= LARGEST:
-            problem = f"{given!r:.80} is empty, or has more than {LARGEST // 2**20} MiB"
+            problem = f"{given.name!r:.80} is empty, or has more than {LARGEST // 2**20} MiB"
             raise DataError(problem, remedy="give another file")
-        path = self.path("uploads", self.new_name("uploads", Path(given).stem, ending) + ending)
+        path = self.path("uploads", self.new_name("uploads", given.stem, ending) + ending)
         try:
             with replacing(path) as new:
                 yield new, path
@@ -244,13 +155,16 @@ class Workspace:
 
     def entry(self, name: str) -> Entry:
         """Return a recording's description; `DataError` if it is missing or damaged."""
+        found = self.read("recordings", name) or {}
+        before = found.get("base") or found.get("file")  # of an earlier version: what was read
+        if before:
+            found |= {"kind": "recordings", "upload": before, "part": 0, "reading": {}}
         try:
-            found = Entry.model_validate(self.read("recordings", name) or {"role": None})
+            return Entry.model_validate(found | {"name": name})
         except ValidationError:
             problem = "its description is missing or damaged"
             file = self.folder / "recordings" / f"{name}.json"
             raise DataError(problem, file=file, remedy="import it again") from None
-        return found.model_copy(update={"name": name, "base": found.base or found.file})
 
     def entries(self) -> list[Entry]:
         """Return all recordings whose descriptions can be read, by name."""
@@ -262,49 +176,42 @@ class Workspace:
 
     def put(self, entry: Entry) -> None:
         """Write a recording's description."""
-        content = entry.model_dump(mode="json", exclude={"name", "file"}, exclude_defaults=True)
-        self.write("recordings", entry.name, {"role": entry.role, **content})
+        content = entry.model_dump(mode="json", exclude={"name"}, exclude_defaults=True)
+        self.write("recordings", entry.name, content)
 
     def raw_path(self, entry: Entry) -> Path:
         """Return the raw file of a recording."""
-        kind = "recordings" if entry.base else "uploads"
-        return self.path(kind, entry.base or entry.upload)
+        return self.path(entry.kind, entry.upload)
 
-    def raw(self, entry: Entry) -> Recording:
-        """Return a recording as it was read, before its steps."""
+    def _parts(self, path: Path, reading: Reading) -> list[Recording]:
+        return self.cached(path, reading.model_dump_json(), lambda: understand(path, reading)[0])
+
+    def _made(self, entry: Entry) -> Recording:
         path = self.raw_path(entry)
-        way, part = (Reading(), 0) if entry.base else (entry.way, entry.part)
-        parts = self._read(path, way)
-        if part >= len(parts):
-            problem = f"the file has {len(parts)} recording(s), and this is number {part + 1}"
+        if entry.part >= len(parts := self._parts(path, entry.reading)):
+            problem = f"the file has {len(parts)} recordings, and this is number {entry.part + 1}"
             raise DataError(problem, file=path, remedy="remove this recording")
-        return parts[part]
+        return applied(parts[entry.part], entry.steps).with_meta(name=entry.name)
 
-    def _read(self, path: Path, way: Reading) -> list[Recording]:
-        return self.cached(path, way.model_dump_json(), lambda: read_file(path, way))
+    def _of(self, entry: Entry, what: str, make: Callable[[], Any]) -> Any:
+        """Return what is made of a recording, until its raw file or description change."""
+        key = what + entry.model_dump_json(exclude={"role"})
+        return self.cached(self.raw_path(entry), key, make)
 
     def recording(self, name: str) -> Recording:
         """Return a recording after its steps; it is read once. Errors are those of reading."""
         entry = self.entry(name)
-        return self._of(
-            entry, "", lambda: applied(self.raw(entry), entry.steps).with_meta(name=name)
-        )
-
-    def _of(self, entry: Entry, what: str, make: Callable[[], Any]) -> Any:
-        """Return what is made of a recording, until its raw file, reading or steps change."""
-        key = what + entry.model_dump_json(include={"name", "reading", "part", "steps"})
-        return self.cached(self.raw_path(entry), key, make)
+        found: Recording = self._of(entry, "", lambda: self._made(entry))
+        return found
 
     def add(
         self, upload: str, *, name: str = "", role: Role = "train", reading: Reading | None = None
     ) -> list[str]:
         """Add the recordings of an uploaded file, and return their names."""
-        way, path, names = reading or Reading(), self.path("uploads", upload), []
-        for part, one in enumerate(found := self._read(path, way)):
+        path, names, way = self.path("uploads", upload), [], reading or Reading()
+        for part, one in enumerate(self._parts(path, way)):
             chosen = self.new_name("recordings", name or one.name or path.stem)
-            origin = f"file {upload}" + f", part {part + 1}" * (len(found) > 1)
-            made = Entry(name=chosen, role=role, origin=origin, upload=upload)
-            self.put(made.model_copy(update={"part": part, "reading": way}))
+            self.put(Entry(name=chosen, role=role, upload=upload, part=part, reading=way))
             names.append(chosen)
         return names
 
@@ -317,31 +224,12 @@ class Workspace:
         return self.add(upload, name=name, role=role)[0]
 
     def change(self, name: str, **fields: Any) -> None:
-        """Change fields of a recording, once it is known that it can be read so.
-
-        Raises
-        ------
-        DataError
-            If it cannot; all stays as it was.
-        """
+        """Change fields of a recording; if it cannot be read so, all stays as it was."""
         with self._lock:
-            before = self.entry(name)
-            fresh = {"base": ""} if "reading" in fields and before.upload else {}
-            after = before.model_copy(update=fresh | fields)
-            if {"reading", "steps", "part"} & fields.keys():
-                applied(self.raw(after), after.steps)
+            after = self.entry(name).model_copy(update=fields)
+            if fields.keys() != {"role"}:
+                self._made(after)
             self.put(after)
-
-    def read_again(self, name: str, reading: Reading) -> None:
-        """Read a recording's raw file in another way, and do its steps anew; or all stays as it was."""
-        entry = self.entry(name)
-        if entry.upload:
-            self.change(name, reading=reading)
-            return
-        raw = self.raw_path(entry)  # of an earlier version, which had no raw file
-        with self.receiving(raw.name, raw.stat().st_size) as (part, path):
-            part.write_bytes(raw.read_bytes())
-        self.change(name, upload=path.name, base="", part=0, reading=reading)
 
     def do(self, name: str, step: Step) -> None:
         """Do one more step to a recording; errors are those of the step."""
@@ -349,20 +237,19 @@ class Workspace:
 
     def undo(self, name: str) -> Step | None:
         """Take a recording's last step back, and return it."""
-        *rest, last = [None, *self.entry(name).steps]
-        if last is not None:
-            self.change(name, steps=rest[1:])
-        return last
+        steps = self.entry(name).steps
+        if steps:
+            self.change(name, steps=steps[:-1])
+        return steps[-1] if steps else None
 
     def split(self, name: str, at: int) -> str:
         """Split a recording before a sample, and return the name of the new second part, for testing."""
-        whole, entry = self.recording(name), self.entry(name)
-        parts = [Step(do="slice", start=0, stop=at), Step(do="slice", start=at, stop=len(whole))]
-        applied(whole, parts[1:])
-        self.do(name, parts[0])
+        entry, end = self.entry(name), len(self.recording(name))
+        second = [*entry.steps, Step(do="slice", start=at, stop=end)]
+        self._made(entry.model_copy(update={"steps": second}))
+        self.do(name, Step(do="slice", start=0, stop=at))
         chosen = self.new_name("recordings", name)
-        steps = [*entry.steps, parts[1]]
-        self.put(entry.model_copy(update={"name": chosen, "role": "test", "steps": steps}))
+        self.put(entry.model_copy(update={"name": chosen, "role": "test", "steps": second}))
         return chosen
 
     def rename(self, name: str, wish: str) -> str:
@@ -393,13 +280,12 @@ class Workspace:
 
     def used(self) -> dict[str, Recording]:
         """Return the recordings in use that can be read, by name."""
-        return {entry.name: recording for entry, recording in self._readable()}
-
-    def _readable(self) -> Iterator[tuple[Entry, Recording]]:
+        found = {}
         for entry in self.entries():
             with suppress(MckibbenError):
                 if entry.role != "unused":
-                    yield entry, self.recording(entry.name)
+                    found[entry.name] = self.recording(entry.name)
+        return found
 
     def channels(self) -> list[str]:
         """Return the channels that all recordings in use have."""
@@ -409,11 +295,12 @@ class Workspace:
 
     def digest(self) -> str:
         """Return what changes whenever what is trained or tested on does; see `results`."""
-        told = [
-            f"{entry.role} {self._of(entry, 'digest', partial(_digest, recording))}"
-            for entry, recording in self._readable()
-        ]
-        return hashlib.sha256("\n".join(sorted(told)).encode()).hexdigest()[:16]
+        used, found = self.used(), []
+        for entry in self.entries():
+            if run := used.get(entry.name):
+                digest = self._of(entry, "digest", partial(_digest, run))
+                found.append(f"{entry.role} {digest}")
+        return hashlib.sha256("\n".join(sorted(found)).encode()).hexdigest()[:16]
 
     # -- models and what came of them ------------------------------------------------------------
 
@@ -432,10 +319,7 @@ class Workspace:
     def save_model(
         self, name: str, model: Block, result: Mapping[str, Any], banded: Block | None = None
     ) -> None:
-        """Write a model with what came of its fit, such as a row of a leaderboard as a dict.
-
-        ``result`` also has ``input``, ``output``, ``unit`` and ``data``, the `digest` at its start.
-        """
+        """Write a model with what came of its fit: a row of a leaderboard, its channels and `digest`."""
         model.save(self.path("models", f"{name}.json"))
         self.delete("banded", name)
         if banded is not None:
@@ -461,35 +345,19 @@ class Workspace:
         return sorted(found, key=place)
 
     def cached(self, path: Path, key: str, make: Callable[[], Any]) -> Any:
-        """Return what is made of a file, made again only when that has changed.
-
-        Raises
-        ------
-        DataError
-            If the file is missing; or what ``make`` raises.
-        """
+        """Return what is made of a file, made again only when that has changed."""
         try:
             stat = path.stat()
         except OSError as error:
             problem = f"it cannot be read ({error.strerror})"
             raise DataError(problem, file=path, remedy="import it again") from None
         at = path, key, stat.st_mtime_ns, stat.st_size
-        known = self._cache.get(at)
-        if known is None:  # without the lock, as it may take seconds
-            made = make()
-            known = made, _size(made)
-        with self._lock:
-            self._cache.pop(at, None)
-            self._cache[at] = known  # the last used goes last
-            while sum(size for _, size in self._cache.values()) > MOST_CELLS and self._cache:
+        made = self._cache[at] if at in self._cache else make()
+        with self._lock:  # not for the making, which takes seconds
+            self._cache[at] = self._cache.pop(at, made)  # the last used goes last
+            while len(self._cache) > MOST_CACHED:
                 del self._cache[next(iter(self._cache))]
-        return known[0]
-
-
-def _size(made: Any) -> int:
-    if isinstance(made, tuple | list):
-        return sum(map(_size, made)) + 1
-    return len(made) * len(made.channels) if hasattr(made, "channels") else 1000
+        return made
 
 
 def _digest(recording: Recording) -> str:

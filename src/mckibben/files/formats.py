@@ -91,6 +91,20 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         return [distinct(printable(table)) for table in module.read(file, path)]
 
 
+def laid_out(
+    file: BufferedReader, path: Path, header: int, skip: int, encoding: str | None
+) -> BufferedReader:
+    """Return a text as `mckibben.files.text.laid_out` does; `DataError` of any other format."""
+    if header <= 1 and not skip and encoding is None:
+        return file
+    if READERS.get(path.suffix.casefold()) != "text":
+        problem, remedy = "only text has lines and an encoding", "leave both as found"
+        raise DataError(problem, file=path, remedy=remedy)
+    text = _module(path, READERS, "read")
+    found: BufferedReader = text.laid_out(file, path, header, skip, encoding)
+    return found
+
+
 def bag(folder: Path) -> list[Table]:
     """Return the contents of the folder of a bag of ROS 2; errors are those of `read`."""
     with refusing(folder):

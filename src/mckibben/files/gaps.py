@@ -144,12 +144,12 @@ def _enclosed(missing: dict[str, Mask], source: Source) -> Mask:
 def _judge_gaps(cuts: NDArray[np.intp], times: Times, source: Source) -> None:
     """Refuse gaps in time, or note that they are bridged."""
     lengths = convert(times.values[cuts] - times.values[cuts - 1], times.unit, "s")
-    total = f"{len(cuts)} gap(s) in time, {lengths.sum():.6g} s in all"
+    total = f"{len(cuts)} gap{'s' * (len(cuts) > 1)} in time, {lengths.sum():.6g} s in all"
     if source.request.gaps == "error":
         problem = f"there is a gap of {lengths[0]:.6g} s before this row ({total})"
         remedy = "use `gaps=split` to cut there or `gaps=interpolate` to bridge them"
         raise source.error(problem, remedy, "time", int(cuts[0]))
-    source.warn(f"{total}, were interpolated over")
+    source.warn(f"bridged by straight lines: {total}")
 
 
 def _judged_step(

@@ -41,6 +41,9 @@ def read(
     most: float = MOST_BYTES,
     raw: bool = False,
     rest_length: float | None = None,
+    header: int = 0,
+    skip: int = 0,
+    encoding: str | None = None,
 ) -> list[Recording]:
     """Read the recordings in a file, by its ending, or in a folder.
 
@@ -86,6 +89,12 @@ def read(
     rest_length : float, optional
         Length of the muscle where its displacement is 0 [mm], kept in ``meta``: where ``channels``, or
         models, ask for a contraction, displacement or length, another of these gives it.
+    header : int
+        Line of a text with the names of columns, counted from 1; 0 where it is found.
+    skip : int
+        Lines after it that are left out.
+    encoding : str, optional
+        Of a text, such as ``"cp932"``; default as found.
 
     Returns
     -------
@@ -120,6 +129,9 @@ def read(
         most,
         raw,
         rest_length,
+        header,
+        skip,
+        encoding,
     )
     request.check(Path(path))
     return [each for one in sources.inside(Path(path)) for each in _read(one, request)[0]]

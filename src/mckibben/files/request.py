@@ -41,6 +41,9 @@ class Request:
     most: float = MOST_BYTES
     raw: bool = False
     rest_length: float | None = None
+    header: int = 0
+    skip: int = 0
+    encoding: str | None = None
     described: Described = field(default_factory=Described)
 
     @property
@@ -101,6 +104,8 @@ class Request:
         require(possible, "rate", self.rate, "a positive number of samples a second", error)
         possible = self.rest_length is None or 0 < self.rest_length <= LONGEST
         require(possible, "rest_length", self.rest_length, f"a length up to {LONGEST:g} mm", error)
+        for name, lines in (("header", self.header), ("skip", self.skip)):
+            require(lines >= 0, name, lines, "a number of lines", error)
         for channel, (value, _) in self.constants.items():
             if not math.isfinite(value) or channel in ("", "time", *self.columns):
                 remedy = "give a finite number, to a channel that is no column and not time"

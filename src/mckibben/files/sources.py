@@ -126,7 +126,9 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
         if is_bag(path):
             found[path] = formats.bag(path)
         else:
-            found |= {each: formats.read(file, each) for each, file in files.items()}
+            for each, file in files.items():
+                lines = request.header, request.skip, request.encoding
+                found[each] = formats.read(formats.laid_out(file, each, *lines), each)
         for (each, file), state in zip(files.items(), before, strict=True):
             file.seek(0)
             digests.append(hashlib.file_digest(file, "sha256").hexdigest())

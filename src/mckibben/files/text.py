@@ -10,7 +10,7 @@ import io
 import os
 import re
 from collections.abc import Sequence
-from io import BufferedReader
+from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,26 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         return [found]
     table = parsed(decoded(data, path), path)
     return [table if found is None else found.edited(table)]
+
+
+def laid_out(
+    file: BufferedReader, path: Path, header: int, skip: int, encoding: str | None
+) -> BufferedReader:
+    """Return a text in UTF-8 whose lines before the header and ``skip`` lines after it are blank.
+
+    The others have the same numbers as before. Errors are those of `mckibben.read`.
+    """
+    try:
+        lines = file.read().decode("utf-8" if encoding is None else encoding).splitlines()
+    except (LookupError, ValueError):
+        problem = f"it is no text in {encoding or 'utf-8'}"
+        raise DataError(problem, file=path, parameter="encoding", remedy="choose another") from None
+    first = max(header, 1)
+    text = "\n".join(
+        "" if at < first or first < at <= first + skip else line
+        for at, line in enumerate(lines, start=1)
+    )
+    return BufferedReader(BytesIO(text.encode()))
 
 
 def write(recording: Recording, path: Path) -> None:

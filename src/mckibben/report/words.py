@@ -242,7 +242,8 @@ def characterization_sentences(found: Characterization) -> list[str]:
             "are taken away, and loop width is not measured."
         )
     elif found.branch_gap is not None:
-        shown = {True: "", False: "No loop: ", None: "A loop is not shown: "}[found.has_loop]
+        open_ = "Too few branches, or too much noise, to tell a loop: "
+        shown = {True: "", False: "No loop: ", None: open_}[found.has_loop]
         gap = f"the mean gap between branches is {size(found.output_unit, found.branch_gap)}."
         said.append(f"{shown}{gap}")
     else:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
-from nicegui import run, ui
+from nicegui import ui
 
 from mckibben.app import modelling, widgets
+from mckibben.app.later import later
 from mckibben.app.modelling import Offered
 from mckibben.app.state import State
 from mckibben.app.terms import said
 from mckibben.app.widgets import mark
 from mckibben.comparison.channels import Channels
-from mckibben.errors import MckibbenError
-from mckibben.estimators.catalogue import ability, declared, full_name, settings_of
+from mckibben.estimators.catalogue import Need, ability, declared, full_name, settings_of
 from mckibben.estimators.core.settings import Setting, setting_value, settings_with_defaults
 
 OWN = ("input", "output", "scheduling")
@@ -29,7 +30,7 @@ INVERSES = {
 OWN_CHOICE = "its own choice"
 
 
-async def choose(state: State) -> None:
+def choose(state: State) -> None:
     """Open the drawer."""
     sides = state.sides
     with (
@@ -37,25 +38,15 @@ async def choose(state: State) -> None:
         ui.element("div").classes("card drawer") as place,
     ):
         mark(place, "drawer")
-        ui.spinner()
-    drawer.on("hide", drawer.delete)
-    offered: Offered | MckibbenError | None
-    try:
-        offered = await run.io_bound(modelling.offered, state.workspace, sides)
-    except MckibbenError as error:
-        offered = error
-    if place.is_deleted or offered is None:
-        return
-    place.clear()
-    with place:
         with widgets.row(classes="spread"):
-            ui.label("Fit models").classes("subtitle").props('role=heading aria-level="2"')
+            with ui.element("div"):
+                ui.label("Fit models").classes("subtitle").props('role=heading aria-level="2"')
+                ui.link("Change recordings for training and test, or channels →", "/")
             mark(widgets.icon_button("close", "Close", drawer.close), "close-drawer")
-        if isinstance(offered, MckibbenError):
-            widgets.error_box(offered)
-            ui.link("Change recordings and channels →", "/")
-        else:
-            _Choice(state, sides, offered, drawer)
+        key = "offered", state.workspace.digest(), sides
+        offer = partial(modelling.offered, state.workspace, sides)
+        later(key, offer, lambda offered: _Choice(state, sides, offered, drawer))
+    drawer.on("hide", drawer.delete)
 
 
 class _Choice:
@@ -67,17 +58,20 @@ class _Choice:
         self.ticked = [name for name in before if name in offered.models] or offered.quick
         self.settings: dict[str, dict[str, Any]] = state.chosen.setdefault("models.settings", {})
         self.boxes: dict[str, Any] = {}
+        told = f", given {', '.join(sides.scheduling)}" if sides.scheduling else ""
+        sets = {"Quick choice": offered.quick, "All": offered.models, "None": []}
         with ui.element("div").classes("stack scroll"):
-            self._data()
+            with ui.element("div"):
+                ui.label(f"{', '.join(sides.outputs)} of {', '.join(sides.inputs)}{told}")
+                ui.label(f"{offered.split[:1].upper()}{offered.split[1:]}.").classes("muted")
+            shared = ui.checkbox("Allow the same data in training and test").props("dense")
+            shared.bind_value(state.chosen, "models.shared")
             with widgets.row():
-                for name, text, models in (
-                    ("quick", "Quick choice", offered.quick),
-                    ("tick-all", "All", offered.models),
-                    ("tick-none", "None", []),
-                ):
-                    mark(widgets.button(text, lambda models=models: self._only(models)), name)
+                for title, models in sets.items():
+                    button = widgets.button(title, partial(self._only, models))
+                    mark(button, f"tick-{title.partition(' ')[0].lower()}")
             for need in offered.needs:
-                self._group(need)
+                self._need(need)
             if offered.others:
                 with widgets.details(f"{len(offered.others)} do not apply to these recordings"):
                     for title, why in offered.others.items():
@@ -89,23 +83,14 @@ class _Choice:
             self.button = mark(widgets.primary("Fit", self._fit), "fit")
         self._counted()
 
-    def _data(self) -> None:
-        sides, split = self.sides, self.offered.split
-        told = f", given {', '.join(sides.scheduling)}" if sides.scheduling else ""
-        with ui.element("div"):
-            ui.label(f"{', '.join(sides.outputs)} of {', '.join(sides.inputs)}{told}")
-            ui.label(f"{split[:1].upper()}{split[1:]}.").classes("muted")
-            ui.link("Change recordings for training and test, or channels →", "/")
-        shared = ui.checkbox("Allow the same data in training and test").props("dense")
-        shared.bind_value(self.state.chosen, "models.shared")
-
-    def _group(self, need: Any) -> None:
+    def _need(self, need: Need) -> None:
         with ui.element("div"):
             ui.label(need.title).classes("subtitle").props('role=heading aria-level="3"')
             ui.label(need.about).classes("muted")
-        first = [one for one in need.models if one in {*self.offered.quick, *self.ticked}]
-        for model in first:
-            self._model(model)
+        first = {*self.offered.quick, *self.ticked} & {*need.models}
+        for model in need.models:
+            if model in first:
+                self._model(model)
         if rest := [one for one in need.models if one not in first]:
             with widgets.details(f"{len(rest)} more"):
                 for model in rest:
@@ -157,12 +142,9 @@ class _Choice:
     def _fit(self) -> None:
         """Start the fits, quick ones first."""
         sides, state = self.sides, self.state
-        given = {
-            "inputs": list(sides.inputs),
-            "outputs": list(sides.outputs),
-            "load": (sides.scheduling or ("",))[0],
-            "allow_shared": bool(state.chosen.get("models.shared")),
-        }
+        given: dict[str, Any] = {"inputs": list(sides.inputs), "outputs": list(sides.outputs)}
+        given["load"] = (sides.scheduling or ("",))[0]
+        given["allow_shared"] = bool(state.chosen.get("models.shared"))
         settings = {name: settings_of(name, self.settings.get(name, {})) for name in self.ticked}
         state.jobs.forget_ended("fit")
         for model in sorted(self.ticked, key=self.offered.seconds):

@@ -11,20 +11,22 @@ import numpy as np
 from nicegui import events, run, ui
 
 from mckibben.app import following, forms, modelling, widgets
-from mckibben.app.pages import trying
-from mckibben.app.state import State, view
+from mckibben.app.pages import parts, trying
+from mckibben.app.state import State
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError, MckibbenError
 from mckibben.numerals import number
 from mckibben.options import InvertOptions, TrackOptions
 from mckibben.recording import Recording
 from mckibben.report import interactive
-from mckibben.report.drawing import axis_label, series_colour
+from mckibben.report.drawing import Curve, Drawing, Panel, axis_label, over_time, series_colour
 
 TITLE = "Compensate"
 ICON = "moving"
 
 TABS = {"motion": "Follow a motion", "force": "Estimate a force", "log": "Review a log"}
+
+SHAPES = {**following.MOTIONS, "hold": "Stay at one value", "points": "Points, or from a file"}
 
 LOOP = ("approach", "settle", "noise", "delay", "slew", "preview", "pressure_loop", "seed")
 """Fields of `TrackOptions` that are asked for."""
@@ -32,11 +34,16 @@ LOOP = ("approach", "settle", "noise", "delay", "slew", "preview", "pressure_loo
 USUAL = ("feedforward", "feedforward-pid")
 """Controllers that are tried first."""
 
+DRIVEN = ("pressure", "voltage", "force", "command")
+"""What channels that drive a plant begin with."""
+
 DRAWN = 4
 """Most runs in a plot."""
 
 ROWS = 100
 """Most points that are edited in a table."""
+
+Json = dict[str, Any]
 
 
 async def build(state: State) -> None:
@@ -50,7 +57,6 @@ async def build(state: State) -> None:
         await run.io_bound(_prepare, state)
         spinner.delete()
         page(state)
-        watch(state)
         widgets.next_step("Right on your model? Take it to your rig.", "Take away", "/takeaway")
 
 
@@ -62,49 +68,36 @@ def _prepare(state: State) -> None:
             following.plants(state.workspace, _able(state))
 
 
-@ui.refreshable
-@widgets.shielded
+@parts.steady("models")
 def page(state: State) -> None:
-    """Show the tab that is chosen; fields in it outlive what happens to jobs."""
+    """Show the tab that is chosen."""
     able = following.having(state.workspace, "inverse")
     forces = following.having(state.workspace, "force")
     chosen = state.chosen.setdefault("compensate.tab", "force" if forces and not able else "motion")
     names = forces if chosen == "force" else able
+
+    def turn(event: events.ValueChangeEventArguments[Any]) -> None:
+        state.chosen["compensate.tab"] = str(event.value)
+        page.refresh()
+
     if able or forces:
         with ui.tabs(value=chosen).props("dense no-caps align=left inline-label") as tabs:
             for name, title in TABS.items():
                 mark(ui.tab(name, title), f"tab-{name}")
-
-        def turn(event: events.ValueChangeEventArguments[Any]) -> None:
-            state.chosen["compensate.tab"] = str(event.value)
-            page.refresh()
-
         tabs.on_value_change(turn)
     if not names:
         _empty(state, chosen)
         return
-    left = {"motion": _motion, "force": trying.force, "log": trying.log}
+    left, right = {
+        "motion": (_motion, followed),
+        "force": (trying.force, trying.estimated),
+        "log": (trying.log, trying.reviewed),
+    }[chosen]
     with ui.element("div").classes("columns"):
         with ui.element("div").classes("stack"):
-            left[chosen](state, names)
+            left(state, names)
         with ui.element("div").classes("stack"):
-            results(state)
-
-
-@view
-def watch(state: State) -> None:
-    """Build the page again where there are other models or channels; it shows nothing."""
-    key = [state.workspace.models(), state.model, state.workspace.channels()]
-    before, state.chosen["compensate.key"] = state.chosen.get("compensate.key"), key
-    if before not in (None, key):
-        page.refresh()
-
-
-@view
-def results(state: State) -> None:
-    """Show what came of it, beside the controls."""
-    shown = {"motion": _followed, "force": trying.estimated, "log": trying.reviewed}
-    shown[state.chosen["compensate.tab"]](state)
+            right(state)
 
 
 def _empty(state: State, tab: str) -> None:
@@ -128,31 +121,30 @@ def _empty(state: State, tab: str) -> None:
 
 def _able(state: State) -> str:
     """Return the model that is inverted: the one that is chosen, or the best that can be."""
-    return trying.model_of(state, following.having(state.workspace, "inverse"))
+    return parts.model_of(state, following.having(state.workspace, "inverse"))
 
 
-def _wish(state: State) -> dict[str, Any]:
+def _wish(state: State) -> Json:
     """Return the motion that is wanted of the chosen model: made by default, or the newest that ran."""
     workspace, name = state.workspace, _able(state)
-    wish: dict[str, Any] = state.chosen.get("compensate.wish", {})
+    wish: Json = state.chosen.get("compensate.wish", {})
     asked = [[*some] for some in following.asked_for(workspace, name)]
     if asked == [[*wish.get("channels", {})], [*wish.get("held", {})]]:
         return wish
     wish = state.chosen["compensate.wish"] = following.wish(workspace, name)
-    ran = [one["reference"] for one in _ran(state).values()]
-    for file in ran[:1]:
+    for one in [*_runs(state).values()][:1]:
         with suppress(MckibbenError):  # it may be gone
-            _take(wish, following.read_run(workspace, file), file)
+            _take(wish, following.read_run(workspace, one["reference"]), one["reference"])
     return wish
 
 
-def _ran(state: State) -> dict[str, dict[str, Any]]:
+def _runs(state: State) -> dict[str, Json]:
     """Return the runs of the model that is inverted, the newest first."""
     runs, name = following.newest(state.workspace, "runs"), _able(state)
     return {run: one for run, one in runs.items() if one["model"] == name}
 
 
-def _take(wish: dict[str, Any], recording: Recording, stored: str = "") -> None:
+def _take(wish: Json, recording: Recording, stored: str = "") -> None:
     """Take the motion of a recording; a stored one keeps its name, so that its runs are shown."""
     for channel, points in following.of_file(recording, wish["channels"]).items():
         wish["channels"][channel] |= {"kind": "points", "points": points}
@@ -169,15 +161,16 @@ def _reference(state: State) -> Recording:
 
 
 def _motion(state: State, names: list[str]) -> None:
-    name, wish = trying.model_of(state, names), _wish(state)
+    name, wish = parts.model_of(state, names), _wish(state)
     channels, held = following.asked_for(state.workspace, name)
     own, unit = wish["channels"][wish["now"]], channels[wish["now"]].unit
+    ready = own["kind"] != "points"
 
     def moved() -> None:
         wish["stored"] = ""
         with suppress(DataError):  # while it is being filled in
             following.shape(wish)
-            results.refresh()
+            followed.refresh()
 
     def reshaped() -> None:
         moved()
@@ -187,30 +180,29 @@ def _motion(state: State, names: list[str]) -> None:
         _take(wish, (await trying.received(state, event))[1])
         page.refresh()
 
+    def field(values: Json, key: str, label: str) -> None:
+        found = ui.number(label, format="%.6g").bind_value(values, key)
+        found.props("dense outlined debounce=400").classes("number")
+        mark(found, f"field-{key}").on_value_change(moved)
+
     with widgets.card("Motion"):
         if len(channels) > 1:
             toggle = ui.toggle([*channels]).bind_value(wish, "now")
             toggle.props("dense no-caps unelevated").on_value_change(lambda _: page.refresh())
             mark(toggle, "channel")
-        shapes = {
-            **following.MOTIONS,
-            "hold": "Stay at one value",
-            "points": "Points, or from a file",
-        }
         with widgets.row(classes="fields"):
-            kind = ui.select(shapes, label="Shape").bind_value(own, "kind").props("dense outlined")
-            mark(kind, "shape").on_value_change(lambda _: reshaped())
-            if own["kind"] == "hold":
-                _number(own, "first", f"At [{unit}]", moved)
-            elif own["kind"] != "points":
-                _number(own, "first", f"From [{unit}]", moved)
-                _number(own, "other", f"To [{unit}]", moved)
-        with widgets.row(classes="fields" if own["kind"] != "points" or held else "hidden"):
-            if own["kind"] != "points":
-                _number(wish, "seconds", "Duration [s]", moved)
-                _number(wish, "cycles", "Cycles", moved)
+            kind = ui.select(SHAPES, label="Shape").bind_value(own, "kind").props("dense outlined")
+            mark(kind, "shape").on_value_change(reshaped)
+            if ready:
+                field(own, "first", f"{'At' if own['kind'] == 'hold' else 'From'} [{unit}]")
+            if own["kind"] in following.MOTIONS:
+                field(own, "other", f"To [{unit}]")
+        with widgets.row(classes="fields" if ready or held else "hidden"):
+            if ready:
+                field(wish, "seconds", "Duration [s]")
+                field(wish, "cycles", "Cycles")
             for key, channel in held.items():
-                _number(wish["held"], key, f"{key}, held [{channel.unit}]", moved)
+                field(wish["held"], key, f"{key}, held [{channel.unit}]")
         with widgets.row():
             mark(widgets.button("Edit points", lambda: _edit(state), "table_rows"), "edit-points")
             with ui.element("div").style("display: none"):
@@ -220,12 +212,6 @@ def _motion(state: State, names: list[str]) -> None:
     _compensator(state, name)
 
 
-def _number(values: dict[str, Any], key: str, label: str, changed: Callable[[], None]) -> None:
-    field = ui.number(label, format="%.6g").bind_value(values, key)
-    field.props("dense outlined debounce=400").classes("number")
-    mark(field, f"field-{key}").on_value_change(lambda _: changed())
-
-
 def _edit(state: State) -> None:
     """Edit the points of the channel at hand as a table."""
     wish = _wish(state)
@@ -233,46 +219,46 @@ def _edit(state: State) -> None:
     if len(own["points"]) > ROWS:
         problem = f"these are {len(own['points'])} points, and a table has {ROWS} at most"
         raise DataError(problem, remedy="choose another shape first, or change the file")
-    points = [{"time": t, "value": y} for t, y in own["points"]]
+    points: list[list[Any]] = [[*point] for point in own["points"]]
 
-    def cell(point: dict[str, Any], key: str, label: str) -> None:
-        field = ui.number(format="%.6g").bind_value(point, key).props("dense borderless")
-        widgets.labelled(field, label)
+    def cell(point: list[Any], at: int, label: str) -> None:
+        found = ui.number(value=point[at], format="%.6g").props("dense borderless")
+        widgets.labelled(found, label)
+        found.on_value_change(lambda event: point.__setitem__(at, event.value))
+
+    def change(how: Callable[[], Any]) -> None:
+        how()
+        rows.refresh()
+
+    def use() -> None:
+        if any(None in point for point in points):
+            raise DataError("a number is missing", remedy="fill it in, or remove the point")
+        following.reference({name: points}, {}, wish["step"], {})
+        own.update(kind="points", points=points)
+        wish["stored"] = ""
+        window.close()
+        page.refresh()
+
+    @ui.refreshable
+    def rows() -> None:
+        cells = []
+        for at, point in enumerate(points, 1):
+            away = partial(change, partial(points.remove, point))
+            remove = partial(widgets.icon_button, "close", f"Remove point {at}", away)
+            fields = [partial(cell, point, 0, f"time of point {at}"),
+                      partial(cell, point, 1, f"{name} of point {at}")]  # fmt: skip
+            cells.append([*fields, remove])
+        widgets.table(["time [s]", name, ""], cells)
 
     with widgets.dialog(f"Points of {name}") as window:
-
-        @ui.refreshable
-        def rows() -> None:
-            cells = [
-                [partial(cell, point, "time", f"time of point {at}"),
-                 partial(cell, point, "value", f"{name} of point {at}"),
-                 partial(widgets.icon_button, "close", f"Remove point {at}", partial(remove, at - 1))]
-                for at, point in enumerate(points, 1)
-            ]  # fmt: skip
-            widgets.table(["time [s]", name, ""], cells)
-
-        def remove(at: int) -> None:
-            del points[at]
-            rows.refresh()
-
-        def add() -> None:
-            last = points[-1] if points else {"time": -1.0, "value": 0.0}
-            points.append({"time": last["time"] + 1.0, "value": last["value"]})
-            rows.refresh()
-
-        def use() -> None:
-            if any(None in point.values() for point in points):
-                raise DataError("a number is missing", remedy="fill it in, or remove the point")
-            given = [(float(point["time"]), float(point["value"])) for point in points]
-            following.reference({name: given}, {}, wish["step"], {})
-            own.update(kind="points", points=given)
-            wish["stored"] = ""
-            window.close()
-            page.refresh()
-
         rows()
         with widgets.row(classes="spread"):
-            mark(widgets.button("Add a point", add, "add"), "add-point")
+
+            def add() -> None:
+                time, value = points[-1] if points else (-1.0, 0.0)
+                points.append([(time or 0.0) + 1.0, value])
+
+            mark(widgets.button("Add a point", partial(change, add), "add"), "add-point")
             mark(widgets.primary("Use these", use), "use-points")
 
 
@@ -284,70 +270,71 @@ def _compensator(state: State, name: str) -> None:
     kinds = {kind: words for kind, words in following.KINDS.items() if kind in uses}
     with widgets.card("Compensator"):
         with widgets.row(classes="fields"):
-            trying.select_model(state, following.having(workspace, "inverse"))
-            form = trying.select(state, "form", kinds, "As", page.refresh)
+            parts.select_model(state, following.having(workspace, "inverse"))
+            form = parts.select(state, "compensate.form", kinds, "As", page.refresh)
         if asked := following.SETTINGS.get(form):
             title = "How it learns" if form == "adaptive" else "Limits and horizon"
             with widgets.details(title), widgets.row():
-                forms.fields(InvertOptions, asked, _values(state, form))
+                forms.fields(InvertOptions, asked, values_of(state, form))
         plants = following.plants(workspace, name)
-        plant = trying.select(state, "plant", plants, "Tried on", page.refresh)
-        if plant:
-            fitting = following.laws(workspace, name, plant)
-            chosen = [x for x in state.chosen.get("compensate.laws", USUAL) if x in fitting]
-            state.chosen["compensate.laws"] = chosen or [*fitting][:1]
-            laws = ui.select(fitting, multiple=True, label="Controllers")
-            laws.bind_value(state.chosen, "compensate.laws").props("dense outlined use-chips")
-            mark(laws, "laws")
-            with widgets.details("Imperfections of the loop"), widgets.row(classes="fields"):
-                forms.fields(TrackOptions, LOOP, _values(state, "loop"))
+        plant = parts.select(state, "compensate.plant", plants, "Tried on", page.refresh)
+        fitting = following.laws(workspace, name, plant) if plant else {}
+        chosen = [x for x in state.chosen.get("compensate.laws", USUAL) if x in fitting]
+        state.chosen["compensate.laws"] = chosen or [*fitting][:1]
+        laws = ui.select(fitting, multiple=True, label="Controllers").props("dense outlined")
+        mark(laws.bind_value(state.chosen, "compensate.laws").props("use-chips"), "laws")
+        with widgets.details("Imperfections of the loop"), widgets.row(classes="fields"):
+            forms.fields(TrackOptions, LOOP, values_of(state, "loop"))
         with widgets.row(classes="spread"):
-            ui.label("Compared with no compensation." if plant else "").classes("muted")
-            text = "Run" if plant else "Show commands"
-            mark(widgets.primary(text, lambda: _start(state, name), "play_arrow"), "run")
+            ui.label("Compared with no compensation.").classes("muted")
+            mark(widgets.primary("Run", partial(_start, state, name), "play_arrow"), "run")
 
 
-def _values(state: State, of: str) -> dict[str, Any]:
-    values: dict[str, Any] = state.chosen.setdefault(f"compensate.values-{of}", {})
+def values_of(state: State, of: str) -> Json:
+    """Return what is filled in of a compensator's settings, or of the loop's."""
+    values: Json = state.chosen.setdefault(f"compensate.values-{of}", {})
     return values
+
+
+def settings_of(state: State, form: str) -> Json:
+    """Return the settings of a compensator that differ from the default."""
+    asked = {key: values_of(state, form).get(key) for key in following.SETTINGS.get(form, ())}
+    return forms.given(InvertOptions, asked)
 
 
 async def _start(state: State, name: str) -> None:
     """Run the compensator with every controller that is chosen, each as a job."""
-    chosen, wish = state.chosen, _wish(state)
-    form, plant = chosen["compensate.form"], chosen["compensate.plant"]
-    values = {key: _values(state, form).get(key) for key in following.SETTINGS.get(form, ())}
-    given: dict[str, Any] = {"model": name, "form": form}
-    given["settings"] = forms.given(InvertOptions, values)
-    options = forms.given(TrackOptions, _values(state, "loop"))
-    if plant and not chosen["compensate.laws"]:
+    form, plant, laws = (state.chosen[f"compensate.{key}"] for key in ("form", "plant", "laws"))
+    if not laws:
         raise DataError("there is no controller", remedy="choose one, such as Compensator alone")
-    if not wish["stored"]:
-        reference = _reference(state)
-        wish["stored"] = await run.io_bound(following.stored, state.workspace, reference)
-    given["reference"] = wish["stored"]
-    if not plant:
-        trying.submit(state, following.commands, "runs", f"{name} commands", given)
-    for law in chosen["compensate.laws"] if plant else ():
-        loop = given | {"plant": plant, "options": options, "controller": law}
+    asked = {"model": name, "form": form, "settings": settings_of(state, form), "plant": plant}
+    asked["options"] = forms.given(TrackOptions, values_of(state, "loop"))
+    wish, reference = _wish(state), _reference(state)
+    wish["stored"] = wish["stored"] or await run.io_bound(
+        following.stored, state.workspace, reference
+    )
+    for law in laws:
         title = " ".join([name, *([form] if form != "inverse" else []), law])
-        trying.submit(state, following.loop, "runs", title, loop)
+        more = {"reference": wish["stored"], "controller": law}
+        trying.start(state, following.loop, title, asked | more)
 
 
 # -- what came of it ----------------------------------------------------------------------------------
 
 
-def _followed(state: State) -> None:
-    wish, runs, reference = _wish(state), _ran(state), _reference(state)
+@parts.steady("runs", jobs=["loop"])
+def followed(state: State) -> None:
+    """Show the motion, what came of it, and the errors of all runs of the model."""
+    wish, runs, reference = _wish(state), _runs(state), _reference(state)
     reach = following.reach(state.workspace, _able(state))
     of_it = [run for run, one in runs.items() if one["reference"] == wish["stored"]]
     chosen = state.chosen.get("compensate.run")
     chosen = chosen if chosen in of_it else next(iter(of_it), "")
     with widgets.card("What is wanted, and what came of it" if chosen else "What is wanted"):
-        drawn = dict.fromkeys([*filter(None, [chosen]), *of_it])
-        _motion_plot(state, reference, reach, {run: runs[run] for run in [*drawn][:DRAWN]})
-        if why := _doubt(state):
-            widgets.error_box(why)
+        drawn = sorted(of_it, key=lambda run: run != chosen)[:DRAWN]
+        _plot(state, reference, reach, {run: runs[run] for run in drawn})
+        if doubt := modelling.against(modelling.comparable(state.workspace, state.sides)):
+            widgets.error_box(doubt)
         together = "; each channel by itself, all at once less" if len(reach) > 1 else ""
         ui.label(f"Shaded: what the model reaches{together}.").classes("muted")
         for channel, (low, high) in reach.items():
@@ -355,20 +342,16 @@ def _followed(state: State) -> None:
             if (out := (values < low - margin) | (values > high + margin)).any():
                 share = f"{100 * out.mean():.0f} % of {channel} is out of reach"
                 mark(ui.label(f"{share}: {low:.3g} to {high:.3g}."), "out-of-reach")
-        trying.going(state, ("loop", "commands"))
+        for job in parts.jobs_of(state, ["loop"]):
+            parts.show_job(state, job)
         if runs:
             _errors(state, runs, chosen)
-            if chosen:
-                with widgets.details(f"More of {_title(runs[chosen])}"):
-                    widgets.items(following.shown(runs[chosen]))
         else:
             text = "Run shows the errors beside no compensation, and the commands, here."
             mark(ui.label(text).classes("muted"), "nothing-yet")
-
-
-def _doubt(state: State) -> str:
-    """Return why no model of these channels is recommended; empty where one is."""
-    return modelling.against(modelling.comparable(state.workspace, state.sides))
+        if chosen:
+            with widgets.details(f"More of {_title(runs[chosen])}"):
+                widgets.items(modelling.restored(runs[chosen]))
 
 
 def _title(one: Mapping[str, Any]) -> str:
@@ -382,44 +365,50 @@ def _scored(state: State, name: str) -> Recording | None:
     """Return the recording of a run without its approach; None where it is gone."""
     with suppress(MckibbenError):
         one = following.read_run(state.workspace, f"{name}.csv")
-        before = round(-one.start_time / (one.sample_time or 1.0))
-        return one.slice(before, len(one)) if before > 0 else one
+        return one.slice(max(round(-one.start_time / (one.sample_time or 1.0)), 0), len(one))
     return None
 
 
-def _motion_plot(
+def _plot(
     state: State,
     reference: Recording,
-    reach: Mapping[str, following.Ends],
-    runs: Mapping[str, Mapping[str, Any]],
+    reach: Mapping[str, tuple[float, float]],
+    runs: Mapping[str, Json],
 ) -> None:
-    """Draw what is wanted over time, and what came of it; shade what can be reached.
+    """Draw what is wanted, what can be reached, and what runs measured, the first before others.
 
-    Below are the commands of the first run, which is the one that is chosen.
+    Below are the commands of the first.
     """
-    panels = []
+    panels, named = [], set[str]()
     ran = {name: one for name in runs if (one := _scored(state, name)) is not None}
+
+    def curve(time: Any, y: Any, name: str, colour: str, style: Any = "line") -> Curve:
+        """Return a curve whose name is in the legend once."""
+        shown = "" if name in named else name
+        named.add(name)
+        return Curve(*over_time(time, y), shown, colour, style)
+
     for channel in reach:
-        courses: list[trying.Course] = [
-            (reference.time, reference[channel], "wanted", "measured", "line")
-        ]
-        key = f"uncompensated_{channel}"
-        for one in [one for one in ran.values() if key in one][:1]:
-            courses.append((_due(one), one[key], "no compensation", "muted", "fine"))
+        curves = [curve(reference.time, reference[channel], "wanted", "measured")]
         for place, (name, one) in enumerate(ran.items()):
+            due = one.time - (one.sample_time or 0.0)  # it is recorded a step later
+            plain = one.channels.get(f"uncompensated_{channel}")
+            if plain is not None and place == 0:
+                curves.append(curve(due, plain, "no compensation", "muted", "fine"))
             if channel in one:
-                look = _title(runs[name]), series_colour(place), "line"
-                courses.append((_due(one), one[channel], *look))
-        panels.append((axis_label(channel, reference.units.get(channel, "")), courses))
+                curves.append(curve(due, one[channel], _title(runs[name]), series_colour(place)))
+        label = axis_label(channel, reference.units.get(channel, ""))
+        panels.append(Panel("time [s]", label, tuple(curves)))
     for name, one in [*ran.items()][:1]:
-        found = _commanded(one, {*runs[name].get("rmse", {}), *_wish(state)["held"]})
-        courses = [
-            (one.time, one[key], key, series_colour(place), "line")
-            for place, key in enumerate(found)
-        ]
-        if found:
-            panels.append((axis_label("command", one.units.get(found[0], "")), courses))
-    (figure,) = interactive.plots(trying.drawing(panels))
+        known = {*runs[name].get("rmse", {}), *_wish(state)["held"]}
+        driven = [key for key in one.channels if key.startswith(DRIVEN) and key not in known]
+        moved = [key for key in driven if np.ptp(one[key]) > 0]
+        moved = [key for key in moved if key.startswith("command_")] or moved
+        commands = [curve(one.time, one[x], x, series_colour(k)) for k, x in enumerate(moved)]
+        if moved:
+            label = axis_label("command", one.units.get(moved[0], ""))
+            panels.append(Panel("time [s]", label, tuple(commands)))
+    (figure,) = interactive.plots(Drawing(tuple(panels), stacked=True))
     for row, (low, high) in enumerate(reach.values()):
         axis = str(row + 1) if row else ""
         shade = {"type": "rect", "xref": f"x{axis} domain", "yref": f"y{axis}", "x0": 0, "x1": 1}
@@ -429,31 +418,26 @@ def _motion_plot(
     mark(widgets.plot_of(figure, height=height), "motion-plot")
 
 
-def _due(one: Recording) -> Any:
-    """Return times at which what is measured was due: a step before it is recorded."""
-    return one.time - (one.sample_time or 0.0)
-
-
-def _errors(state: State, runs: Mapping[str, Mapping[str, Any]], chosen: str) -> None:
+def _errors(state: State, runs: Mapping[str, Json], chosen: str) -> None:
     """Show the errors of all runs of the model; one that is chosen brings its motion back."""
     names, rows = [*runs], []
+
+    def text(one: Json, errors: Mapping[str, float] | None) -> str:
+        units = one.get("units", {})
+        each = (f"{number(x, 3)} {units.get(key, '')}" for key, x in (errors or {}).items())
+        return ", ".join(each) or "–"
+
     for name, one in runs.items():
         plain = one.get("uncompensated") or {}
         errors = one.get("rmse"), plain.get("rmse", plain), one.get("largest")
-        units = one.get("units", {})
-        texts = [
-            ", ".join(f"{number(x, 3)} {units.get(key, '')}" for key, x in (of or {}).items())
-            or "–"
-            for of in errors
-        ]
-        motion = one["reference"].removesuffix(".csv")
-        limited = str(one.get("clipped", "–"))
+        texts = [text(one, of) for of in errors]
+        motion, limited = one["reference"].removesuffix(".csv"), str(one.get("clipped", "–"))
         rows.append([_title(one), motion, *texts, limited, partial(_acts, state, name)])
 
     def choose(at: int) -> None:
         state.chosen["compensate.run"], file = names[at], runs[names[at]]["reference"]
         if file == _wish(state)["stored"]:
-            results.refresh()
+            followed.refresh()
         else:
             _take(_wish(state), following.read_run(state.workspace, file), file)
             page.refresh()
@@ -474,11 +458,3 @@ def _acts(state: State, name: str) -> None:
     with ui.element("div").classes("acts").on("click.stop", js_handler="() => {}"):
         widgets.icon_button("download", f"Download {name}", partial(widgets.download, path))
         widgets.icon_button("delete_outline", f"Delete {name}", away)
-
-
-def _commanded(one: Recording, known: set[str]) -> list[str]:
-    """Return the channels of what was commanded in a run, or else of what drove the plant."""
-    kinds = ("pressure", "voltage", "force", "command")
-    found = [key for key in one.channels if key.partition("_")[0] in kinds and key not in known]
-    found = [key for key in found if np.ptp(one[key]) > 0]
-    return [key for key in found if key.startswith("command_")] or found

@@ -14,12 +14,11 @@ from mckibben import example, registry
 from mckibben.app import together, widgets
 from mckibben.app.pages import importing
 from mckibben.app.state import State, view
-from mckibben.app.steps import Reading, Step
+from mckibben.app.steps import Entry, Reading, Step
 from mckibben.app.terms import said
 from mckibben.app.virtual import FIRST, TITLES, record
 from mckibben.app.widgets import mark
-from mckibben.app.workspace import Entry
-from mckibben.errors import DataError, MckibbenError, TooLargeError
+from mckibben.errors import DataError, MckibbenError
 from mckibben.files import read
 from mckibben.files.formats import READERS
 from mckibben.recording import Recording
@@ -45,9 +44,8 @@ def build(state: State) -> None:
     """Build the page."""
     with mark(ui.element("div").classes("page"), "page-data"):
         with widgets.row(classes="spread"):
-            widgets.heading(
-                "Data", "Recordings to identify models with, and others to test them on."
-            )
+            text = "Recordings to identify models with, and others to test them on."
+            widgets.heading("Data", text)
             mark(widgets.primary("Add files", lambda: files.run_method("pickFiles"), "add"), "add")
         with ui.element("div").style("display: none"):
             files = _upload(state)
@@ -65,8 +63,13 @@ def _upload(state: State) -> Any:
 
 
 def _is_empty(state: State) -> bool:
-    known = state.workspace.names("recordings")
-    return not known and not _unread(state) and "data.removed" not in state.chosen
+    rest = _unread(state) or state.chosen.get("data.removed")
+    return not (rest or state.workspace.names("recordings"))
+
+
+async def _changed(state: State, change: Callable[..., Any], *given: Any) -> None:
+    await asyncio.to_thread(change, *given)
+    state.changed()
 
 
 @view
@@ -78,10 +81,16 @@ def start(state: State) -> None:
         "A file with columns such as time, pressure and displacement: CSV, Excel, MATLAB, HDF5, TDMS, "
         "LabVIEW, Parquet or a ROS bag. Names and units of columns are recognised, and can be corrected."
     )
+
+    def add() -> None:
+        for file, role in ((example.TRAIN, "train"), (example.TEST, "test")):
+            (run,) = read(file)
+            state.workspace.add_recording(run, name=run.name, role=role)  # type: ignore[arg-type]
+
     with widgets.card():
         title = "Start with a recording of your muscle"
         with widgets.empty("show_chart", title, text), widgets.row():
-            button = widgets.button("Open the example", partial(_example, state), "science")
+            button = widgets.button("Open the example", partial(_changed, state, add), "science")
             mark(button, "example")
             _virtual(state)
         _upload(state)
@@ -91,8 +100,11 @@ def start(state: State) -> None:
 def listed(state: State) -> None:
     """Show all recordings, and what drives and what moves."""
     if not _is_empty(state):
-        _recordings(state, state.workspace.entries())
-        _sides(state)
+        with widgets.card("Recordings"):
+            _recordings(state, state.workspace.entries())
+        if state.workspace.used():
+            with widgets.card("What drives, what moves"):
+                _sides(state, state.workspace.channels())
 
 
 @view
@@ -101,7 +113,8 @@ def shown(state: State) -> None:
     entries = state.workspace.entries()
     for entry in entries:
         if entry.name == state.recording:
-            _recording(state, entry)
+            with widgets.card():
+                _recording(state, entry)
     if any(one.role == "train" for one in entries):
         text = "Channels and roles are right? See what the muscle does."
         widgets.next_step(text, "Look", "/look")
@@ -111,14 +124,14 @@ def _virtual(state: State) -> None:
     """Offer to record a virtual muscle, of which there are runs to choose."""
 
     def ask() -> None:
-        def listed() -> None:
+        def offer() -> None:
             found = {one.name: f"{one.name} ({one.role})" for one in protocol(str(rig.value)).runs}
             runs.set_options(found, value=list(found)[:2])
 
         def start() -> None:
             if not runs.value:
                 raise DataError("no run is chosen", remedy="choose one under Runs")
-            title = TITLES.get(rig.value, rig.value)
+            title = names[rig.value]
             state.jobs.submit(record, title, protocol=rig.value, runs=list(runs.value))
             shown.close()
 
@@ -127,20 +140,11 @@ def _virtual(state: State) -> None:
             rig = mark(ui.select(names, value=FIRST, label="Rig"), "rig").props("dense outlined")
             runs = ui.select([], multiple=True, with_input=True, label="Runs")
             runs.props("dense outlined use-chips")
-            rig.on_value_change(listed)
-            listed()
+            rig.on_value_change(offer)
+            offer()
             mark(widgets.primary("Record", start), "record")
 
     mark(widgets.button("Record a virtual muscle", ask, "smart_toy"), "virtual")
-
-
-async def _example(state: State) -> None:
-    def add() -> None:
-        for file, role in ((example.TRAIN, "train"), (example.TEST, "test")):
-            (run,) = read(file)
-            state.workspace.add_recording(run, name=run.name, role=role)  # type: ignore[arg-type]
-
-    await _changed(state, add)
 
 
 # -- files ------------------------------------------------------------------------------------------
@@ -156,17 +160,14 @@ async def _received(state: State, event: events.UploadEventArguments) -> None:
     """Keep a file, and read it as it is; where that does not work, ask."""
     with state.workspace.receiving(event.file.name, event.file.size()) as (part, path):
         await event.file.save(part)
-    upload = path.name
+    unread = _unread(state)
     try:
-        state.recording, *_ = await asyncio.to_thread(state.workspace.add, upload)
-    except TooLargeError:
-        path.unlink(missing_ok=True)
-        raise
+        state.recording, *_ = await asyncio.to_thread(state.workspace.add, path.name)
     except MckibbenError as error:
-        _unread(state)[upload] = error
+        unread[path.name] = error
     state.changed()
-    if [*_unread(state)] == [upload]:
-        await _ask(state, upload)
+    if [*unread] == [path.name]:
+        await _ask(state, path.name)
 
 
 async def _ask(state: State, upload: str) -> None:
@@ -174,14 +175,14 @@ async def _ask(state: State, upload: str) -> None:
     workspace, unread = state.workspace, _unread(state)
 
     async def take(reading: Reading, others: bool) -> None:
-        for one in [upload, *(other for other in [*unread] if others and other != upload)]:
+        add = partial(workspace.add, reading=reading)
+        state.recording, *_ = await asyncio.to_thread(add, upload)
+        unread.pop(upload, None)
+        for one in [*unread] if others else ():
             try:
-                first, *_ = await asyncio.to_thread(partial(workspace.add, one, reading=reading))
+                await asyncio.to_thread(add, one)
                 unread.pop(one, None)
-                state.recording = first if one == upload else state.recording
             except MckibbenError as error:
-                if one == upload:
-                    raise
                 unread[one] = error
         state.changed()
 
@@ -192,25 +193,19 @@ async def _ask(state: State, upload: str) -> None:
 async def _correct(state: State, entry: Entry) -> None:
     """Ask how a recording is to be read instead, and those that are read like it."""
     workspace = state.workspace
-
-    def channels(name: str) -> list[str] | None:
-        try:
-            return list(workspace.recording(name).channels)
-        except MckibbenError:
-            return None
-
-    own = channels(entry.name)
-    others = [one for one in workspace.entries() if one.name != entry.name and one.way == entry.way]
-    alike = [one.name for one in others if channels(one.name) == own]
+    channels = {name: [*run.channels] for name, run in workspace.used().items()}
+    like = [one.name for one in workspace.entries() if one.reading == entry.reading]
+    own = channels.pop(entry.name, [])
+    alike = [name for name in like if channels.get(name) == own]
 
     async def take(reading: Reading, all_so: bool) -> None:
         for name in [entry.name, *(alike if all_so else ())]:
-            await asyncio.to_thread(workspace.read_again, name, reading)
+            await asyncio.to_thread(partial(workspace.change, name, reading=reading))
         state.changed()
 
-    path = workspace.path("uploads", entry.upload) if entry.upload else workspace.raw_path(entry)
+    path = workspace.raw_path(entry)
     text = f"Also read {', '.join(alike[:3])}{' …' * (len(alike) > 3)} so" if alike else ""
-    await importing.ask(path, entry.way, take, others=text, verb="Read again", ticked=False)
+    await importing.ask(path, entry.reading, take, others=text, verb="Read again", ticked=False)
 
 
 # -- the list ---------------------------------------------------------------------------------------
@@ -219,14 +214,14 @@ async def _correct(state: State, entry: Entry) -> None:
 def _recordings(state: State, entries: list[Entry]) -> None:
     names = [one.name for one in entries]
 
-    def discard(upload: str) -> None:
+    def discard(upload: str) -> Any:
         _unread(state).pop(upload, None)
-        state.workspace.path("uploads", upload).unlink(missing_ok=True)
-        state.changed()
+        return _changed(
+            state, state.workspace.path("uploads", upload).unlink, True
+        )  # if it is there
 
-    def restore() -> None:
-        state.workspace.restore(state.chosen.pop("data.removed"))
-        state.changed()
+    def restore() -> Any:
+        return _changed(state, state.workspace.restore, state.chosen.pop("data.removed"))
 
     def choose(at: int) -> None:
         if state.recording != names[at]:
@@ -234,30 +229,29 @@ def _recordings(state: State, entries: list[Entry]) -> None:
             listed.refresh()
             shown.refresh()
 
-    with widgets.card("Recordings"):
-        for upload, error in _unread(state).items():
-            widgets.error_box(error)
-            with widgets.row():
-                widgets.button("How is it read?", partial(_ask, state, upload))
-                widgets.button("Discard", partial(discard, upload))
-        if removed := state.chosen.get("data.removed"):
-            with widgets.row():
-                ui.label(f"{removed} was removed.").classes("muted")
-                mark(widgets.button("Bring it back", restore, "undo"), "restore")
-        if entries:
-            chosen = names.index(state.recording) if state.recording in names else None
-            heads, rows = (
-                ["Name", "Role", "Samples", "Channels"],
-                [_line(state, e) for e in entries],
-            )
-            mark(widgets.table(heads, rows, chosen=chosen, on_choose=choose), "recordings")
-        if entries and not any(one.role == "test" for one in entries):
-            ui.label(
-                "None is for testing: add another recording, or split this one in two. Without, models "
-                "are judged by cross-validation alone."
-            ).classes("muted")
-        _upload(state)
-        _virtual(state)
+    if unread := _unread(state):
+        first, *others = unread  # mostly, they are alike
+        widgets.error_box(unread[first])
+        with widgets.row():
+            widgets.button("How is it read?", partial(_ask, state, first))
+            widgets.button("Discard", partial(discard, first))
+        if others:
+            ui.label(f"Not read yet either: {', '.join(others)}").classes("muted")
+    if removed := state.chosen.get("data.removed"):
+        with widgets.row():
+            ui.label(f"{removed} was removed.").classes("muted")
+            mark(widgets.button("Bring it back", restore, "undo"), "restore")
+    if entries:
+        chosen = names.index(state.recording) if state.recording in names else None
+        heads, rows = ["Name", "Role", "Samples", "Channels"], [_line(state, e) for e in entries]
+        mark(widgets.table(heads, rows, chosen=chosen, on_choose=choose), "recordings")
+    if entries and not any(one.role == "test" for one in entries):
+        ui.label(
+            "None is for testing: add another recording, or split this one in two. Without, models are "
+            "judged by cross-validation alone."
+        ).classes("muted")
+    _upload(state)
+    _virtual(state)
 
 
 def _line(state: State, entry: Entry) -> list[Any]:
@@ -271,88 +265,70 @@ def _line(state: State, entry: Entry) -> list[Any]:
     return [entry.name, role, recording.n_samples, ", ".join(recording.channels)]
 
 
-def _sides(state: State) -> None:
+def _sides(state: State, known: list[str]) -> None:
     """Let inputs, outputs and the load be chosen, of channels that all recordings have."""
-    known = state.workspace.channels()
-    if not state.workspace.used():
+    workspace = state.workspace
+    if not known:
+        widgets.error_box(
+            "The recordings in use have no channel in common. Join those of one run, set one of them to "
+            "unused, or correct how it is read"
+        )
+        if several := together.pairs(workspace):
+            text = f"Join {' and '.join(several[0])}" + " …" * (len(several) > 1)
+            join = partial(_changed, state, together.join, workspace)
+            mark(widgets.button(text, join, "merge"), "join")
         return
+    if times := together.sample_times(workspace):
+        slow = f"{times[1]:.4g}"
+        with widgets.row():
+            ui.label(f"Sample times differ, from {times[0]:.4g} to {slow} s.").classes("muted")
+            alike = partial(_changed, state, together.resample, workspace, times[1])
+            mark(widgets.button(f"Resample to {slow} s", alike), "one-rate")
+    if state.outputs == ["force"] and "pressure" in known and "pressure" not in state.inputs:
+        ui.label("Models of a force are given the pressure, too.").classes("muted")
+    rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
 
     def choose(side: str, event: Any) -> None:
         if side == "load" or event.value:
             setattr(state, side, event.value or "")
             state.changed()
 
-    with widgets.card("What drives, what moves"):
-        if not known:
-            widgets.error_box(
-                "The recordings in use have no channel in common. Join those of one run, set one of "
-                "them to unused, or correct how it is read"
-            )
-            if several := together.pairs(state.workspace):
-                text = f"Join {' and '.join(several[0])}" + " …" * (len(several) > 1)
-                join = partial(together.join, state.workspace)
-                mark(widgets.button(text, partial(_changed, state, join), "merge"), "join")
-            return
-        if times := together.sample_times(state.workspace):
-            slow = f"{times[1]:.4g}"
-            with widgets.row():
-                ui.label(f"Sample times differ, from {times[0]:.4g} to {slow} s.").classes("muted")
-                alike = partial(together.resample, state.workspace, times[1])
-                button = widgets.button(f"Resample to {slow} s", partial(_changed, state, alike))
-                mark(button, "one-rate")
-        if state.outputs == ["force"] and "pressure" in known and "pressure" not in state.inputs:
-            ui.label("Models of a force are given the pressure, too.").classes("muted")
-        rest = [name for name in known if name not in (*state.inputs, *state.outputs)]
-        loads = {"": "By name, or none", **{name: name for name in rest}}
-        for side, options in (("inputs", known), ("outputs", known), ("load", loads)):
-            value = getattr(state, side)
-            if side == "load":
-                value = value if value in rest else ""
-            else:
-                value = [name for name in value if name in known]
-            field: Any = ui.select(
-                options, value=value, multiple=side != "load", label=side.capitalize()
-            )
-            field.on_value_change(partial(choose, side)).set_visibility(
-                side != "load" or bool(rest)
-            )
-            mark(field.props("dense outlined"), side)
+    def field(side: str, options: Any, value: Any) -> None:
+        several, label = side != "load", side.capitalize()
+        made: Any = ui.select(options, value=value, multiple=several, label=label)
+        made.on_value_change(partial(choose, side)).set_visibility(several or bool(rest))
+        mark(made.props("dense outlined"), side)
+
+    for side in ("inputs", "outputs"):
+        field(side, known, [name for name in getattr(state, side) if name in known])
+    loads = {"": "By name, or none", **{name: name for name in rest}}
+    field("load", loads, state.load if state.load in rest else "")
 
 
 # -- one recording ----------------------------------------------------------------------------------
 
 
 def _recording(state: State, entry: Entry) -> None:
-    with widgets.card():
-        with widgets.row(classes="spread"):
-            ui.label(entry.name).classes("subtitle").props('role=heading aria-level="3"')
-            with widgets.row():
-                _actions(state, entry)
-        try:
-            recording = state.workspace.recording(entry.name)
-        except MckibbenError as error:
-            widgets.error_box(error)
-            return
-        ui.label(importing.summary(recording)).classes("muted")
-        _part(state, entry, recording)
-        _steps(state, entry, recording)
-        if notes := dict.fromkeys([*recording.notes, *entry.notes]):
-            with widgets.details("Notes of the reading"):
-                for note in notes:
-                    ui.label(said(note)).classes("muted")
+    with widgets.row(classes="spread"):
+        ui.label(entry.name).classes("subtitle").props('role=heading aria-level="3"')
+        with widgets.row():
+            _actions(state, entry)
+    recording = state.workspace.recording(entry.name)
+    ui.label(importing.summary(recording)).classes("muted")
+    _part(state, entry, recording)
+    _steps(state, entry, recording)
+    if notes := dict.fromkeys([*recording.notes, *entry.notes]):
+        with widgets.details("Notes of the reading"):
+            for note in notes:
+                ui.label(said(note)).classes("muted")
 
 
 def _actions(state: State, entry: Entry) -> None:
-    name, workspace = entry.name, state.workspace
+    name, workspace, act = entry.name, state.workspace, partial(_changed, state)
 
-    def role(event: Any) -> None:
-        workspace.change(name, role=event.value)
-        state.changed()
-
-    def remove() -> None:
-        workspace.remove(name)
+    def remove() -> Any:
         state.chosen["data.removed"] = name
-        state.changed()
+        return act(workspace.remove, name)
 
     def rename() -> None:
         def done() -> None:
@@ -365,8 +341,9 @@ def _actions(state: State, entry: Entry) -> None:
             field.on("keydown.enter", widgets.guarded(done), [])
             widgets.primary("Rename", done)
 
-    picked = ui.toggle(ROLES, value=entry.role, on_change=widgets.guarded(role))
-    mark(picked.props("dense no-caps unelevated toggle-color=primary"), "role")
+    picked = ui.toggle(ROLES, value=entry.role).props("dense no-caps unelevated")
+    role = widgets.guarded(lambda e: act(partial(workspace.change, name, role=e.value)))
+    mark(picked.props("toggle-color=primary").on_value_change(role), "role")
     mark(widgets.button("How it is read", lambda: _correct(state, entry), "tune"), "correct")
     widgets.icon_button("edit", "Rename", rename)
     mark(widgets.icon_button("delete_outline", "Remove", remove), "remove")
@@ -374,10 +351,10 @@ def _actions(state: State, entry: Entry) -> None:
 
 def _part(state: State, entry: Entry, recording: Recording) -> None:
     """Draw a recording over time, and let a part be kept or split off."""
+    workspace, time = state.workspace, recording.time
     sides = [name for name in (*state.inputs, *state.outputs) if name in recording]
     channels = list(dict.fromkeys([*sides, *recording.channels]))[: max(MOST_DRAWN, len(sides))]
-    drawing = draw(recording, "time", channels=channels)
-    height = min(160 * len(channels) + 60, 420)
+    drawing, height = draw(recording, "time", channels=channels), min(160 * len(channels) + 60, 420)
     for figure in widgets.plot(drawing, height=height, dragged="select"):
         figure.figure["layout"]["selectdirection"] = "h"
         mark(figure, "over-time")
@@ -393,18 +370,16 @@ def _part(state: State, entry: Entry, recording: Recording) -> None:
             remedy = "drag across the plot, or give From and To"
             raise DataError("no part is selected", remedy=remedy)
         half = 0.5 * (recording.sample_time or 1.0)
-        low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
-        first, last = np.searchsorted(recording.time, (low - half, high + half))
+        first = 0 if low is None else np.searchsorted(time, low - half)
+        last = len(time) if high is None else np.searchsorted(time, high + half)
         return int(first), int(last)
 
-    async def keep() -> None:
+    def keep() -> Any:
         first, last = samples()
-        await _changed(
-            state, state.workspace.do, entry.name, Step(do="slice", start=first, stop=last)
-        )
+        return _changed(state, workspace.do, entry.name, Step(do="slice", start=first, stop=last))
 
-    async def split() -> None:
-        await _changed(state, state.workspace.split, entry.name, samples()[0])
+    def split() -> Any:
+        return _changed(state, workspace.split, entry.name, samples()[0])
 
     unit = "s" if recording.sample_time is not None else "sample"
     with widgets.row():
@@ -433,8 +408,8 @@ def _steps(state: State, entry: Entry, recording: Recording) -> None:
     others = [name for name in recording.channels if name != driving]
 
     def offer(text: str, do: Any, values: Callable[[], dict[str, Any]]) -> None:
-        async def act() -> None:
-            await _changed(state, state.workspace.do, entry.name, Step(do=do, **values()))
+        def act() -> Any:
+            return _changed(state, state.workspace.do, entry.name, Step(do=do, **values()))
 
         mark(widgets.button(text, act), do)
 
@@ -446,14 +421,6 @@ def _steps(state: State, entry: Entry, recording: Recording) -> None:
             offer("Resample", "resample", lambda: {"sample_time": step.value})
         of = ui.select(others, value=others[:1], multiple=True, label="Channels")
         of.props("dense outlined")
-        offer(
-            f"Zero where {driving} is lowest",
-            "zero",
-            lambda: {"channels": of.value, "over": driving},
-        )
+        zero = f"Zero where {driving} is lowest"
+        offer(zero, "zero", lambda: {"channels": of.value, "over": driving})
         offer("Remove drift", "detrend", lambda: {"channels": of.value})
-
-
-async def _changed(state: State, change: Callable[..., Any], *given: Any) -> None:
-    await asyncio.to_thread(change, *given)
-    state.changed()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -12,27 +13,24 @@ from typing import Any
 from nicegui import ui
 
 from mckibben.app import widgets
-from mckibben.app.steps import TEXT, Reading, columns_in, understand
+from mckibben.app.steps import Reading, understand
 from mckibben.app.terms import GAPS, said
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files.choosing import Seen
+from mckibben.files.formats import READERS
+from mckibben.files.reading import columns_of
 from mckibben.options import constant
 from mckibben.recording import Recording
 
 CHANNELS = (
-    "time",
-    "pressure",
-    "displacement",
-    "force",
-    "length",
-    "contraction",
-    "angle",
+    *("time", "pressure", "displacement", "force", "length", "contraction", "angle"),
     "voltage",
 )
 """Channels that are offered; any other name can be typed."""
 
-ENCODINGS = ("utf-8", "cp1252", "utf-16", "cp932", "gb18030", "cp949")
+KNOWN = ("utf-8", "cp1252", "utf-16", "cp932", "gb18030", "cp949")
+ENCODINGS: dict[str | None, str] = {None: "As found", **{name: name for name in KNOWN}}
 
 FIRST_LINES = 8
 """Of a text that are shown."""
@@ -58,10 +56,6 @@ class Column:
         """Gain and offset."""
         return self.gain or 1.0, self.offset or 0.0
 
-    def turn(self) -> None:
-        """Turn the sign."""
-        self.gain, self.offset = (-one for one in self.line)
-
 
 @dataclass
 class Form:
@@ -80,81 +74,70 @@ class Form:
     def start(self, reading: Reading) -> None:
         """Begin with a reading."""
         self.reading, self.columns = reading, []
-        held = "; ".join(f"{c} = {v:g} {u}" for c, (v, u) in reading.constants.items())
-        names = ("rate", "rest_length", "gaps", "raw", "encoding")
-        self.values |= {name: getattr(reading, name) for name in names} | {"held": held}
-        self.values |= {"header": reading.header or None, "skip": reading.skip or None}
+        self.values |= {name: getattr(reading, name) for name in ("rest_length", "gaps", "raw")}
+        self.values |= {name: getattr(reading, name) or None for name in ("rate", *LAYOUT)}
+        each = reading.constants.items()
+        self.values["held"] = "; ".join(f"{name} = {v:g} {unit}" for name, (v, unit) in each)
 
     def look(self) -> bool:
         """Read the file as it is said to be, and return whether its columns are others now."""
-        self.error, self.recordings, columns = None, [], None
+        columns: list[Seen] = []
+        self.error, self.recordings = None, []
         try:
             self.reading = self.said()
             self.recordings, columns = understand(self.path, self.reading)
         except MckibbenError as error:
             self.error = error
-        if columns is None:
-            columns = columns_in(self.path, self.reading)
+            with suppress(DataError):
+                columns = columns_of(self.path, **self.reading.options() | {"channels": None})
         if self.columns and [c.seen.header for c in self.columns] == [c.header for c in columns]:
             return False
-        way = self.reading
+        units, lines = self.reading.units, self.reading.calibration
         self.columns = [
-            Column(
-                *(one, one.channel, way.units.get(one.channel, one.unit)),
-                *way.calibration.get(one.channel, (1.0, 0.0)),
-            )
-            for one in columns
+            Column(one, of, units.get(of, one.unit), *lines.get(of, (1.0, 0.0)))
+            for one, of in ((one, one.channel) for one in columns)
         ]
         return True
 
     def said(self) -> Reading:
-        """Return the reading that the controls say.
-
-        Raises
-        ------
-        DataError
-            If they contradict each other.
-        """
-        held = self.values["held"].split(";")
+        """Return the reading that the controls say; `DataError` if they contradict each other."""
+        general = {name: self.values[name] for name in ("rate", "rest_length", "gaps", "raw")}
+        general |= {name: int(self.values[name] or 0) for name in ("header", "skip")}
+        general["encoding"] = self.values["encoding"]
+        held = [part.replace(" = ", "=").strip() for part in self.values["held"].split(";")]
         try:
-            constants = dict(constant(p.replace(" = ", "=").strip()) for p in held if p.strip())
+            general["constants"] = dict(constant(part) for part in held if part)
         except ValueError:
             problem = f"{self.values['held']!r:.80} is no channel with a value and a unit"
             raise DataError(problem, parameter="constants", remedy="write force = 200 g") from None
-        general = self.values | {"constants": constants}
-        general |= {name: int(self.values[name] or 0) for name in ("header", "skip")}
         if any(general[name] != getattr(self.reading, name) for name in LAYOUT):
             self.columns = []  # others: what was said of these is void
-            return Reading.model_validate(general)
+            return Reading(**general)
         if not self.columns:
-            return Reading.model_validate(self.reading.model_dump() | general)
-        named = {one.channel: one for one in self.columns if one.channel}
-        if len(named) < sum(bool(one.channel) for one in self.columns):
-            twice = [one.channel for one in self.columns if one.channel]
-            channel = next(name for name in named if twice.count(name) > 1)
+            return self.reading.model_copy(update=general)
+        used = [(one.channel, one) for one in self.columns if one.channel]
+        channel, count = Counter(name for name, _ in used).most_common(1)[0] if used else ("", 0)
+        if count > 1:
             problem = "two columns are this channel"
             raise DataError(problem, channel=channel, remedy="clear one of `columns`")
-        seen = {name: one.seen for name, one in named.items()}
-        units = {name: one.unit or "" for name, one in named.items()}
-        lines = {name: one.line for name, one in named.items() if one.line != (1.0, 0.0)}
-        all_used = all(one.channel or not one.seen.unasked for one in self.columns)
-        return Reading.model_validate(
-            general
-            | {
-                "columns": {n: one.header for n, one in seen.items() if n != one.unasked},
-                "units": {n: unit for n, unit in units.items() if unit != seen[n].unit},
-                "calibration": lines,
-                "channels": None if all_used else [name for name in named if name != "time"],
-            }
+        left_out = any(one.seen.unasked and not one.channel for one in self.columns)
+        return Reading(
+            **general,
+            columns={n: one.seen.header for n, one in used if n != one.seen.unasked},
+            units={n: one.unit or "" for n, one in used if (one.unit or "") != one.seen.unit},
+            calibration={n: one.line for n, one in used if one.line != (1.0, 0.0)},
+            channels=[n for n, _ in used if n != "time"] if left_out else None,
         )
 
     def lines(self) -> list[str]:
         """Return the first lines of a text."""
-        if self.path.suffix.casefold() not in TEXT:
+        if READERS.get(self.path.suffix.casefold()) != "text":
             return []
-        with self.path.open("rb") as file, suppress(LookupError):
-            start = file.read(4096).decode(self.reading.encoding or "utf-8", "replace")
-            return start.splitlines()[:FIRST_LINES]
+        with self.path.open("rb") as file:
+            start = file.read(4096)
+        with suppress(LookupError):
+            text = start.decode(self.reading.encoding or "utf-8", "replace")
+            return text.splitlines()[:FIRST_LINES]
         return []
 
 
@@ -167,22 +150,9 @@ async def ask(
     verb: str = "Import",
     ticked: bool = True,
 ) -> None:
-    """Ask how a file is to be read, and call ``take`` with that once it can be.
+    """Ask how a file is to be read, now as ``reading`` says, and ``take`` that once it can be.
 
-    Parameters
-    ----------
-    path : Path
-        The raw file.
-    reading : Reading
-        How it is read now.
-    take : coroutine function
-        Called with the reading, and whether others are read so, too; its errors are shown.
-    others : str
-        Which others, for a check box; empty for none.
-    verb : str
-        On the button.
-    ticked : bool
-        Whether the others are read so unless somebody says no.
+    That is a coroutine function, called also with whether ``others`` (empty for none) are read so, too.
     """
     form, one = Form(path, reading), asyncio.Lock()
     await asyncio.to_thread(form.look)
@@ -209,18 +179,11 @@ async def ask(
     def bound(made: Any, name: str) -> None:
         made.bind_value(form.values, name).on_value_change(check).props(FIELD)
 
-    @ui.refreshable
-    def understood() -> None:
-        _understood(form)
-
-    @ui.refreshable
-    def columns() -> None:
-        _columns(form, check)
-
+    understood, columns = ui.refreshable(_understood), ui.refreshable(_columns)
     with widgets.dialog(f"How is {path.name} read?") as shown:
         mark(shown, "importing")
-        understood()
-        columns()
+        understood(form)
+        columns(form, check)
         with widgets.row():
             bound(ui.number("Samples per second").props("clearable"), "rate")
             bound(ui.number("Rest length [mm]").props("clearable"), "rest_length")
@@ -233,14 +196,11 @@ async def ask(
                 numbered = [[str(at), line[:160]] for at, line in enumerate(lines, start=1)]
                 widgets.table(["", "First lines"], numbered)
                 with widgets.row():
-                    for label, name in (
-                        ("Header in line", "header"),
-                        ("Lines after it left out", "skip"),
-                    ):
+                    labels = {"header": "Header in line", "skip": "Lines after it left out"}
+                    for name, label in labels.items():
                         number = ui.number(label, min=0, precision=0, placeholder="as found")
                         bound(number.props("clearable"), name)
-                    known = {"": "As found", **{name: name for name in ENCODINGS}}
-                    bound(ui.select(known, label="Encoding"), "encoding")
+                    bound(ui.select(ENCODINGS, label="Encoding"), "encoding")
         with widgets.row(classes="spread"):
             widgets.button("As found", as_found)
             ui.space()
@@ -258,17 +218,13 @@ def _understood(form: Form) -> None:
     found = form.recordings
     more = [f"and {len(found) - 3} more recordings"] * (len(found) > 3)
     with ui.element("div"):
-        for text in [
-            *map(summary, found[:3]),
-            *more,
-            *(map(said, found[0].notes) if found else ()),
-        ]:
+        for text in [*map(summary, found[:3]), *more, *map(said, found[0].notes)]:
             ui.label(text).classes("muted")
 
 
 def summary(recording: Recording) -> str:
     """Return what a recording is, in a line."""
-    time = f"{recording.n_samples:,} samples"
+    time = f"{recording.n_samples} samples"
     if recording.sample_time is not None:
         time += f", {recording.duration or 0:.4g} s at {1 / recording.sample_time:.4g} Hz"
     ranges = [
@@ -282,9 +238,9 @@ def _columns(form: Form, check: Callable[[], Any]) -> None:
     """Show the columns with controls for what each is read as."""
 
     def cells(column: Column) -> list[Any]:
-        def bound(made: Any, name: str, label: str, width: int) -> Any:
+        def bound(made: Any, name: str, label: str, width: int) -> None:
             made.bind_value(column, name).on_value_change(check).props(FIELD)
-            return widgets.labelled(made, label).style(f"width: {width}px; min-width: 0")
+            widgets.labelled(made, label).style(f"width: {width}px; min-width: 0")
 
         def channel() -> None:
             made = ui.input(placeholder="left out").props("clearable list=channels")
@@ -292,7 +248,7 @@ def _columns(form: Form, check: Callable[[], Any]) -> None:
 
         def calibration() -> None:
             async def turn() -> None:
-                column.turn()
+                column.gain, column.offset = (-one for one in column.line)
                 await check()
 
             with widgets.row():

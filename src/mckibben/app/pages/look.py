@@ -16,8 +16,8 @@ from mckibben.app.terms import said
 from mckibben.app.widgets import mark
 from mckibben.comparison.channels import Channels
 from mckibben.diagnosis.characterization import characterize
-from mckibben.diagnosis.coupling import coupling
-from mckibben.diagnosis.data_gaps import Gap, data_gaps
+from mckibben.diagnosis.coupling import Coupling, coupling
+from mckibben.diagnosis.data_gaps import data_gaps
 from mckibben.numerals import number
 from mckibben.options import PlanOptions
 from mckibben.recording import Recording
@@ -44,9 +44,8 @@ def build(state: State) -> None:
     """Build the page."""
     with mark(ui.element("div").classes("page"), "page-look"):
         with widgets.row(classes="spread"):
-            widgets.heading(
-                "Look", "What the muscle does, and what the recordings do not show yet."
-            )
+            text = "What the muscle does, and what the recordings do not show yet."
+            widgets.heading("Look", text)
             if state.workspace.names("recordings"):
                 choose = partial(ui.navigate.to, "/models")
                 mark(widgets.primary("Choose models", choose, "leaderboard"), "choose-models")
@@ -57,7 +56,7 @@ def build(state: State) -> None:
 def content(state: State) -> None:
     """Show the recordings that are chosen, and what all of them tell."""
     used, known = state.workspace.used(), state.workspace.channels()
-    if not used or not {*state.inputs, *state.outputs} & {*known}:
+    if not {*state.inputs, *state.outputs} & {*known}:
         text = (
             "Add recordings with an input, such as pressure, and an output, such as displacement. "
             "You then see how wide the loop is, whether speed matters, and what is missing."
@@ -65,25 +64,28 @@ def content(state: State) -> None:
         with widgets.card(), widgets.empty("insights", "Nothing to look at yet", text):
             ui.link("Add recordings →", "/")
         return
-    sides, runs = (
-        state.sides,
-        [*used.values()],
-    )
-    pairs = coupling(runs, sides.inputs, sides.outputs).pairs(runs)
+    sides, runs = state.sides, [*used.values()]
+    found = coupling(runs, sides.inputs, sides.outputs)
     every = [(given, wanted) for given in sides.inputs for wanted in sides.outputs]
-    pair = state.chosen.get("look.pair")
+    pair, pairs = state.chosen.get("look.pair"), found.pairs(runs)
     pair = pair if pair in [*every, *pairs] else pairs[0]
     shown = [name for name in state.chosen.get("look.shown", []) if name in used]
     shown = shown or [*used][:DRAWN]
     with ui.element("div").classes("columns"):
         with ui.element("div").classes("stack"):
-            _recordings(state, used, shown)
-            _words(state, runs, sides, pair)
+            with widgets.card("Recordings"):
+                _recordings(state, used, shown)
+            with widgets.card("What the muscle does" + f": {pair[1]}" * (len(sides.outputs) > 1)):
+                _words(state, runs, sides, pair)
         with ui.element("div").classes("stack"):
             if len(every) > 1:
-                _coupling(state, runs, sides, pair)
-            _figure(state, [used[name] for name in shown], sides, pair)
-            _gaps(state, sides, pair)
+                with widgets.card("What moves what"):
+                    _coupling(state, found, pair)
+            with widgets.card():
+                _figure(state, [used[name] for name in shown], sides, pair)
+            with widgets.card("What to record next"):
+                _gaps(state, sides, pair)
+                _planned(state)
     widgets.next_step("Seen enough? Fit models to it, and compare them.", "Models", "/models")
 
 
@@ -95,31 +97,29 @@ def _choose(state: State, key: str, value: Any) -> None:
 def _recordings(state: State, used: dict[str, Recording], shown: list[str]) -> None:
     roles = {entry.name: entry.role for entry in state.workspace.entries()}
 
-    def tick(name: str, on: bool) -> None:
-        _choose(state, "look.shown", [n for n in used if (on if n == name else n in shown)])
+    def tick(name: str, event: Any) -> None:
+        chosen = [n for n in used if (event.value if n == name else n in shown)]
+        _choose(state, "look.shown", chosen)
 
     def box(name: str) -> None:
-        found = ui.checkbox(name, value=name in shown, on_change=lambda e: tick(name, e.value))
+        found = ui.checkbox(name, value=name in shown, on_change=partial(tick, name))
         mark(found.props("dense"), f"show-{name}")
 
     def chip(role: str) -> None:
         ui.label(role.capitalize()).classes(f"chip {role}")
 
-    rows = [
-        [
-            partial(box, name),
-            partial(chip, roles[name]),
-            f"{run.duration:.4g} s" if run.sample_time else f"{len(run)} samples",
-        ]
-        for name, run in used.items()
+    lengths = [
+        f"{r.duration:.4g} s" if r.sample_time else f"{len(r)} samples" for r in used.values()
     ]
-    with widgets.card("Recordings"):
-        widgets.table(["Shown", "Role", "Length"], rows)
+    rows = [
+        [partial(box, name), partial(chip, roles[name]), length]
+        for name, length in zip(used, lengths, strict=True)
+    ]
+    widgets.table(["Shown", "Role", "Length"], rows)
 
 
-def _coupling(state: State, used: list[Recording], sides: Channels, pair: Pair) -> None:
+def _coupling(state: State, found: Coupling, pair: Pair) -> None:
     """Show how far every input moves every output; a click shows their loop."""
-    found = coupling(used, sides.inputs, sides.outputs)
 
     def cell(given: str, wanted: str, effect: float, unit: str) -> None:
         text = f"{number(effect, 2)}\xa0{unit}" if np.isfinite(effect) else "loop"
@@ -129,87 +129,74 @@ def _coupling(state: State, used: list[Recording], sides: Channels, pair: Pair) 
         mark(button, f"pair-{given}-{wanted}")
 
     rows: list[list[Any]] = []
-    for wanted, effects, unit, share in zip(
-        found.outputs, found.effects.tolist(), found.units, found.explained, strict=True
-    ):
-        each = zip(found.inputs, effects, strict=True)
-        cells = [partial(cell, given, wanted, effect, unit) for given, effect in each]
+    each = zip(found.outputs, found.effects.tolist(), found.units, found.explained, strict=True)
+    for wanted, effects, unit, share in each:
+        cells = [
+            partial(cell, given, wanted, effect, unit)
+            for given, effect in zip(found.inputs, effects, strict=True)
+        ]
         rows.append([wanted, *cells, f"{100 * max(share, 0):.0f} %"])
-    with widgets.card("What moves what"):
-        mark(widgets.table(["", *found.inputs, "Explained"], rows), "coupling")
-        ui.label(
-            "What each input over its whole range does to an output, by one straight line through all "
-            "inputs. The rest, up to 100 %, is bent, remembers, or takes time. Choose a number to see "
-            "its loop."
-        ).classes("muted")
+    mark(widgets.table(["", *found.inputs, "Explained"], rows), "coupling")
+    ui.label(
+        "What each input over its whole range does to an output, by one straight line through all "
+        "inputs. The rest, up to 100 %, is bent, remembers, or takes time. Choose a number to see its "
+        "loop."
+    ).classes("muted")
 
 
-def _figure(state: State, recordings: list[Recording], sides: Channels, pair: Pair) -> None:
-    given, wanted = pair
-    shared = [n for n in recordings[0].channels if all(n in run for run in recordings)]
-    spans = {n: np.ptp(np.concatenate([run[n] for run in recordings])) for n in shared}
+def _figure(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
+    (given, wanted), kind = pair, state.chosen.get("look.view", "loop")
+    shared = [name for name in runs[0].channels if all(name in run for run in runs)]
+    spans = {name: np.ptp(np.concatenate([run[name] for run in runs])) for name in shared}
     free = [name for name in shared if name not in pair and spans[name] > 0]
     by = state.chosen.get("look.by", "")
-    by = by if by in free else ""
-    kind = state.chosen.get("look.view", "loop")
     named = [n for n in (*sides.inputs, *sides.outputs, *(sides.scheduling or ())) if n in shared]
     channels = [*dict.fromkeys([given, wanted, *(named if len(named) <= MOST else ())])]
-    with widgets.card():
-        with widgets.row(classes="spread"):
-            ui.label(f"{wanted} over {given}").classes("subtitle")
-            with widgets.row():
-                if kind == "loop" and free:
-                    options = {"": "Colour by recording or time"}
-                    options |= {n: f"Colour by {n}" for n in free}
-                    colour = ui.select(options, value=by).props(
-                        'dense outlined aria-label="Colour"'
-                    )
-                    colour.on_value_change(lambda event: _choose(state, "look.by", event.value))
-                toggle = ui.toggle(VIEWS, value=kind).props("no-caps unelevated dense")
-                toggle.on_value_change(lambda event: _choose(state, "look.view", event.value))
-        if kind == "time":
-            drawing = draw(recordings, "time", channels=channels)
-        elif by:
-            drawing = loop_by(recordings, given, wanted, by)
-        else:
-            drawing = draw(recordings, "loop", input=given, output=wanted)
-        height = 360 if kind == "loop" else 130 + 90 * len(channels)
-        for plot in widgets.plot(drawing, height=height):
-            mark(plot, f"look-{kind}")
-        if drawing.note:
-            ui.label(said(drawing.note)).classes("muted")
+    with widgets.row(classes="spread"):
+        ui.label(f"{wanted} over {given}").classes("subtitle")
+        with widgets.row():
+            if kind == "loop" and free:
+                options = {"": "Colour by recording or time"}
+                options |= {name: f"Colour by {name}" for name in free}
+                colour = ui.select(options, value=by if by in free else "").props("dense outlined")
+                widgets.labelled(colour, "Colour")
+                colour.on_value_change(lambda event: _choose(state, "look.by", event.value))
+            toggle = ui.toggle(VIEWS, value=kind).props("no-caps unelevated dense")
+            toggle.on_value_change(lambda event: _choose(state, "look.view", event.value))
+    if kind == "time":
+        drawing = draw(runs, "time", channels=channels)
+    elif by in free:
+        drawing = loop_by(runs, given, wanted, by)
+    else:
+        drawing = draw(runs, "loop", input=given, output=wanted)
+    for plot in widgets.plot(drawing, height=360 if kind == "loop" else 130 + 90 * len(channels)):
+        mark(plot, f"look-{kind}")
+    if drawing.note:
+        ui.label(said(drawing.note)).classes("muted")
 
 
-def _words(state: State, used: list[Recording], sides: Channels, pair: Pair) -> None:
+def _words(state: State, runs: list[Recording], sides: Channels, pair: Pair) -> None:
     """Show what the muscle does: a few sentences, and all numbers behind a fold-out."""
-    given, wanted = pair
-    beside = [name for name in (*sides.inputs, *(sides.scheduling or ())) if name != given]
-    what = f": {wanted}" if len(sides.outputs) > 1 else ""
-    with widgets.card(f"What the muscle does{what}") as card:
-        mark(card, "words")
-        key = "characterization", state.workspace.digest(), pair, tuple(beside)
-        make = partial(characterize, used, given, wanted, beside=beside)
+    beside = tuple(n for n in (*sides.inputs, *(sides.scheduling or ())) if n != pair[0])
+    key = "characterization", state.workspace.digest(), pair, beside
+    make = partial(characterize, runs, *pair, beside=beside)
+    with mark(ui.element("div"), "words"):
         later(key, make, lambda found: widgets.items(results.characterization(found)), height=120)
 
 
 def _gaps(state: State, sides: Channels, pair: Pair) -> None:
-    """Show what the recordings cannot identify, and plan what to record next."""
+    """Show what the recordings cannot identify."""
     train, test = state.workspace.train_and_test()
     inputs = sides.inputs if len(sides.inputs) > 1 else (pair[0],)
     none = [Text(["Nothing is missing: the recordings show all that models ask for."])]
-
-    def show(found: tuple[Gap, ...]) -> None:
-        widgets.items(results.data_gaps(found) or none)
-
-    with widgets.card("What to record next") as card:
-        mark(card, "gaps")
-        key = "gaps", state.workspace.digest(), inputs, sides.outputs
-        make = partial(data_gaps, train or test, inputs, sides.outputs, tests=test if train else ())
-        later(key, make, show)
-        _planned(state)
+    key = "gaps", state.workspace.digest(), inputs, sides.outputs
+    make = partial(data_gaps, train or test, inputs, sides.outputs, tests=test if train else ())
+    with mark(ui.element("div"), "gaps"):
+        later(key, make, lambda found: widgets.items(results.data_gaps(found) or none))
 
 
 def _planned(state: State) -> None:
+    """Offer to plan the next recording, and show the plan."""
     jobs = [job for job in state.jobs.jobs.values() if job.kind == "plan"]
     made = last_plan(state.workspace)
     if running := next((job for job in jobs if job.active), None):

@@ -11,10 +11,9 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app import modelling, widgets
-from mckibben.app.jobs import Job
 from mckibben.app.later import later
-from mckibben.app.pages import choosing
-from mckibben.app.state import State, view
+from mckibben.app.pages import choosing, parts
+from mckibben.app.state import State
 from mckibben.app.terms import said
 from mckibben.app.widgets import mark
 from mckibben.arrays import Array
@@ -87,12 +86,11 @@ def _compared(state: State) -> tuple[Channels, list[Json]]:
 # -- fits that run, or did not work ----------------------------------------------------------------
 
 
-@view
+@parts.steady("models", jobs=["fit"])
 def fits(state: State) -> None:
     """Show the fits that wait, run or did not work; those that did are in the leaderboard."""
-    jobs = [job for job in state.jobs.jobs.values() if job.kind == "fit" and job.state != "done"]
-    active = [job for job in jobs if job.active]
-    ended = [job for job in reversed(jobs) if not job.active]
+    jobs = parts.jobs_of(state, ["fit"])
+    active, ended = [job for job in jobs if job.active], [job for job in jobs if not job.active]
     if not active and not state.workspace.models():
         _empty(state)
     if not jobs:
@@ -100,21 +98,18 @@ def fits(state: State) -> None:
     with widgets.card() as card:
         mark(card, "fits")
         with widgets.row(classes="spread"):
-            text = f"Fitting, {len(active)} to go" if active else "Did not work"
+            text = f"Fitting, {len(active)} to go" if active else "Did not finish"
             ui.label(text).classes("subtitle")
-            if len(active) > 1:
-                mark(widgets.button("Cancel all", partial(_end, state, active)), "cancel-all")
-            if not active:
-                widgets.button("Clear", partial(_end, state, ended))
-        for job in [*(job for job in active if job.state == "running"), *ended[:ENDED]]:
-            _fit(state, job)
-        if waiting := [job for job in active if job.state == "waiting"]:
-            with widgets.row():
-                ui.label("Next:").classes("muted")
-                for job in waiting:
-                    button = widgets.button(job.title, partial(_end, state, [job]))
-                    widgets.labelled(button.props("icon-right=close"), f"Cancel {job.title}")
-                    mark(button, f"cancel-{job.title}")
+            if active:
+                mark(widgets.button("Cancel all", partial(parts.end, state, active)), "cancel-all")
+            else:
+                widgets.button("Clear", partial(parts.end, state, ended))
+        for job in [*(job for job in active if job.state == "running"), *ended[: -ENDED - 1 : -1]]:
+            title = f"{full_name(job.title)} · {job.title}"
+            parts.show_job(state, job, title, modelling.fit)
+        if waiting := [job.title for job in active if job.state == "waiting"]:
+            more = f" and {len(waiting) - ENDED} more" if len(waiting) > ENDED else ""
+            ui.label(f"Next: {', '.join(waiting[:ENDED])}{more}").classes("muted")
 
 
 def _empty(state: State) -> None:
@@ -135,49 +130,10 @@ def _empty(state: State) -> None:
             ui.link("Add recordings →", "/")
 
 
-def _end(state: State, jobs: Sequence[Job]) -> None:
-    for job in reversed(jobs):  # those that wait first, or they would begin
-        state.jobs.cancel(job.name)
-        state.jobs.forget(job.name)
-    state.changed()
-
-
-def _fit(state: State, job: Job) -> None:
-    def again() -> None:
-        state.jobs.forget(job.name)
-        given = {name: value for name, value in job.given.items() if name != "title"}
-        state.jobs.submit(modelling.fit, job.title, **given)
-        state.changed()
-
-    def tell() -> None:
-        bar.set_value(round(job.share, 3))
-        share.set_text(f"{100 * job.share:.0f} %")
-
-    with widgets.row(classes="spread"):
-        with ui.element("div").classes("grow"):
-            ui.label(f"{full_name(job.title)} · {job.title}")
-            if not job.active:
-                ui.label(said(job.message or job.state)).classes("muted")
-        if job.active:
-            bar = ui.linear_progress(show_value=False, color="primary").classes("meter")
-            widgets.labelled(bar, "Progress")
-            share = ui.label().classes("muted")
-            tell()
-            ui.timer(0.3, tell)
-        else:
-            widgets.icon_button("replay", f"Fit {job.title} again", again)
-        text = f"Cancel {job.title}" if job.active else f"Take {job.title} off the list"
-        mark(widgets.icon_button("close", text, partial(_end, state, [job])), f"cancel-{job.title}")
-
-
 # -- leaderboard -----------------------------------------------------------------------------------
 
 
-def _columns(rows: list[Json], outputs: Sequence[str] = ()) -> tuple[Column, ...]:
-    return columns_of(rows, rows[0]["unit"], outputs, rows[0]["chosen_by"])
-
-
-@view
+@parts.steady("models", "results")
 def board(state: State) -> None:
     """Show the models that compare, best first, and behind a fold-out those of other channels."""
     _, rows = _compared(state)
@@ -188,7 +144,8 @@ def board(state: State) -> None:
     with widgets.card("Leaderboard") as card:
         mark(card, "leaderboard")
         if rows:
-            shown = [one for one in _columns(rows) if one.key in FIRST]
+            every = columns_of(rows, rows[0]["unit"], (), rows[0]["chosen_by"])
+            shown = [one for one in every if one.key in FIRST]
             lines = []
             for row in rows:
                 errors = [(one.flag(row), one.value(row)) for one in shown]
@@ -200,8 +157,8 @@ def board(state: State) -> None:
             ui.label("No model of these inputs and outputs is fitted yet.").classes("muted")
         if others:
             about = {row["name"]: row for row in state.workspace.results()}
-            of = (about.get(name, {}) for name in others)
-            words = [" ".join(str(row.get(key, "")) for key in ("output", "input")) for row in of]
+            rows = [about.get(name, {}) for name in others]
+            words = [f"{row.get('output', '')} {row.get('input', '')}" for row in rows]
             with widgets.details(f"{len(others)} of other channels, or not fitted here"):
                 lines = [list(line) for line in zip(others, words, strict=True)]
                 _choosable(state, ["Model", "Output, input"], lines, others)
@@ -241,13 +198,13 @@ def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
     ui.label(typeset_within(said(" ".join(notes)))).classes("muted")
 
 
-@view
+@parts.steady("models", "results")
 def figures(state: State) -> None:
     """Show all figures of all models behind a fold-out, and what comes next."""
     sides, rows = _compared(state)
     if not rows:
         return
-    found = _columns(rows, sides.outputs)
+    found = columns_of(rows, rows[0]["unit"], sides.outputs, rows[0]["chosen_by"])
     with widgets.details("All figures of all models"):
         texts = [
             [f"{typeset(one.text(row))} {one.flag(row)}".strip() for one in found] for row in rows
@@ -264,7 +221,7 @@ def figures(state: State) -> None:
 # -- the model that is chosen ----------------------------------------------------------------------
 
 
-@view
+@parts.steady("models", "banded", "results", jobs=["check", "calibrate"], own=True)
 def closer(state: State) -> None:
     """Show the model that is chosen, in tabs."""
     sides, _ = _compared(state)
@@ -307,12 +264,8 @@ def _summary(row: Json) -> str:
     text = f"Test RMSE {number(test['rmse'], 3)} {unit}"
     if ends := test.get("rmse_interval"):
         text += f" ({number(ends[0], 2)} to {number(ends[1], 2)} in 95 %)"
-    inverse = {"exact": "exact inverse", "solved": "inverse by solving", "none": "no inverse"}
-    about = [
-        text,
-        inverse.get(row.get("inverse") or "", ""),
-        f"{row.get('n_parameters')} parameters",
-    ]
+    inverse = choosing.INVERSES.get(row.get("inverse") or "", "")
+    about = [text, inverse, f"{row.get('n_parameters')} parameters"]
     return typeset_within(" · ".join(filter(None, about)))
 
 
@@ -343,8 +296,7 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
         ui.label(text).classes("muted")
         return
     train = workspace.with_role("train")
-    paths = [workspace.path(kind, f"{name}.json") for kind in ("models", "banded")]
-    key = [name, workspace.digest(), *(p.stat().st_mtime_ns if p.is_file() else 0 for p in paths)]
+    key = workspace.digest(), parts.stamps(workspace, "models", "banded", of=name)
     if tab == "parameters":
         fitted = [run for run in train if {*inputs, *outputs} <= {*run.channels}]
         on = fitted or [run for run, *_ in runs.values()]
@@ -353,16 +305,9 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
         return
 
     def choice(what: str, label: str, options: dict[str, str]) -> str:
-        def pick(event: Any) -> None:
-            state.chosen[f"models.{what}"] = event.value
-            closer.refresh()
-
-        chosen = state.chosen.get(f"models.{what}")
-        chosen = chosen if chosen in options else next(iter(options))
-        if len(options) > 1:
-            found = ui.select(options, value=chosen, label=label, on_change=pick)
-            mark(found.props("dense outlined"), f"closer-{what}")
-        return str(chosen)
+        if len(options) == 1:
+            return next(iter(options))
+        return parts.select(state, f"models.closer-{what}", options, label, closer.refresh)
 
     with widgets.row():
         uses = {key: f"{key} ({use})" for key, (*_, use) in runs.items()}
@@ -392,7 +337,7 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
                 mark(widgets.plot_of(plot, height=HEIGHT), f"closer-{tab}")
         ui.label(typeset_within(" ".join(text))).classes("muted")
         if banded is not None:
-            widgets.items(modelling.restored(row.get("calibration")))
+            widgets.items(modelling.restored(row.get("calibration") or {}))
             _work(state, modelling.calibrate, "Calibrate again", "straighten")
 
     free = partial(run_free, block, run, outputs, train)
@@ -402,20 +347,18 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
 def _shade(run: Recording, low: Array, high: Array) -> Json:
     """Return a band about the residual over time, as a trace."""
     (t, lower), (back, upper) = (over_time(run.time, end, POINTS) for end in (low, high))
-    x, y = np.append(t, back[::-1]), np.append(lower, upper[::-1])
+    outline = {"x": np.append(t, back[::-1]), "y": np.append(lower, upper[::-1])}
     trace = {"type": "scatter", "mode": "lines", "name": "band", "fill": "toself", "opacity": 0.3}
-    trace |= {"x": interactive.packed(x), "y": interactive.packed(y), "hoverinfo": "skip"}
-    return trace | {"fillcolor": "--series-1", "line": {"width": 0}}
+    trace |= {"hoverinfo": "skip", "fillcolor": "--series-1", "line": {"width": 0}}
+    return trace | outline
 
 
 def _parameters(found: ModelDescription) -> None:
-    for item in results.description(found):
-        if isinstance(item, Table):  # symbols belong to equations, which the report has
-            heads, rows = (
-                [[a, *rest] for a, _, *rest in some] for some in ([item.headings], item.rows)
-            )
-            item = replace(item, headings=heads[0], rows=rows)
-        with mark(ui.element("div").classes("stack"), "parameters"):
+    with mark(ui.element("div").classes("stack"), "parameters"):
+        for item in results.description(found):
+            if isinstance(item, Table):  # symbols belong to equations, which the report has
+                head, *rows = ([a, *rest] for a, _, *rest in (item.headings, *item.rows))
+                item = replace(item, headings=head, rows=rows)
             widgets.items([item])
 
 
@@ -457,7 +400,7 @@ def _work(
     about: tuple[str, str] | None = None,
 ) -> None:
     """Show a button for a job on the model, and what it is for; while it runs, that it does."""
-    jobs = [job for job in state.jobs.jobs.values() if job.kind == work.__name__]
+    jobs = parts.jobs_of(state, [work.__name__])
     mine = [job for job in jobs if job.given.get("name") == state.model]
 
     def start() -> None:
@@ -465,11 +408,8 @@ def _work(
         state.jobs.submit(work, f"{work.__name__} {state.model}", name=state.model)
         state.changed()
 
-    with widgets.empty(icon, *about) if about else widgets.row():
-        if any(job.active for job in mine):
-            ui.spinner(size="20px")
-            ui.label("At work …").classes("muted")
-            return
-        if mine and mine[-1].state == "failed":
-            widgets.error_box(mine[-1].message)
-        mark(widgets.button(text, start, icon), work.__name__)
+    for job in mine[-1:]:
+        parts.show_job(state, job)
+    if not any(job.active for job in mine):
+        with widgets.empty(icon, *about) if about else widgets.row():
+            mark(widgets.button(text, start, icon), work.__name__)

@@ -9,12 +9,12 @@ from typing import Any
 from nicegui import ui
 
 from mckibben.app import following, forms, taking, widgets
-from mckibben.app.jobs import DONE
+from mckibben.app.pages import parts
+from mckibben.app.pages.compensate import settings_of
 from mckibben.app.state import State, view
 from mckibben.app.taking import THINGS, Thing
 from mckibben.app.widgets import mark
 from mckibben.errors import DataError
-from mckibben.options import InvertOptions
 
 TITLE = "Take away"
 ICON = "inventory_2"
@@ -25,23 +25,11 @@ def build(state: State) -> None:
     with mark(ui.element("div").classes("page"), "page-takeaway"):
         widgets.heading("Take away", "What was found, for a paper, a controller or a colleague.")
         page(state)
-        watch(state)
         script(state)
-        before(state)
         widgets.next_step("Run it on your rig, then review its log.", "Compensate", "/compensate")
 
 
-@view
-def watch(state: State) -> None:
-    """Build the list again when models or recordings are others; it shows nothing."""
-    key = (state.workspace.models(), [one.name for one in state.workspace.entries()])
-    known, state.chosen["takeaway.key"] = state.chosen.get("takeaway.key"), key
-    if known not in (None, key):
-        page.refresh()
-
-
-@ui.refreshable
-@widgets.shielded
+@parts.steady("models", "recordings")
 def page(state: State) -> None:
     """Show the list."""
     models, use = state.workspace.models(), ""
@@ -51,7 +39,16 @@ def page(state: State) -> None:
             widgets.empty("inventory_2", "Nothing to take away yet", text)
             return
         if models:
-            use = _use(state)
+            uses = following.uses(state.workspace, state.model)
+            if state.chosen.get("takeaway.take-use") not in uses:
+                usual = state.chosen.get("compensate.form", "inverse")
+                usual = usual if usual in uses else next(reversed(uses))
+                state.chosen["takeaway.take-use"] = usual
+            with widgets.row():
+                parts.select_model(state, models, "take-model")
+                again = state.changed, page.refresh
+                changed = lambda: [do() for do in again]  # noqa: E731
+                use = parts.select(state, "takeaway.take-use", uses, "Used as", changed)
         rows = [
             [thing.title, thing.purpose, partial(_options, state, key, thing),
              partial(_button, state, key, thing)]
@@ -61,65 +58,37 @@ def page(state: State) -> None:
         mark(widgets.table(["", "What it is for", "", ""], rows), "things")
 
 
-def _use(state: State) -> str:
-    """Let a model be chosen, and what it is used as; return that."""
-    uses = following.uses(state.workspace, state.model)
-    if state.chosen.get("takeaway.use") not in uses:
-        usual = str(state.chosen.get("compensate.form", "inverse"))
-        state.chosen["takeaway.use"] = usual if usual in uses else next(reversed(uses))
-
-    def changed() -> None:
-        state.changed()
-        page.refresh()
-
-    with widgets.row():
-        names = state.workspace.models()
-        field = ui.select(names, label="Model").bind_value(state, "model").props("dense outlined")
-        mark(field, "take-model").on_value_change(changed)
-        field = ui.select(uses, label="Used as").bind_value(state.chosen, "takeaway.use")
-        mark(field.props("dense outlined"), "take-use").on_value_change(changed)
-    return str(state.chosen["takeaway.use"])
-
-
 def _of(state: State) -> dict[str, Any]:
     """Return what all things are of: model and what it is used as, and channels."""
-    use = str(state.chosen.get("takeaway.use", "model"))
-    values = state.chosen.get(f"compensate.values-{use}", {})
-    asked = {key: values.get(key) for key in following.SETTINGS.get(use, ())}
-    found = {"model": state.model, "use": use, "settings": forms.given(InvertOptions, asked)}
+    use = str(state.chosen.get("takeaway.take-use", "model"))
+    found = {"model": state.model, "use": use, "settings": settings_of(state, use)}
     return found | {"inputs": [*state.inputs], "outputs": [*state.outputs], "load": state.load}
-
-
-def _values(state: State, key: str) -> dict[str, Any]:
-    values: dict[str, Any] = state.chosen.setdefault(f"takeaway.{key}", {})
-    return values
 
 
 def _options(state: State, key: str, thing: Thing) -> None:
     """Make the button behind which the options of a thing are; they stay as they are set."""
+    values = state.chosen.setdefault(f"takeaway.{key}", {})
 
-    def ask() -> None:
+    def ask(kind: type) -> None:
         with widgets.dialog(f"{thing.title}: options") as window:
             with widgets.row(classes="fields"):
-                assert thing.kind is not None
-                forms.fields(thing.kind, thing.fields, _values(state, key), taking.FIGURES)
+                forms.fields(kind, thing.fields, values, taking.FIGURES)
             with widgets.row(classes="spread"):
                 ui.space()
                 widgets.button("Done", window.close)
 
     if thing.kind is not None:
-        button = widgets.labelled(
-            widgets.button("Options", ask, "tune"), f"Options of {thing.title}"
-        )
-        mark(button, f"options-{key}")
+        button = widgets.button("Options", partial(ask, thing.kind), "tune")
+        mark(widgets.labelled(button, f"Options of {thing.title}"), f"options-{key}")
 
 
 def _button(state: State, key: str, thing: Thing) -> None:
     """Make the button that writes a thing in a job, and hands it over when it is done."""
 
     async def take() -> None:
-        options = forms.given(thing.kind, _values(state, key)) if thing.kind else {}
-        of, plain = _of(state), vars(thing.kind()) if thing.kind else {}
+        values, of = state.chosen[f"takeaway.{key}"], _of(state)
+        options = forms.given(thing.kind, values) if thing.kind else {}
+        plain = vars(thing.kind()) if thing.kind else {}
         stem = state.model if of["use"] == "model" else f"{state.model}-{of['use']}"
         wish, _, ending = thing.file.format_map({"stem": stem, **plain, **options}).rpartition(".")
         file = f"{state.workspace.new_name('takeaway', wish, '.' + ending)}.{ending}"
@@ -127,16 +96,13 @@ def _button(state: State, key: str, thing: Thing) -> None:
         path.unlink()  # only its name was reserved; exports replace what they wrote alone
         job = state.jobs.submit(thing.work, file, file=file, options=options, of=of)
         button.props("loading")
-        try:
-            while job.active:
-                await asyncio.sleep(0.1)
-        finally:
-            button.props(remove="loading")
-        if job.state != DONE:
+        while job.active:
+            await asyncio.sleep(0.1)
+        button.props(remove="loading")
+        if job.state != "done":
             problem = f"{thing.title}: {job.message or job.state}"
             raise DataError(problem, remedy="see its options")
         await widgets.download(path)
-        before.refresh()
 
     make = widgets.primary if key == "report" else widgets.button
     button = widgets.labelled(make("Download", take, "download"), f"Download {thing.title}")
@@ -150,19 +116,6 @@ def script(state: State) -> None:
         return
     text = taking.script(state.workspace, _of(state))
     with widgets.card("All of it as a script"):
-        take = widgets.button(
-            "script.py", lambda: ui.download.content(text, "script.py"), "download"
-        )
-        mark(take, "take-script")
+        take = partial(ui.download.content, text, "script.py")
+        mark(widgets.button("script.py", take, "download"), "take-script")
         mark(ui.label(text).classes("code script"), "script")
-
-
-@view
-def before(state: State) -> None:
-    """Offer what was taken before."""
-    folder = state.workspace.folder / "takeaway"
-    files = [path for path in folder.iterdir() if path.is_file() and path.stat().st_size]
-    if files:
-        with widgets.details(f"Taken before ({len(files)})"):
-            for path in sorted(files, key=lambda path: -path.stat().st_mtime_ns):
-                widgets.button(path.name, partial(widgets.download, path), "download")

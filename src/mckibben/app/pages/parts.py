@@ -1,0 +1,147 @@
+"""What several pages share: parts that are built again only when they must be, choices, and jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Any
+
+from nicegui import events, ui
+
+from mckibben.app import widgets
+from mckibben.app.jobs import Job, Work
+from mckibben.app.state import State, view
+from mckibben.app.terms import said
+from mckibben.app.widgets import mark
+from mckibben.app.workspace import Workspace
+
+
+def steady(
+    *kinds: str, jobs: Sequence[str] = (), own: bool = False
+) -> Callable[[Callable[[State], None]], Any]:
+    """Make a part of a page that is built again only when it must be; `refresh` does so at once.
+
+    That is where the model, channels or data are others, or files of some kinds (with ``own`` only
+    those of the model), or jobs. Fields in it outlive what happens else, and no click on it is lost.
+    """
+
+    def now(state: State) -> Any:
+        files = stamps(state.workspace, *kinds, of=state.model if own else "")
+        going = [(job.name, job.state) for job in jobs_of(state, jobs)]
+        sides = state.model, (*state.inputs,), (*state.outputs,), state.load
+        return widgets.theme.dark, sides, state.workspace.digest(), files, going
+
+    def decorate(build: Callable[[State], None]) -> Any:
+        known: list[Any] = [None]
+
+        @ui.refreshable
+        @widgets.shielded
+        def part(state: State) -> None:
+            if state.ready.is_set():
+                build(state)
+                known[0] = now(state)
+
+        @view
+        def watch(state: State) -> None:
+            if known[0] != now(state):
+                part.refresh()
+
+        @wraps(build)
+        def made(state: State) -> None:
+            part(state)
+            watch(state)
+
+        made.refresh = part.refresh  # type: ignore[attr-defined]
+        return made
+
+    return decorate
+
+
+def stamps(workspace: Workspace, *kinds: str, of: str = "") -> tuple[Any, ...]:
+    """Return when files of some kinds were written, or those of one name, as a key."""
+    return tuple(
+        (kind, name, workspace.path(kind, f"{name}.json").stat().st_mtime_ns)
+        for kind in kinds
+        for name in workspace.names(kind)
+        if of in ("", name)
+    )
+
+
+def jobs_of(state: State, kinds: Sequence[str]) -> list[Job]:
+    """Return the jobs of some kinds that are not done."""
+    return [job for job in state.jobs.jobs.values() if job.kind in kinds and job.state != "done"]
+
+
+# -- choices ----------------------------------------------------------------------------------------
+
+
+def select(
+    state: State, key: str, options: dict[str, str], label: str, changed: Callable[[], Any]
+) -> str:
+    """Let one of some options be chosen, the first by default; return which is."""
+    if state.chosen.get(key) not in options:
+        state.chosen[key] = next(iter(options), "")
+    field = ui.select(options, label=label).bind_value(state.chosen, key).props("dense outlined")
+    mark(field, key.partition(".")[2]).on_value_change(lambda _: changed())
+    return str(state.chosen[key])
+
+
+def model_of(state: State, names: Sequence[str]) -> str:
+    """Return the model that is chosen, or else the first of some."""
+    return state.model if state.model in names else names[0]
+
+
+def select_model(state: State, names: Sequence[str], name: str = "model") -> None:
+    """Let one of some models be chosen."""
+    first = next(iter(state.workspace.models()), "")
+    titles = {x: f"{x} (first of the leaderboard)" * (x == first) or x for x in names}
+
+    def chosen(event: events.ValueChangeEventArguments[Any]) -> None:
+        state.model = str(event.value)
+        state.changed()
+
+    field = ui.select(titles, value=model_of(state, names), label="Model", on_change=chosen)
+    mark(field.props("dense outlined"), name)
+
+
+# -- jobs -------------------------------------------------------------------------------------------
+
+
+def end(state: State, jobs: Sequence[Job]) -> None:
+    """Cancel jobs, or take those that ended off the list."""
+    for job in reversed(jobs):  # those that wait first, or they would begin
+        state.jobs.cancel(job.name)
+        state.jobs.forget(job.name)
+    state.changed()
+
+
+def show_job(state: State, job: Job, title: str = "", work: Work | None = None) -> None:
+    """Show how far a job is, or why it did not work; with its work, it can be done again."""
+
+    def again() -> None:
+        state.jobs.forget(job.name)
+        given = {name: value for name, value in job.given.items() if name != "title"}
+        assert work is not None
+        state.jobs.submit(work, job.title, **given)
+        state.changed()
+
+    def tell() -> None:
+        bar.set_value(round(job.share, 3))
+        share.set_text(f"{100 * job.share:.0f} %")
+
+    with widgets.row(classes="spread"):
+        with ui.element("div").classes("grow"):
+            ui.label(title or job.title)
+            if not job.active:
+                ui.label(said(job.message or job.state)).classes("muted")
+        if job.active:
+            bar = ui.linear_progress(show_value=False, color="primary").classes("meter")
+            widgets.labelled(bar, "Progress")
+            share = ui.label().classes("muted")
+            tell()
+            ui.timer(0.3, tell)
+        elif work is not None:
+            widgets.icon_button("replay", f"Do {job.title} again", again)
+        text = f"Cancel {job.title}" if job.active else f"Take {job.title} off the list"
+        stop = widgets.icon_button("close", text, lambda: end(state, [job]))
+        mark(stop, f"cancel-{job.title}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, cast
@@ -177,6 +179,60 @@ def test_a_count_that_time_does_not_allow_makes_no_rows() -> None:
         rows, n_breaks = driven.places()
         assert n_breaks == 1
         assert rows[-1] == pytest.approx((found[-1].time - found[0].time) / SAMPLE_TIME, abs=3)
+
+
+class Impostor:
+    """A port whose device answers everything with the next of some texts."""
+
+    timeout, in_waiting = 0.0, 0
+
+    def __init__(self, *texts: bytes) -> None:
+        self.texts, self.asked = iter(texts), b""
+
+    def write(self, data: bytes) -> None:
+        self.asked = data
+
+    def read(self, size: int) -> bytes:
+        if (frame := unpacked(self.asked.strip(b"\0"))) is None:
+            return b""
+        body = b"\0" + next(self.texts, b"")
+        return frame._replace(kind=frame.kind | 128, body=body).packed()
+
+    def close(self) -> None:
+        pass
+
+
+ABOUT: dict[str, Any] = {
+    "fingerprint": "0123456789abcdef",
+    "period": 0.01,
+    "silence": 5,
+    "numbers": "float64",
+    "n_memory": 0,
+    "n_missable": 0,
+    "inputs": [],
+    "outputs": [{"name": "p", "unit": "bar", "low": 0, "high": 6, "safe": 0}],
+}
+LIES: tuple[dict[str, Any], ...] = (
+    *({"fingerprint": "../../x"}, {"period": 0}, {"period": "x"}, {"silence": 2**32}),
+    *({"numbers": "object"}, {"n_memory": 2**40}, {"n_missable": -1}, {"outputs": [{}]}),
+)
+
+
+def test_what_a_device_answers_is_not_trusted() -> None:
+    texts = [json.dumps(ABOUT | lie).encode() for lie in LIES]
+    for text in (b"", b"{}", b"[", *texts):
+        with pytest.raises(LinkError, match="cannot be read"):
+            Link(cast(Any, Impostor(text)), timeout=0.5)
+    with pytest.raises(LinkError, match="cannot be read"):
+        Link(cast(Any, Impostor(*[b" " * 200] * 400)))
+    for outputs, is_good in (((3.0,), True), ((np.nan,), False), ((1.0, 2.0), False), ((), False)):
+        body = struct.pack(f"<BI{len(outputs)}d", 1, 7, *outputs)
+        link = Link(cast(Any, Impostor(json.dumps(ABOUT).encode(), b"", body)))
+        if is_good:
+            assert link.state().outputs == [3.0]
+        else:
+            with pytest.raises(LinkError, match="cannot be read"):
+                link.state()
 
 
 def test_what_is_beyond_limits_is_not_sent() -> None:

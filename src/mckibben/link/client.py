@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import os
 import struct
 import time
 import zlib
+from collections import deque
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field, FiniteFloat, TypeAdapter, ValidationError
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError, require
@@ -24,14 +25,11 @@ from mckibben.system.extras import demand
 if TYPE_CHECKING:
     from serial import Serial
 
-VERSION, ANSWER, WORDS = 2, 0x80, 1 << 32
+VERSION, ANSWER, WORD, WORDS = 2, 0x80, 0xFFFF, 1 << 32
 HEAD, CHECK = struct.Struct("<BB4sI"), struct.Struct("<I")
 PAYLOAD = 250
-ROOM = PAYLOAD - HEAD.size - CHECK.size
-"""Bytes of a body, at most."""
-
+ROOM = PAYLOAD - HEAD.size - CHECK.size  # bytes of a body, at most
 STATUSES = ("ok", "malformed", "beyond limits", "another model is there")
-
 
 Kind = IntEnum("Kind", "IDENTIFY STATE READ INPUTS RESET RELEASE SAMPLE")
 Note = IntFlag("Note", "RUNNING TRIPPED LIMITED BAD_INPUT BAD_OUTPUT RESUMED")
@@ -78,9 +76,9 @@ class Port:
 
     name: str
     unit: str
-    low: float
-    high: float
-    safe: float
+    low: FiniteFloat
+    high: FiniteFloat
+    safe: FiniteFloat
 
 
 @dataclass(frozen=True)
@@ -90,19 +88,14 @@ class Device:
     ``n_memory`` numbers of the memory can be read; the last ``n_missable`` inputs may be NaN.
     """
 
-    fingerprint: str
-    period: float
-    silence: int
-    numbers: str
-    n_memory: int
-    n_missable: int
+    fingerprint: Annotated[str, Field(pattern="^[0-9a-f]{16}$")]
+    period: Annotated[FiniteFloat, Field(gt=0)]
+    silence: Annotated[int, Field(gt=0, lt=WORDS)]
+    numbers: Literal["float32", "float64"]
+    n_memory: Annotated[int, Field(ge=0, le=WORD)]
+    n_missable: Annotated[int, Field(ge=0)]
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
-
-    @property
-    def kind(self) -> np.dtype[np.floating]:
-        """Of its numbers on the line."""
-        return np.dtype(self.numbers).newbyteorder("<")
 
 
 @dataclass(frozen=True)
@@ -166,20 +159,17 @@ class Link(AbstractContextManager["Link"]):
     ) -> None:
         require(0 < timeout <= patience, "timeout", timeout, f"up to {patience:g} s", DataError)
         self._lock_step, self._timeout, self._patience = lock_step, timeout, patience
-        # answers to an earlier program have other numbers
-        self._sequence = int.from_bytes(os.urandom(4), "little")
+        self._sequence = int.from_bytes(os.urandom(4), "little")  # not that of an earlier program
         self._model, self._every, self._driving, self._begun = bytes(4), 0, False, b""
-        self._samples: list[State] = []
-        self.statistics = Statistics()
+        self._samples, self.statistics = deque[State](maxlen=100_000), Statistics()
         self._port = opened(port, baud) if isinstance(port, str | Path) else port
         try:
             self.device = device = self._identified()
             if fingerprint is not None and fingerprint.lower() != device.fingerprint:
                 problem = f"the device has model {device.fingerprint}, not {fingerprint:.40}"
-                raise LinkError(
-                    problem, remedy="load the program that was exported with that model"
-                )
+                raise LinkError(problem, remedy="load the program exported with that model")
             self._model, longest = bytes.fromhex(device.fingerprint)[:4], device.silence
+            self._kind = np.dtype(device.numbers).newbyteorder("<")
             self._silence = longest if watchdog is None else round(watchdog / device.period)
             wanted = f"{device.period:g} to {device.period * longest:g} s"
             require(1 <= self._silence <= longest, "watchdog", watchdog, wanted, DataError)
@@ -190,8 +180,7 @@ class Link(AbstractContextManager["Link"]):
     def step(self, inputs: ArrayLike) -> State:
         """Step the model by one sample, in lock-step, and return its state.
 
-        ``inputs`` are in the order of ``device.inputs``, within their limits. Those that may be missing
-        may be NaN, and count as missing beyond their limits.
+        ``inputs`` are those of ``device.inputs``, within their limits; NaN where one may be missing.
         """
         return self._drive(inputs, lock_step=True)
 
@@ -201,11 +190,11 @@ class Link(AbstractContextManager["Link"]):
 
     def _drive(self, inputs: ArrayLike, *, lock_step: bool) -> State:
         if lock_step != self._lock_step:
-            remedy = f"call {'step' if self._lock_step else 'set'}()"
-            raise LinkError(f"the link has lock_step={self._lock_step}", remedy=remedy)
+            right = "step()" if self._lock_step else "set()"
+            raise LinkError(f"lock_step is {self._lock_step}", remedy=f"call {right}")
         ports, values = self.device.inputs, np.empty(0)
         with suppress(TypeError, ValueError):
-            values = np.asarray(inputs, dtype=np.float64).ravel().astype(self.device.kind)
+            values = np.asarray(inputs, dtype=np.float64).ravel().astype(self._kind)
         if values.size != len(ports):
             names = ", ".join(port.name for port in ports)
             raise DataError(f"{inputs!r:.100} cannot be set", remedy=f"give numbers for {names}")
@@ -223,7 +212,7 @@ class Link(AbstractContextManager["Link"]):
 
     def stream(self, every: int) -> None:
         """From the next inputs on, have the device send every so many of its steps, or none with 0."""
-        require(0 <= every <= 0xFFFF, "every", every, "0 to 65535", DataError)
+        require(0 <= every <= WORD, "every", every, "0 to 65535", DataError)
         self._every = every
 
     def samples(self, timeout: float = 0.0) -> list[State]:
@@ -232,8 +221,7 @@ class Link(AbstractContextManager["Link"]):
         self._take(0.0)
         while not self._samples and (left := until - time.monotonic()) > 0:
             self._take(left)
-        found, self._samples = self._samples, []
-        return found
+        return [self._samples.popleft() for _ in range(len(self._samples))]
 
     def reset(self) -> State:
         """Clear the model's memory: the next step is its first."""
@@ -250,7 +238,7 @@ class Link(AbstractContextManager["Link"]):
 
     def memory(self) -> Array:
         """Return the memory of the model, in the order of its C; see `mckibben.export.state_of`."""
-        n, most, body = self.device.n_memory, (ROOM - 1) // self.device.kind.itemsize, b""
+        n, most, body = self.device.n_memory, (ROOM - 1) // self._kind.itemsize, b""
         for first in range(0, n, most):
             body += self._ask(Kind.READ, struct.pack("<HB", first, min(most, n - first)))
         return self._numbers(body, n)
@@ -265,19 +253,17 @@ class Link(AbstractContextManager["Link"]):
             self._port.close()
 
     def __exit__(self, *error: object) -> None:
-        """Close it."""
         self.close()
 
     def _identified(self) -> Device:
         text = b""
-        while part := self._ask(Kind.IDENTIFY, struct.pack("<H", len(text))):
+        while len(text) <= WORD and (
+            part := self._ask(Kind.IDENTIFY, struct.pack("<H", len(text)))
+        ):
             text += part
         try:
-            about = json.loads(text)
-            for way in ("inputs", "outputs"):
-                about[way] = tuple(Port(**port) for port in about[way])
-            return Device(**about)
-        except (ValueError, TypeError, KeyError):
+            return TypeAdapter(Device).validate_json(text)
+        except ValidationError:
             raise unreadable() from None
 
     def _ask(self, kind: Kind, body: bytes = b"") -> bytes:
@@ -289,9 +275,7 @@ class Link(AbstractContextManager["Link"]):
             asked = time.monotonic()
             if asked - begun >= self._patience:
                 problem = f"nothing has answered for {self._patience:g} s"
-                raise LinkError(
-                    problem, remedy="check power, port, rate and other users of the port"
-                )
+                raise LinkError(problem, remedy="check power, port, rate, and other users of it")
             with working():
                 self._port.write(b"\0" + packed if sent else packed)  # a zero ends noise
             sent += 1
@@ -310,9 +294,8 @@ class Link(AbstractContextManager["Link"]):
         with working():
             self._port.timeout = max(timeout, 0.0)
             received = self._port.read(max(self._port.in_waiting, 1))
-        found = None
         *pieces, begun = (self._begun + received).split(b"\0")
-        self._begun = begun[: PAYLOAD + 2]  # more is no frame
+        self._begun, found = begun[: PAYLOAD + 2], None  # more is no frame
         for piece in filter(None, pieces):
             frame = unpacked(piece)
             if frame and kind and frame[::2] == (kind | ANSWER, self._sequence):
@@ -327,15 +310,17 @@ class Link(AbstractContextManager["Link"]):
         if len(body) < 5:
             raise unreadable()
         n = len(self.device.outputs)
-        (notes, steps), values = struct.unpack_from("<BI", body), body[5:]
-        numbers = self._numbers(values, n + len(self.device.inputs))
+        notes, steps = struct.unpack_from("<BI", body)
+        numbers = self._numbers(body[5:], n + len(self.device.inputs))
+        if not np.isfinite(numbers[:n]).all():
+            raise unreadable()
         return State(Note(notes), steps, numbers[:n], numbers[n:], time.monotonic())
 
     def _numbers(self, body: bytes, n: int) -> Array:
-        if len(body) != n * self.device.kind.itemsize:
+        if len(body) != n * self._kind.itemsize:
             raise unreadable()
         with np.errstate(invalid="ignore"):  # of a NaN that signals
-            return np.frombuffer(body, self.device.kind).astype(np.float64)
+            return np.frombuffer(body, self._kind).astype(np.float64)
 
 
 def opened(name: str | Path, baud: int) -> Serial:

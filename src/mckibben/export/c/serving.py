@@ -168,7 +168,8 @@ def _port(channel: Mapping[str, str], single: bool) -> dict[str, Any]:
     """Return a channel as ``link.json`` has it, with the numbers of the device."""
     kind = np.float32 if single else np.float64
     numbers = {key: float(kind(channel[key].rstrip("f"))) for key in ("low", "high", "safe")}
-    return {"name": channel["name"], "unit": channel["unit"], **numbers}
+    unit = "" if channel["unit"] == "1" else channel["unit"]
+    return {"name": channel["name"], "unit": unit, **numbers}
 
 
 def _ticks(serving: Serving, period: float | None) -> int:

@@ -58,7 +58,7 @@ static uint32_t crc32(const uint8_t *bytes, int n)
     return ~crc;
 }}
 
-static uint32_t sequence, session;
+static uint32_t sequence;
 
 /* Send a frame as it should be around any body. */
 static void send_frame(mck_server *link, uint8_t kind, const uint8_t *body, int n)
@@ -71,7 +71,7 @@ static void send_frame(mck_server *link, uint8_t kind, const uint8_t *body, int 
     frame[length++] = MCK_LINK_VERSION;
     frame[length++] = kind;
     for (int i = 0; i < 4; i++) {{
-        frame[length++] = (uint8_t)(session >> (8 * i));
+        frame[length++] = link->served->fingerprint[i];
     }}
     for (int i = 0; i < 4; i++) {{
         frame[length++] = (uint8_t)(sequence >> (8 * i));
@@ -108,18 +108,6 @@ static void drain(mck_server *link)
     }}
 }}
 
-static void open_session(mck_server *link, source *from)
-{{
-    uint8_t body[13] = {{0}};
-    memcpy(body, link->served->fingerprint, 8);
-    body[8] = next(from) & 1u;
-    body[9] = (uint8_t)(1u + next(from) % 10u);
-    session = link->session + 1u;
-    sequence++;
-    send_frame(link, 3, body, 13);
-    drain(link);
-}}
-
 /* Numbers between limits, as the limits of the export allow. */
 static void put_between(uint8_t *to, mck_real low, mck_real high, uint8_t share)
 {{
@@ -130,13 +118,16 @@ static void put_between(uint8_t *to, mck_real low, mck_real high, uint8_t share)
 
 static void set_inputs(mck_server *link, source *from)
 {{
-    uint8_t body[MCK_PAYLOAD];
+    uint8_t body[MCK_PAYLOAD] = {{0}};
+    body[0] = next(from) & 1u;
+    body[1] = next(from) % 4u;
+    body[3] = (uint8_t)(1u + next(from) % 10u);
     for (int i = 0; i < link->served->n_inputs; i++) {{
         const mck_channel *channel = &link->served->channels[i];
-        put_between(body + i * (int)sizeof(mck_real), channel->low, channel->high, next(from));
+        put_between(body + 7 + i * (int)sizeof(mck_real), channel->low, channel->high, next(from));
     }}
     sequence++;
-    send_frame(link, 4, body, link->served->n_inputs * (int)sizeof(mck_real));
+    send_frame(link, 4, body, 7 + link->served->n_inputs * (int)sizeof(mck_real));
     drain(link);
 }}
 
@@ -148,7 +139,7 @@ static void check(const mck_server *link)
             abort();
         }}
     }}
-    for (int i = 0; i < link->served->n_inputs; i++) {{
+    for (int i = 0; i < link->served->n_inputs - link->served->n_missable; i++) {{
         const mck_channel *channel = &link->served->channels[i];
         if (!(link->in[i] >= channel->low && link->in[i] <= channel->high)) {{
             abort();
@@ -158,14 +149,13 @@ static void check(const mck_server *link)
 
 static void tried(mck_server *link, source *from)
 {{
-    session = sequence = 0;
-    mck_server_init(link, 0);
-    open_session(link, from);
+    sequence = 0;
+    mck_server_init(link);
     while (from->left > 0) {{
         const uint8_t what = next(from);
         uint8_t bytes[ROOM];
         int n = 0;
-        switch (what % 9) {{
+        switch (what % 8) {{
         case 0:
             for (n = next(from); n > 0 && from->left > 0; n--) {{
                 mck_server_receive(link, next(from));
@@ -178,26 +168,23 @@ static void tried(mck_server *link, source *from)
                 bytes[i] = next(from);
             }}
             sequence += what % 45 == 1 ? next(from) : 1u;
-            send_frame(link, next(from) % 16, bytes, n);
+            send_frame(link, next(from) % 8, bytes, n);
             break;
         case 3:
-            open_session(link, from);
-            break;
         case 4:
-        case 5:
             set_inputs(link, from);
             break;
-        case 6:
+        case 5:
             for (n = next(from) % 16; n > 0; n--) {{
                 mck_server_tick(link);
             }}
             break;
-        case 7:
+        case 6:
             drain(link);
             break;
         default:
-            if (what % 90 == 8) {{
-                mck_server_init(link, next(from));
+            if (what % 80 == 7) {{
+                mck_server_init(link);
             }} else {{
                 (void)mck_server_send(link);
             }}
@@ -219,7 +206,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 
 CASE = """    case {index}: {{
         static {name}_server server;
-        {name}_server_init(&server, 0);
+        {name}_server_init(&server);
         tried(&server.link, &from);
         break;
     }}"""

@@ -29,8 +29,8 @@ import mckibben
 from mckibben.blocks.adaptive import Adaptive, adaptive
 from mckibben.control.drifting import Drift, Drifting
 from mckibben.export import Serving, state_of
-from mckibben.link import ByteStream, Link
-from mckibben.link.trying import emulated, hosted
+from mckibben.export.c.emulation import serial_device
+from mckibben.link import Link
 from mckibben.signals import random_wave
 from mckibben.stream import FixedRate
 
@@ -194,20 +194,19 @@ def main() -> None:
     asked, measured = (channel.name for channel in block.inputs)
     limits = {asked: WITHIN, measured: WITHIN, block.outputs[0].name: PRESSURES}
     serving = Serving(limits, watchdog=0.5)
-    device: AbstractContextManager[ByteStream | str]
+    device: AbstractContextManager[str]
     if chosen.port:
         device = nullcontext(chosen.port)
-    elif chosen.here:
-        device = hosted(block, sample_time=PERIOD, single=True, serving=serving)
     else:
-        device = emulated(block, sample_time=PERIOD, serving=serving)
-    with device as line, Link(line, lock_step=True, patience=10.0) as link:
+        emulated = not chosen.here
+        device = serial_device(block, sample_time=PERIOD, serving=serving, emulated=emulated)
+    with device as port, Link(port, lock_step=True, patience=10.0) as link:
         learnt, kept = in_firmware(link, reference, chosen.duration, fast=chosen.fast)
         state = state_of(block, link.memory(), PERIOD)
-        steps, statistics = link.counts().steps, link.statistics
+        steps, statistics = link.state().steps, link.statistics
     print(
         f"The device took {steps} steps, {kept}; {statistics.repeated} frames were sent again, "
-        f"{statistics.dropped} dropped, and it was led again {statistics.reopened} times"
+        f"{statistics.dropped} dropped, and it was resumed {statistics.resumed} times"
     )
     runs = {"fixed": fixed(block, reference, chosen.duration), "adaptive": learnt}
     for name, found in runs.items():

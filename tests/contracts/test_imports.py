@@ -45,7 +45,7 @@ STANDS_ON = {
     "rigs": {"rigs", "recording", "signals", "registry", "system", "metrics", *BASE},
     "export": {"export", "blocks", "outputs", "registry", "system", *BASE},
     "stream": {"stream", "blocks", *BASE},
-    "link": {"link", "export", "blocks", "recording", *BASE},
+    "link": {"link", "recording", "system", *BASE},
     "control": {
         *("control", "blocks", "recording", "signals", "registry", "numerals", "system"),
         *BASE,

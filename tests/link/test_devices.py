@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import os
-import subprocess
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,10 +12,9 @@ from mckibben.blocks.laws import examples
 from mckibben.errors import DataError, ModelError
 from mckibben.export import Serving, export_c, state_of
 from mckibben.export.c import emulation
-from mckibben.export.programs import compile_c
+from mckibben.export.c.emulation import serial_device
 from mckibben.files import read
-from mckibben.link import Descriptor, Link, open_port
-from mckibben.link.trying import emulated, hosted
+from mckibben.link import Link, LinkError
 from tests.export.building import build
 from tests.export.models import path_for
 from tests.golden.commands import call
@@ -30,87 +25,55 @@ EMULATED = [needs(tool) for tool in (emulation.COMPILER, emulation.SIZE, emulati
 SERVING = Serving(limits={"pressure": (0, 6), "displacement": (-50, 50)}, watchdog=60.0)
 
 
-@contextmanager
-def terminals() -> Iterator[tuple[int, str]]:
-    """Give one end of a pseudo-terminal, and the name of the other."""
-    import tty
-
-    ours, theirs = os.openpty()
-    tty.setraw(theirs)
-    try:
-        yield ours, os.ttyname(theirs)
-    finally:
-        os.close(theirs)
-
-
 @pytest.mark.long
 @needs("cc")
-@pytest.mark.parametrize("start", [hosted, pytest.param(emulated, marks=EMULATED)])
-def test_a_device_gives_the_numbers_of_the_export(start: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize("emulated", [False, pytest.param(True, marks=EMULATED)])
+def test_a_device_gives_the_numbers_of_the_export(emulated: bool, tmp_path: Path) -> None:
     block = examples()["pi"]
     inputs = path_for(block, 1, 200).astype(np.float32).astype(np.float64)
-    precision = {"single": True} if start is hosted else {}
     expected = build({"pi": block}, "float32", tmp_path)["pi"](inputs)
-    with (
-        start(block, sample_time=SAMPLE_TIME, serving=SERVING, **precision) as line,
-        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
-    ):
+    device = serial_device(block, sample_time=SAMPLE_TIME, serving=SERVING, emulated=emulated)
+    with device as port, Link(port, lock_step=True, timeout=1.0, patience=30.0) as link:
         np.testing.assert_array_equal([link.step(row).outputs for row in inputs], expected)
         stream = block.stream()
         for row in inputs:
             stream.step(row)
         state = state_of(block, link.memory(), SAMPLE_TIME)
         np.testing.assert_allclose(state, stream.state, rtol=1e-6)
-    with pytest.raises(DataError):  # as it has been switched off
-        link.step([1.0])
 
 
-def test_a_port_is_opened_by_name_and_closed() -> None:
+def test_a_port_that_cannot_be_opened_or_is_gone_is_an_error() -> None:
     for wrong in (__file__, "/dev/null", "/absent"):
         with pytest.raises(DataError, match=wrong):
-            open_port(wrong)
-    with terminals() as (ours, name):
-        port, other = open_port(name), Descriptor(ours)
-        port.write(b"\0\x01\n\r\xff")
-        assert other.read(1.0) == b"\0\x01\n\r\xff"
-        other.write(b"\x03\x04\x11")
-        assert port.read(1.0) == b"\x03\x04\x11"
-        assert port.read(0.0) == b""
-        other.close()
-        with pytest.raises(DataError):
-            port.read(1.0)
-        port.close()
-        port.close()
-        with pytest.raises(DataError):
-            port.write(b"x")
+            Link(wrong)
+    ours, theirs = os.openpty()
+    name = os.ttyname(theirs)
+    with pytest.raises(LinkError, match="nothing has answered"):
+        Link(name, patience=0.1)
+    os.close(ours)
+    with pytest.raises(DataError):
+        Link(name, patience=0.1)
+    os.close(theirs)
 
 
-@pytest.mark.long
 @needs("cc")
-def test_the_command_line_looks_leads_and_records(tmp_path: Path) -> None:
-    folder, program = tmp_path / "c", tmp_path / "device"
-    export_c(examples()["pi"], folder, sample_time=0.01, serving=SERVING)
-    sources = [*(folder / "src").glob("*.c"), folder / "examples" / "link_posix.c"]
-    options = ["-D_POSIX_C_SOURCE=200809L", f"-I{folder / 'src'}"]
-    compile_c(sorted(sources), program, options=options)
-    with terminals() as (ours, name):
-        process = subprocess.Popen([str(program)], stdin=ours, stdout=ours)
-        try:
-            looked = call("link", name)
-            assert looked.code == 0, looked.err
-            out = tmp_path / "out.csv"
-            led = call("link", name, "--set", "pressure=2", "--seconds", "0.5", "-o", str(out))
-            assert led.code == 0, led.err
-            (recording,) = read(out)
-            assert recording.sample_time == pytest.approx(0.01)
-            assert set(recording["pressure"]) == {2.0}
-            (expected,) = examples()["pi"].simulate([2.0])
-            assert recording["displacement"][-1] == pytest.approx(expected, rel=1e-12)
-            for wrong in ("pressure=7", "force=1", "pressure"):
-                assert call("link", name, "--set", wrong).code == 2
-        finally:
-            process.kill()
-            process.wait()
+def test_the_command_line_looks_drives_and_records(tmp_path: Path) -> None:
+    block = examples()["pi"]
+    device = serial_device(block, sample_time=0.01, serving=SERVING, single=False)
+    with device as port:
+        looked = call("link", port)
+        assert looked.code == 0, looked.err
+        out = tmp_path / "out.csv"
+        led = call("link", port, "--set", "pressure=2", "--seconds", "0.5", "-o", str(out))
+        assert led.code == 0, led.err
+        (recording,) = read(out)
+        assert recording.sample_time == pytest.approx(0.01)
+        assert len(recording) == pytest.approx(50, abs=5)
+        assert set(recording["pressure"]) == {2.0}
+        (expected,) = block.simulate([2.0])
+        assert recording["displacement"][-1] == pytest.approx(expected, rel=1e-12)
+        for wrong in ("pressure=7", "force=1", "pressure"):
+            assert call("link", port, "--set", wrong).code == 2
 
 
 REFUSED = {

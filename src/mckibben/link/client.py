@@ -1,84 +1,154 @@
-"""A host's end of the wire: finds out what is there, and leads it."""
+"""A host's end of the serial line to an exported model; docs/deploy/link.md is the protocol."""
 
 from __future__ import annotations
 
+import os
 import struct
 import time
-from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import replace
+import zlib
+from collections import deque
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
 from pathlib import Path
-from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field, FiniteFloat, TypeAdapter, ValidationError
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError, require
-from mckibben.link.device import (
-    Counts,
-    Device,
-    Kind,
-    Port,
-    State,
-    described,
-    identified,
-    stated,
-    unfit,
-)
-from mckibben.link.exchange import WORDS, Exchange, LinkError, LostError, Statistics
-from mckibben.link.ports import ByteStream, open_port
+from mckibben.system.extras import demand
 
-OPENINGS = 3
-"""How often to open a session for one frame, at most."""
+if TYPE_CHECKING:
+    from serial import Serial
+
+VERSION, ANSWER, WORD, WORDS = 2, 0x80, 0xFFFF, 1 << 32
+HEAD, CHECK = struct.Struct("<BB4sI"), struct.Struct("<I")
+PAYLOAD = 250
+ROOM = PAYLOAD - HEAD.size - CHECK.size  # bytes of a body, at most
+STATUSES = ("ok", "malformed", "beyond limits", "another model is there")
+
+Kind = IntEnum("Kind", "IDENTIFY STATE READ INPUTS RESET RELEASE SAMPLE")
+Note = IntFlag("Note", "RUNNING TRIPPED LIMITED BAD_INPUT BAD_OUTPUT RESUMED")
 
 
-class Link:
-    """Leads a model on a device, over any stream of bytes.
+class LinkError(DataError):
+    """A device that does not answer, refuses, or is not what it was."""
 
-    A frame that is not answered is sent again under its number, by which the device knows it: whatever
-    the line loses, damages or doubles, each command is carried out once, in order, or not at all.
+
+class Frame(NamedTuple):
+    """A message: its kind, the first bytes of the model's fingerprint, a number, a body."""
+
+    kind: int
+    model: bytes
+    sequence: int
+    body: bytes = b""
+
+    def packed(self) -> bytes:
+        """Return its bytes: checked (CRC-32), and without a zero but at the end (COBS)."""
+        content = HEAD.pack(VERSION, *self[:3]) + self.body
+        parts = (content + CHECK.pack(zlib.crc32(content))).split(b"\0")
+        return b"".join(bytes([len(part) + 1]) + part for part in parts) + b"\0"
+
+
+def unpacked(piece: bytes) -> Frame | None:
+    """Return the frame of the bytes before a zero, or None where they are none."""
+    parts, at = [], 0
+    while at < len(piece):
+        parts.append(piece[at + 1 : at + piece[at]])
+        at += piece[at]
+    content = b"\0".join(parts)
+    if at != len(piece) or not HEAD.size + CHECK.size <= len(content) <= PAYLOAD:
+        return None
+    content, check = content[: -CHECK.size], content[-CHECK.size :]
+    version, kind, model, sequence = HEAD.unpack_from(content)
+    if version != VERSION or CHECK.pack(zlib.crc32(content)) != check:
+        return None
+    return Frame(kind, model, sequence, content[HEAD.size :])
+
+
+@dataclass(frozen=True)
+class Port:
+    """A channel of a device, its limits, and, of an output, the value without a host."""
+
+    name: str
+    unit: str
+    low: FiniteFloat
+    high: FiniteFloat
+    safe: FiniteFloat
+
+
+@dataclass(frozen=True)
+class Device:
+    """What a device is, as in ``link.json``: its time between ticks [s], longest silence [ticks], ...
+
+    ``n_memory`` numbers of the memory can be read; the last ``n_missable`` inputs may be NaN.
+    """
+
+    fingerprint: Annotated[str, Field(pattern="^[0-9a-f]{16}$")]
+    period: Annotated[FiniteFloat, Field(gt=0)]
+    silence: Annotated[int, Field(gt=0, lt=WORDS)]
+    numbers: Literal["float32", "float64"]
+    n_memory: Annotated[int, Field(ge=0, le=WORD)]
+    n_missable: Annotated[int, Field(ge=0)]
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+
+
+@dataclass(frozen=True)
+class State:
+    """The state of a device after so many steps, modulo 2^32, when it was received [s]."""
+
+    notes: Note
+    steps: int
+    outputs: Array
+    inputs: Array
+    time: float = 0.0
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether the outputs are the safe ones, as no host gives inputs."""
+        return Note.RUNNING not in self.notes
+
+
+@dataclass
+class Statistics:
+    """How often a frame was sent again, a piece was no frame, and a device had to be resumed."""
+
+    repeated: int = 0
+    dropped: int = 0
+    resumed: int = 0
+
+
+class Link(AbstractContextManager["Link"]):
+    """Drives a model on a device over a serial line.
+
+    A frame without an answer is sent again under the same number: whatever the line loses or damages,
+    the device executes each command once, in order, or not at all. Inputs carry all settings, so that
+    the next ones resume a device that was reset, or whose watchdog has acted; `statistics` counts it.
 
     Parameters
     ----------
-    stream : ByteStream, str or Path
-        What bytes go over, or the serial port to open.
+    port : str, Path or serial.Serial
+        Port to open, such as /dev/ttyACM0 or COM3, or one that is open.
     baud : int
-        Of a serial port [bits/s].
+        Rate of a port that is to be opened [bits/s].
     lock_step : bool
-        Whether the host's `step` steps the model; else the device's own timer does.
+        Whether each `step` steps the model; else the device's timer does, with the inputs of `set`.
     watchdog : float, optional
-        Silence after which the device takes its safe outputs [s]; default what it was exported with,
-        which is the most.
+        Time without inputs after which outputs become safe [s]; default that of the export, the longest.
     fingerprint : str, optional
-        Of the model that must be there, as in the export's ``link.json``.
-    timeout : float
-        How long to wait for an answer before asking again [s].
-    patience : float
-        After which time without any answer to give up [s].
-    reopen : bool
-        Whether to lead a device again that has been switched off and on, or whose watchdog has acted.
-        Its memory may then be another; it says so in `statistics`.
-    clock : callable
-        Time in seconds; other than real for tests.
-
-    Raises
-    ------
-    LinkError
-        If nothing answers, or it is another model.
-
-    Examples
-    --------
-    ::
-
-        with Link("/dev/ttyACM0", lock_step=True) as link:
-            (bar,) = link.step([reference, measured]).outputs
+        Of the model that must be on the device, as in the export's ``link.json``.
+    timeout, patience : float
+        Without an answer, the times after which a frame is sent again, and given up [s].
     """
 
     def __init__(
         self,
-        stream: ByteStream | str | Path,
+        port: str | Path | Serial,
         *,
         baud: int = 115200,
         lock_step: bool = False,
@@ -86,212 +156,196 @@ class Link:
         fingerprint: str | None = None,
         timeout: float = 0.05,
         patience: float = 2.0,
-        reopen: bool = True,
-        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        line = open_port(stream, baud=baud) if isinstance(stream, str | Path) else stream
-        self._exchange = Exchange(line, timeout=timeout, patience=patience, clock=clock)
-        self._lock_step, self._watchdog, self._reopen = lock_step, watchdog, reopen
-        self._session, self._led, self._every = 0, False, 0
+        require(0 < timeout <= patience, "timeout", timeout, f"up to {patience:g} s", DataError)
+        self._lock_step, self._timeout, self._patience = lock_step, timeout, patience
+        self._sequence = int.from_bytes(os.urandom(4), "little")  # not that of an earlier program
+        self._model, self._every, self._driving, self._begun = bytes(4), 0, False, b""
+        self._samples, self.statistics = deque[State](maxlen=100_000), Statistics()
+        self._port = opened(port, baud) if isinstance(port, str | Path) else port
         try:
-            self.device = self._identify(fingerprint)
+            self.device = device = self._identified()
+            if fingerprint is not None and fingerprint.lower() != device.fingerprint:
+                problem = f"the device has model {device.fingerprint}, not {fingerprint:.40}"
+                raise LinkError(problem, remedy="load the program exported with that model")
+            self._model, longest = bytes.fromhex(device.fingerprint)[:4], device.silence
+            self._kind = np.dtype(device.numbers).newbyteorder("<")
+            self._silence = longest if watchdog is None else round(watchdog / device.period)
+            wanted = f"{device.period:g} to {device.period * longest:g} s"
+            require(1 <= self._silence <= longest, "watchdog", watchdog, wanted, DataError)
         except BaseException:
-            line.close()
+            self._port.close()
             raise
 
-    def _identify(self, fingerprint: str | None) -> Device:
-        device, _, n_in, n_out = identified(self._exchange.ask(Kind.IDENTIFY))
-        if fingerprint is not None and fingerprint.lower() != device.fingerprint:
-            raise LinkError(
-                f"the device holds model {device.fingerprint}, not {fingerprint:.40}",
-                remedy="load the program that was exported with it, or give the other fingerprint",
-            )
-        ports: list[Port] = []
-        for place in range(n_in + n_out):
-            ports.append(described(self._exchange.ask(Kind.DESCRIBE, bytes([place])), device))
-        return replace(device, inputs=tuple(ports[:n_in]), outputs=tuple(ports[n_in:]))
-
-    # -- leading -----------------------------------------------------------------------------
-
-    @property
-    def statistics(self) -> Statistics:
-        """What was asked, repeated and dropped so far."""
-        return self._exchange.statistics
-
     def step(self, inputs: ArrayLike) -> State:
-        """Step the model on the device by one sample, and return how it stands then.
+        """Step the model by one sample, in lock-step, and return its state.
 
-        Parameters
-        ----------
-        inputs : array-like, shape (n_inputs,)
-            In the order of ``device.inputs``, within their limits. The last ``device.n_missable`` may be
-            NaN, where a measurement is missing; beyond limits they are taken as missing.
-
-        Raises
-        ------
-        DataError
-            If the inputs are not that.
-        LinkError
-            If the link is not in lock-step, or nothing answers.
+        ``inputs`` are those of ``device.inputs``, within their limits; NaN where one may be missing.
         """
-        if not self._lock_step:
-            raise LinkError(
-                "the device's own timer steps the model",
-                remedy="call set(), or give lock_step=True",
-            )
-        return self._inputs(inputs)
+        return self._drive(inputs, lock_step=True)
 
     def set(self, inputs: ArrayLike) -> State:
-        """Give the inputs of the coming steps, which the device's timer takes.
+        """Set the inputs of the coming steps of the device's timer, before the watchdog acts."""
+        return self._drive(inputs, lock_step=False)
 
-        Returns what stands there before the next of them; see `step`.
-        """
-        if self._lock_step:
-            raise LinkError("the host steps the model", remedy="call step()")
-        return self._inputs(inputs)
-
-    def _inputs(self, inputs: ArrayLike) -> State:
-        ports = self.device.inputs
-        try:
-            values = np.asarray(inputs, dtype=np.float64).ravel()
-        except (TypeError, ValueError):
-            values = np.empty(0)
+    def _drive(self, inputs: ArrayLike, *, lock_step: bool) -> State:
+        if lock_step != self._lock_step:
+            right = "step()" if self._lock_step else "set()"
+            raise LinkError(f"lock_step is {self._lock_step}", remedy=f"call {right}")
+        ports, values = self.device.inputs, np.empty(0)
+        with suppress(TypeError, ValueError):
+            values = np.asarray(inputs, dtype=np.float64).ravel().astype(self._kind)
         if values.size != len(ports):
-            raise DataError(
-                f"{inputs!r:.100} is sent to {len(ports)} input(s)",
-                remedy=f"give {', '.join(port.name for port in ports)}",
-            )
-        body = self.device.packed(values)
-        needed = ports[: len(ports) - self.device.n_missable]
-        for port, value in zip(needed, self.device.numbers(body).tolist(), strict=False):
+            names = ", ".join(port.name for port in ports)
+            raise DataError(f"{inputs!r:.100} cannot be set", remedy=f"give numbers for {names}")
+        needed = len(ports) - self.device.n_missable
+        for port, value in zip(ports[:needed], values[:needed].tolist(), strict=True):
             if not port.low <= value <= port.high:  # as NaN never is
-                raise DataError(
-                    f"{value:g} {port.unit} is beyond the limits {port.low:g} to {port.high:g} that "
-                    "were fixed at export",
-                    channel=port.name,
-                    remedy="stay within, or export the model with other limits",
-                )
-        return stated(self._lead(Kind.INPUTS, body), self.device, with_inputs=False)
+                problem = f"{value:g} {port.unit} is beyond {port.low:g} to {port.high:g}"
+                remedy = "stay within, or export the model with other limits"
+                raise DataError(problem, channel=port.name, remedy=remedy)
+        settings = struct.pack("<BHI", lock_step, self._every, self._silence)
+        state = self._state(self._ask(Kind.INPUTS, settings + values.tobytes()))
+        self.statistics.resumed += self._driving and Note.RESUMED in state.notes
+        self._driving = True
+        return state
 
     def stream(self, every: int) -> None:
-        """Have the device tell every so many of its steps by itself, or none with 0; see `samples`."""
-        require(0 <= every <= 0xFFFF, "every", every, "0 to 65535", DataError)
-        self._lead(Kind.STREAM, struct.pack("<H", every))
+        """From the next inputs on, have the device send every so many of its steps, or none with 0."""
+        require(0 <= every <= WORD, "every", every, "0 to 65535", DataError)
         self._every = every
 
     def samples(self, timeout: float = 0.0) -> list[State]:
-        """Return the steps that the device has told since, waiting so long for the first [s]."""
-        exchange = self._exchange
-        until = exchange.clock() + timeout
-        exchange.take(0.0)
-        while not exchange.samples and (left := until - exchange.clock()) > 0:
-            exchange.take(left)
-        found = []
-        while exchange.samples:
-            frame = exchange.samples.popleft()
-            try:
-                if self._led and frame.session == self._session:
-                    found.append(stated(frame.body[1:], self.device, with_inputs=True))
-                    continue
-            except DataError:
-                pass
-            self.statistics.dropped += 1
-        return found
+        """Return the steps that were received since the last call, waiting for the first one [s]."""
+        until = time.monotonic() + timeout
+        self._take(0.0)
+        while not self._samples and (left := until - time.monotonic()) > 0:
+            self._take(left)
+        return [self._samples.popleft() for _ in range(len(self._samples))]
 
-    def keep(self) -> None:
-        """Tell the watchdog that the host is there."""
-        self._lead(Kind.KEEP)
+    def reset(self) -> State:
+        """Clear the model's memory: the next step is its first."""
+        return self._state(self._ask(Kind.RESET))
 
-    def reset(self) -> None:
-        """Make the next step a first one: the model forgets everything."""
-        self._lead(Kind.RESET)
-
-    def release(self) -> None:
-        """Lead no more: the device takes its safe outputs at once."""
-        if self._led:
-            self._led = False
-            with suppress(LostError):  # it has let go by itself
-                self._exchange.ask(Kind.RELEASE, session=self._session)
-
-    # -- asking ------------------------------------------------------------------------------
+    def release(self) -> State:
+        """Make the outputs the safe ones, until the next inputs."""
+        self._driving = False
+        return self._state(self._ask(Kind.RELEASE))
 
     def state(self) -> State:
-        """Return how the device stands; this leads nothing."""
-        return stated(self._exchange.ask(Kind.STATE), self.device, with_inputs=True)
-
-    def counts(self) -> Counts:
-        """Return what the device has counted; this leads nothing."""
-        return identified(self._exchange.ask(Kind.IDENTIFY))[1]
+        """Return the state; this changes nothing, not even the watchdog's time."""
+        return self._state(self._ask(Kind.STATE))
 
     def memory(self) -> Array:
         """Return the memory of the model, in the order of its C; see `mckibben.export.state_of`."""
-        n, parts = self.device.n_memory, [np.empty(0)]
-        for first in range(0, n, self.device.most):
-            count = min(self.device.most, n - first)
-            body = self._exchange.ask(Kind.READ, struct.pack("<HB", first, count))
-            parts.append(self.device.numbers(body))
-        found = np.concatenate(parts)
-        if found.size != n:
-            raise unfit("numbers")
-        return found
-
-    # -- frames ------------------------------------------------------------------------------
-
-    def _lead(self, kind: Kind, body: bytes = b"") -> bytes:
-        """Ask within the session, which is opened first where it must be."""
-        for tried in range(OPENINGS):
-            try:
-                if not self._led:
-                    self._open()
-                return self._exchange.ask(kind, body, session=self._session)
-            except LostError:
-                lost, self._led = self._led, False
-                if tried == OPENINGS - 1 or (lost and not self._reopen):
-                    raise
-                self.statistics.reopened += lost
-        raise AssertionError("unreachable")
-
-    def _open(self) -> None:
-        device, *_ = identified(self._exchange.ask(Kind.IDENTIFY))
-        if device.fingerprint != self.device.fingerprint:
-            raise LinkError(
-                f"the device holds model {device.fingerprint} now, not {self.device.fingerprint}",
-                remedy="open the link again if that is meant",
-            )
-        ticks = device.silence
-        if self._watchdog is not None:
-            ticks = round(self._watchdog / device.period)
-            wanted = f"{device.period:g} to {device.period * device.silence:g} s"
-            require(1 <= ticks <= device.silence, "watchdog", self._watchdog, wanted, DataError)
-        body = bytes.fromhex(device.fingerprint) + struct.pack("<BI", self._lock_step, ticks)
-        self._session = (
-            self._exchange.session + 1
-        ) % WORDS  # by which the device knows that it is a later one
-        self._exchange.ask(Kind.OPEN, body, session=self._session)
-        self._led = True
-        if self._every:
-            self._exchange.ask(Kind.STREAM, struct.pack("<H", self._every), session=self._session)
-
-    # -- ending ------------------------------------------------------------------------------
+        n, most, body = self.device.n_memory, (ROOM - 1) // self._kind.itemsize, b""
+        for first in range(0, n, most):
+            body += self._ask(Kind.READ, struct.pack("<HB", first, min(most, n - first)))
+        return self._numbers(body, n)
 
     def close(self) -> None:
-        """Lead no more, and close the port."""
+        """Make the outputs the safe ones if this link has driven them, and close the port."""
         try:
-            self.release()
-        except DataError:
-            pass  # its watchdog does it
+            if self._driving:
+                with suppress(DataError):  # else the watchdog does it
+                    self.release()
         finally:
-            self._exchange.stream.close()
+            self._port.close()
 
-    def __enter__(self) -> Self:
-        """Return the link."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Lead no more, and close the port."""
+    def __exit__(self, *error: object) -> None:
         self.close()
+
+    def _identified(self) -> Device:
+        text = b""
+        while len(text) <= WORD and (
+            part := self._ask(Kind.IDENTIFY, struct.pack("<H", len(text)))
+        ):
+            text += part
+        try:
+            return TypeAdapter(Device).validate_json(text)
+        except ValidationError:
+            raise unreadable() from None
+
+    def _ask(self, kind: Kind, body: bytes = b"") -> bytes:
+        """Send a frame until it is answered, and return the answer, without its status."""
+        self._sequence = (self._sequence + 1) % WORDS
+        packed = Frame(kind, self._model, self._sequence, body).packed()
+        begun, answer, sent = time.monotonic(), None, 0
+        while answer is None:
+            asked = time.monotonic()
+            if asked - begun >= self._patience:
+                problem = f"nothing has answered for {self._patience:g} s"
+                raise LinkError(problem, remedy="check power, port, rate, and other users of it")
+            with working():
+                self._port.write(b"\0" + packed if sent else packed)  # a zero ends noise
+            sent += 1
+            while answer is None and (left := asked + self._timeout - time.monotonic()) > 0:
+                answer = self._take(left, kind)
+        self.statistics.repeated += sent - 1
+        if not answer or answer[0] >= len(STATUSES):
+            raise unreadable()
+        if answer[0]:
+            problem = f"the device refuses {kind.name}: {STATUSES[answer[0]]}"
+            raise LinkError(problem, remedy="see docs/deploy/link.md, or open the link again")
+        return answer[1:]
+
+    def _take(self, timeout: float, kind: Kind | None = None) -> bytes | None:
+        """Read once, store samples, and return the body of the expected answer if it has come."""
+        with working():
+            self._port.timeout = max(timeout, 0.0)
+            received = self._port.read(max(self._port.in_waiting, 1))
+        *pieces, begun = (self._begun + received).split(b"\0")
+        self._begun, found = begun[: PAYLOAD + 2], None  # more is no frame
+        for piece in filter(None, pieces):
+            frame = unpacked(piece)
+            if frame and kind and frame[::2] == (kind | ANSWER, self._sequence):
+                found = frame.body
+            elif frame and frame[:2] == (Kind.SAMPLE | ANSWER, self._model) and self._driving:
+                self._samples.append(self._state(frame.body[1:]))
+            else:
+                self.statistics.dropped += 1
+        return found
+
+    def _state(self, body: bytes) -> State:
+        if len(body) < 5:
+            raise unreadable()
+        n = len(self.device.outputs)
+        notes, steps = struct.unpack_from("<BI", body)
+        numbers = self._numbers(body[5:], n + len(self.device.inputs))
+        if not np.isfinite(numbers[:n]).all():
+            raise unreadable()
+        return State(Note(notes), steps, numbers[:n], numbers[n:], time.monotonic())
+
+    def _numbers(self, body: bytes, n: int) -> Array:
+        if len(body) != n * self._kind.itemsize:
+            raise unreadable()
+        with np.errstate(invalid="ignore"):  # of a NaN that signals
+            return np.frombuffer(body, self._kind).astype(np.float64)
+
+
+def opened(name: str | Path, baud: int) -> Serial:
+    """Return a serial port, open for this program alone."""
+    demand("serial", "serial", "serial ports")
+    from serial import Serial
+
+    try:
+        return Serial(str(name), baud, write_timeout=1.0, exclusive=True)
+    except (OSError, ValueError) as error:
+        remedy = "give an unused serial port that you may read and write, and one of its rates"
+        raise DataError(f"it cannot be opened ({error})", file=name, remedy=remedy) from None
+
+
+@contextmanager
+def working() -> Iterator[None]:
+    """Turn errors of a port into `LinkError`."""
+    try:
+        yield
+    except OSError as error:
+        remedy = "see that the device is on and plugged in, and open the link again"
+        raise LinkError(f"the serial port has failed ({error})", remedy=remedy) from None
+
+
+def unreadable() -> LinkError:
+    """Return the error of an answer that does not belong to the protocol."""
+    remedy = "check that it was exported by the same release of mckibben"
+    return LinkError("the device's answer cannot be read", remedy=remedy)

@@ -1,4 +1,4 @@
-"""A device driven with constant inputs for a while, and what it did."""
+"""A device driven with constant inputs for a while, and the recording of it."""
 
 from __future__ import annotations
 
@@ -7,34 +7,26 @@ import time
 import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError, DataWarning, require
-from mckibben.link.client import Link
-from mckibben.link.device import Device, State
+from mckibben.link.client import WORDS, Device, Link, Note, State
 from mckibben.recording import Recording
 
 LONGEST = 86400.0
 """Time to drive a device [s]."""
 
+LATE = 1.0
+"""Between two samples, the largest difference of the device's time and the host's [s]."""
+
 
 @dataclass(frozen=True)
 class Driven:
-    """What a device is, how it was, and what it did while it was driven.
-
-    Parameters
-    ----------
-    device : Device
-    before : State
-    after : State or None
-        None where it was not driven.
-    samples : tuple of State
-        Of the recording.
-    every : int
-        Steps between these.
-    """
+    """A device, its state before and, if it was driven, after that, and every so many of its steps."""
 
     device: Device
     before: State
@@ -42,102 +34,84 @@ class Driven:
     samples: tuple[State, ...] = ()
     every: int = 1
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the device and its states, for JSON."""
-        device = self.device
-        about = {
-            "fingerprint": device.fingerprint,
-            "period": device.period,
-            "watchdog": device.period * device.silence,
-            "numbers": str(device.kind),
-            "memory": device.n_memory,
-            "inputs": [asdict(port) for port in device.inputs],
-            "outputs": [asdict(port) for port in device.outputs],
-        }
-        found = {"device": about, "state": _state(self.before)}
-        return found if self.after is None else found | {"led": _state(self.after)}
+    def places(self) -> tuple[list[int], int]:
+        """Return the rows of the samples in the recording, and how often the device was interrupted.
+
+        Steps are counted modulo 2^32. Where the count does not fit the time between two samples, or the
+        device was resumed, as after a reset, the host's time says how many rows are between them.
+        """
+        period, rows, n_breaks = self.device.period, [0], 0
+        for one, other in pairwise(self.samples):
+            steps, seconds = (other.steps - one.steps) % WORDS, other.time - one.time
+            resumed = Note.RESUMED in other.notes and Note.RESUMED not in one.notes
+            if resumed or abs(steps * period - seconds) > LATE:
+                steps, n_breaks = round(seconds / period), n_breaks + 1
+            rows.append(rows[-1] + max(round(steps / self.every), 1))
+        return rows, n_breaks
 
     def recording(self) -> Recording:
-        """Return the samples as a recording; rows that were lost on the way are interpolated.
+        """Return the samples as a recording; a warning says how many rows are missing.
 
         Raises
         ------
         DataError
-            If there are fewer than two.
+            If there are fewer than two samples.
         """
-        samples, device = self.samples, self.device
-        if len(samples) < 2:
-            raise DataError(
-                "the device sent fewer than two steps in that time",
-                remedy="give more `seconds`, or less `every`",
-            )
-        steps = np.array([one.steps - samples[0].steps for one in samples]) / self.every
-        grid = np.arange(int(steps[-1]) + 1)
-        if lost := len(grid) - len(samples):
-            text = f"{lost} of {len(grid)} rows were lost on the way, and are interpolated"
+        if len(self.samples) < 2:
+            problem = "fewer than two steps of the device were received"
+            raise DataError(problem, remedy="give more `seconds`, or less `every`")
+        rows, n_breaks = self.places()
+        grid = np.arange(rows[-1] + 1)
+        if missing := len(grid) - len(rows):
+            text = f"{missing} of {len(grid)} rows are missing, and interpolated"
             warnings.warn(text, DataWarning, stacklevel=2)
-        channels, units = {}, {}
-        inputs = [port.name for port in device.inputs]
-        for k, port in enumerate(device.inputs):
-            channels[port.name], units[port.name] = [one.inputs[k] for one in samples], port.unit
-        for k, port in enumerate(device.outputs):
-            name = f"{port.name}_out" if port.name in inputs else port.name
-            channels[name], units[name] = [one.outputs[k] for one in samples], port.unit
-        rows = {name: np.interp(grid, steps, column) for name, column in channels.items()}
+        if n_breaks:
+            text = f"the device was reset, or took safe outputs, {n_breaks} time(s) meanwhile"
+            warnings.warn(text, DataWarning, stacklevel=2)
+        columns, units, device = dict[str, Array](), {}, self.device
+        values = np.array([[*one.inputs, *one.outputs] for one in self.samples]).T
+        for port, column in zip((*device.inputs, *device.outputs), values, strict=True):
+            name = f"{port.name}_out" if port.name in columns else port.name
+            columns[name], units[name] = np.interp(grid, rows, column), port.unit
         meta = {"device": device.fingerprint}
-        return Recording(rows, device.period * self.every, units=units, meta=meta)
+        return Recording(columns, device.period * self.every, units=units, meta=meta)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the device and its states, for JSON."""
+        about = {"watchdog": self.device.period * self.device.silence}
+        found = {"device": asdict(self.device) | about, "state": _state(self.before)}
+        return found if self.after is None else found | {"led": _state(self.after)}
 
 
 def _state(state: State) -> dict[str, Any]:
-    return {
-        "steps": state.steps,
-        "safe": state.is_safe,
-        "notes": [note.name.lower() for note in state.notes if note.name],
-        "inputs": state.inputs.tolist(),
-        "outputs": state.outputs.tolist(),
-    }
+    notes = [note.name.lower() for note in Note if note in state.notes and note.name]
+    values = {"inputs": state.inputs.tolist(), "outputs": state.outputs.tolist()}
+    return {"steps": state.steps, "safe": state.is_safe, "notes": notes, **values}
 
 
-def drive(line: Link, settings: Mapping[str, float], seconds: float, every: int) -> Driven:
-    """Drive inputs of a device for some time; without any, only look at it.
+def drive(link: Link, settings: Mapping[str, float], seconds: float, every: int) -> Driven:
+    """Drive inputs of a device for some time [s], up to a day; without settings, only look at it.
 
-    Parameters
-    ----------
-    line : Link
-    settings : mapping of str to float
-        Input -> value; the others stay as they are.
-    seconds : float
-        How long, up to a day.
-    every : int
-        Steps from one sample of the recording to the next; 0 for none.
-
-    Raises
-    ------
-    DataError
-        On unknown inputs, or values or times that are out of range.
+    ``settings`` are values of inputs; the others stay. ``every`` so many steps are samples, 0 for none.
     """
     require(0 < seconds <= LONGEST, "seconds", seconds, f"a time up to {LONGEST:g} s", DataError)
-    require(0 <= every <= 0xFFFF, "every", every, "0 to 65535", DataError)
-    before = line.state()
+    before, device, samples = link.state(), link.device, list[State]()
     if not settings:
-        return Driven(line.device, before)
-    inputs, names = before.inputs.copy(), [port.name for port in line.device.inputs]
+        return Driven(device, before)
+    inputs, names = before.inputs.copy(), [port.name for port in device.inputs]
     for name, value in settings.items():
         if name not in names or not math.isfinite(value):
-            problem = f"{name!r:.60} cannot be {value:g}"
             remedy = f"give finite numbers to {', '.join(names)}"
+            problem = f"{name!r:.60} cannot be {value:g}"
             raise DataError(problem, parameter="settings", remedy=remedy)
         inputs[names.index(name)] = value
-    line.set(inputs)
-    if every:
-        line.stream(every)
-    samples: list[State] = []
+    link.stream(every)
     until = time.monotonic() + seconds
-    pause = min(0.25 * line.device.period * line.device.silence, 0.1)
+    pause = min(0.25 * device.period * device.silence, 0.1)
     while (left := until - time.monotonic()) > 0:
+        link.set(inputs)
         if every:
-            samples += line.samples(timeout=min(pause, left))
+            samples += link.samples(timeout=min(pause, left))
         else:
             time.sleep(min(pause, left))
-        line.keep()
-    return Driven(line.device, before, line.state(), tuple(samples), every or 1)
+    return Driven(device, before, link.state(), tuple(samples), every or 1)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mckibben.diagnosis.data_gaps import Gap
     from mckibben.diagnosis.description import ModelDescription
     from mckibben.diagnosis.review import Review
-    from mckibben.link.device import State
+    from mckibben.link.client import State
     from mckibben.link.driving import Driven
     from mckibben.papers.paper import Paper
     from mckibben.planning.planner import Plan

@@ -276,7 +276,7 @@ class Device32:
             fingerprint="0123456789abcdef",
             period=0.01,
             silence=50,
-            kind=np.dtype(np.float64),
+            numbers="float64",
             n_memory=0,
             inputs=(port(name="displacement", unit="mm"),),
             outputs=(port(name="pressure", unit="bar"),),
@@ -298,9 +298,6 @@ class Device32:
         return self.state()
 
     def stream(self, every: int) -> None:
-        pass
-
-    def keep(self) -> None:
         pass
 
     def samples(self, timeout: float = 0.0) -> list[State]:

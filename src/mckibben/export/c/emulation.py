@@ -5,8 +5,13 @@ What is counted are instructions, exactly and repeatably, not cycles: QEMU knows
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
+import subprocess
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,9 +20,10 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.export.c.project import described, render, source_files, vectors
+from mckibben.export.c.project import c_files, described, render, source_files, vectors
+from mckibben.export.c.serving import Serving
 from mckibben.export.folders import write_texts
-from mckibben.export.programs import FLAGS, run
+from mckibben.export.programs import FLAGS, compile_c, run
 
 BOARD = Path(__file__).parent / "cortex_m4f"
 COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
@@ -126,6 +132,69 @@ def built(folder: Path) -> tuple[Path, int]:
     )
     table = _run(SIZE, *map(str, objects)).splitlines()[1:]
     return program, sum(int(line.split()[0]) for line in table)
+
+
+@contextmanager
+def serial_device(
+    block: Block,
+    *,
+    sample_time: float,
+    serving: Serving | None = None,
+    single: bool = True,
+    emulated: bool = False,
+) -> Iterator[str]:
+    """Run a served model without a board, and give the name of its serial port.
+
+    Parameters
+    ----------
+    block : Block
+        What is served.
+    sample_time : float
+        Time between its ticks [s].
+    serving : Serving, optional
+        What it accepts.
+    single : bool
+        Whether it computes in single precision, as the emulated microcontroller does.
+    emulated : bool
+        Whether it runs on the emulated microcontroller, else as a process of this machine.
+
+    Raises
+    ------
+    ModelError
+        If it cannot be exported or compiled.
+    """
+    import tty
+
+    serving, single = serving or Serving(), single or emulated
+    ours, theirs = os.openpty()  # the process is at our end, the host at the other
+    tty.setraw(theirs)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        files = c_files(block, sample_time=sample_time, single=single, serving=serving)
+        write_texts(folder, files)
+        if emulated:
+            (folder / "main.c").write_bytes((folder / "examples" / "link_mps2.c").read_bytes())
+            command = [EMULATOR, *EMULATED, "-serial", "pty", "-kernel", str(built(folder)[0])]
+        else:
+            command = [str(folder / "device")]
+            sources = [*sorted((folder / "src").glob("*.c")), folder / "examples" / "link_posix.c"]
+            options = ["-D_POSIX_C_SOURCE=200809L", f"-I{folder / 'src'}"]
+            compile_c(sources, Path(command[0]), options=options)
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL if emulated else ours,
+            stdout=subprocess.PIPE if emulated else ours,
+            stderr=subprocess.STDOUT if emulated else subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C is the host's
+        )
+        try:
+            found = re.search(rb"/dev/\S+", process.stdout.readline()) if process.stdout else None
+            yield found[0].decode() if found else os.ttyname(theirs)
+        finally:
+            process.kill()
+            process.communicate()
+            os.close(ours)
+            os.close(theirs)
 
 
 def _run(*command: str) -> str:

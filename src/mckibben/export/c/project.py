@@ -77,7 +77,7 @@ def export_c(
     force : bool
         Whether files of the user's may be replaced; those of an earlier export are anyway.
     serving : Serving, optional
-        Add a server that answers over a wire, within these settings; see `mckibben.link`.
+        Add a server that answers over a serial line, within these settings; see `mckibben.link`.
 
     Returns
     -------

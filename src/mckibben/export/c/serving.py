@@ -1,4 +1,4 @@
-"""What an exported model that answers over a wire accepts: fixed here, and nowhere on the wire."""
+"""What an exported model accepts over a serial line: fixed here, and nowhere on the line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MOST_NUMBERS = 0xFFFF
 MOST_TICKS = 2**31 - 1
 
 MOST_MICROSECONDS = 2**32 - 1
-"""Between ticks, as a device tells it."""
+"""Between ticks, in a word."""
 
 
 @dataclass(frozen=True)
@@ -121,37 +121,55 @@ def served(
     single, n = content["single"], len(block.inputs) + len(block.outputs)
     if n * content["bytes"] + 6 > ROOM:
         raise ModelError(
-            f"{n} channels do not fit into a frame of the wire",
+            f"{n} channels do not fit into a frame of the serial link",
             remedy="export in single precision, `single`, or fewer channels",
         )
-    told = {
-        "period": period,
-        "microseconds": round(1e6 * period),
+    bounds = [[literal(value, single=single) for value in each] for each in limits(block, serving)]
+    channels = [
+        channel | dict(zip(("low", "high", "safe"), numbers, strict=True))
+        for channel, *numbers in zip(
+            (*content["inputs"], *content["outputs"]), *bounds, strict=True
+        )
+    ]
+    about: dict[str, Any] = {
+        "fingerprint": "",
+        "period": round(1e6 * period) / 1e6,
         "silence": ticks,
-        "channels": [
-            channel | dict(zip(("low", "high", "safe"), numbers, strict=True))
-            for channel, *numbers in zip(
-                (*content["inputs"], *content["outputs"]),
-                *(
-                    [literal(value, single=single) for value in each]
-                    for each in limits(block, serving)
-                ),
-                strict=True,
-            )
-        ],
+        "numbers": "float32" if single else "float64",
         "n_memory": content["n_memory"] if content["n_memory"] <= MOST_NUMBERS else 0,
+        "n_missable": len(block.inputs) - content["n_needed"],
+        "inputs": [_port(channel, single) for channel in channels[: len(block.inputs)]],
+        "outputs": [_port(channel, single) for channel in channels[len(block.inputs) :]],
+    }
+    told = about | {
+        "microseconds": round(1e6 * period),
+        "channels": channels,
+        "about": [],
         "fingerprint_bytes": "",
     }
     full = {**content, "served": told}
     texts = [render("mckibben.export.c", file, full) for file in ("model.c.j2", "server.c.j2")]
-    digest = hashlib.sha256("\n".join([*texts, repr(single)]).encode()).digest()[:8]
-    told["fingerprint"] = digest.hex()
+    digest = hashlib.sha256("\n".join([*texts, json.dumps(about)]).encode()).digest()[:8]
+    about["fingerprint"] = digest.hex()
+    told["fingerprint"], text = digest.hex(), json.dumps(about, separators=(",", ":"))
+    if len(text) > MOST_NUMBERS:
+        raise ModelError(f"{n} channels are too many to describe", remedy="export fewer channels")
+    told["link.json"] = json.dumps(about, indent=2) + "\n"
+    told["about"] = [json.dumps(text[k : k + 80]) for k in range(0, len(text), 80)]
     told["fingerprint_bytes"] = ", ".join(f"0x{byte:02X}" for byte in digest)
     return {
         "served": told,
         "shared": [*content["shared"], *SERVER],
         "sources": [*content["sources"], SERVER[0].name, f"{content['name']}_server.c"],
     }
+
+
+def _port(channel: Mapping[str, str], single: bool) -> dict[str, Any]:
+    """Return a channel as ``link.json`` has it, with the numbers of the device."""
+    kind = np.float32 if single else np.float64
+    numbers = {key: float(kind(channel[key].rstrip("f"))) for key in ("low", "high", "safe")}
+    unit = "" if channel["unit"] == "1" else channel["unit"]
+    return {"name": channel["name"], "unit": unit, **numbers}
 
 
 def _ticks(serving: Serving, period: float | None) -> int:
@@ -174,8 +192,7 @@ def served_files(content: Mapping[str, Any]) -> dict[str, str]:
         "examples/link_posix.c": "link_posix.c.j2",
         "examples/link_mps2.c": "link_mps2.c.j2",
     }
-    said = {"name": name, "fingerprint": told["fingerprint"], "period_us": told["microseconds"]}
     return {
         **{path: render("mckibben.export.c", file, content) for path, file in files.items()},
-        "link.json": json.dumps(said, indent=2) + "\n",
+        "link.json": told["link.json"],
     }

@@ -1,12 +1,8 @@
-/* A model behind a wire: bytes in, bytes out, and time told by ticks. docs/deploy/link.md is the protocol.
+/* A model behind a serial line: bytes in, bytes out, time in ticks. docs/deploy/link.md is the protocol.
  *
- * Nothing is allocated, nothing blocks, and every call ends in bounded time: at most one frame of
- * 250 bytes is looked at, and one step of the model taken. Call all functions from one context (such as the
- * main loop): an interrupt hands over bytes and ticks, it does not call.
- *
- * Outputs are the safe values before the first inputs have come, and again once the host was silent
- * for too long; they are finite and within the limits of the export at any time.
- */
+ * Nothing is allocated, nothing blocks; a call reads one frame and takes one step at most. Call all
+ * functions from one context, such as the main loop. Outputs are finite and within the limits of the
+ * export at any time, and the safe ones until inputs come and after the host was silent for too long. */
 #ifndef MCK_SERVER_H
 #define MCK_SERVER_H
 
@@ -14,13 +10,11 @@
 
 #include "mck.h"
 
-#define MCK_LINK_VERSION 1u
-#define MCK_PAYLOAD 250                /* bytes of a frame before it is stuffed, at most */
+#define MCK_LINK_VERSION 2u
+#define MCK_PAYLOAD 250               /* bytes of a frame before it is stuffed, at most */
 #define MCK_STUFFED (MCK_PAYLOAD + 2) /* and after, with the zero that ends it */
 
 typedef struct {
-    const char *name;
-    const char *unit;
     mck_real low;
     mck_real high;
     mck_real safe; /* of an output */
@@ -28,13 +22,13 @@ typedef struct {
 
 /* What was fixed at export. */
 typedef struct {
+    const char *about; /* all of this as text: JSON */
     uint8_t fingerprint[8];
-    uint32_t period;  /* time between ticks [us] */
-    uint32_t silence; /* ticks without a good frame, at most */
+    uint32_t silence; /* longest silence of a host [ticks] */
     int n_inputs;
-    int n_missable; /* of them the last, which may be missing: NaN */
+    int n_missable; /* the last of them, which may be missing: NaN */
     int n_outputs;
-    int n_memory; /* numbers of the model's memory that can be read */
+    int n_memory;                /* numbers of the model's memory that can be read */
     const mck_channel *channels; /* inputs, then outputs */
     int (*step)(void *model, const mck_real *in, mck_real *out);
     void (*reset)(void *model);
@@ -55,45 +49,41 @@ typedef struct {
     uint8_t *own; /* of every input: set by the firmware, not by frames */
     const mck_real *memory;
 
-    uint32_t session;
-    uint32_t sequence;
+    uint32_t sequence; /* of the last frame */
     uint8_t last_kind;
     uint8_t last_status;
-    int open;
-    int lock_step;
-    int running; /* inputs have come, and the host is not silent */
-    int tripped;
-    uint32_t silence;
-    uint32_t quiet;
-    uint32_t steps;
-    uint16_t every;
-    uint16_t since;
-    uint8_t notes;
-    uint32_t dropped;
+    uint8_t notes; /* of the last step */
+    uint8_t running;
+    uint8_t resumed; /* the last inputs ended a time with safe outputs */
+    uint8_t tripped; /* the watchdog has acted since the last inputs */
+    uint8_t lock_step;
+    uint16_t every;   /* steps from one sample to the next; 0 for none */
+    uint16_t since;   /* steps since the last sample */
+    uint32_t silence; /* allowed [ticks] */
+    uint32_t quiet;   /* ticks since the last inputs */
+    uint32_t steps;   /* since the start, modulo 2^32 */
 
-    uint8_t frame[MCK_STUFFED];
+    uint8_t frame[MCK_STUFFED]; /* on its way in */
     int length;
-    int too_long;
     mck_frame answer;
     mck_frame sample;
     mck_frame *sending;
 } mck_server;
 
-/* Before anything else; `start` counts the starts of the device where that is kept, and is else 0: frames
- * from before a start are then known by it, however late they come. */
-void mck_server_init(mck_server *self, uint32_t start);
+/* Before anything else. */
+void mck_server_init(mck_server *self);
 
-/* Take a byte that came. */
+/* Take a received byte. */
 void mck_server_receive(mck_server *self, uint8_t byte);
 
 /* Return the next byte to send, or -1 where there is none. */
 int mck_server_send(mck_server *self);
 
-/* Once every period: counts the silence, and steps the model unless frames do. */
+/* Once every period: counts the silence, and steps the model unless the host does. */
 void mck_server_tick(mck_server *self);
 
-/* Give an input from the firmware, such as a sensor's; frames do not set it any more. NaN says that one of
- * the missable is missing; of others it is not taken. */
+/* Set an input from the firmware, such as a sensor's; frames do not set it any more. NaN is ignored, but
+ * for inputs that may be missing. */
 void mck_server_measure(mck_server *self, int input, mck_real value);
 
 #endif

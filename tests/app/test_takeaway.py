@@ -17,6 +17,7 @@ from mckibben.app import taking
 from mckibben.app.workspace import Workspace
 from tests.app.browsing import Workbench, seen, visited, workbench
 from tests.app.simulated import with_example
+from tests.export.muscle import MUSCLE
 
 pytestmark = pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
 
@@ -42,9 +43,14 @@ def test_code_figures_and_recordings_are_written(workspace: Workspace) -> None:
     take(taking.code, "b-ros2.zip")
     take(taking.code, "c.json")
     take(taking.recordings, "r.zip")
+    MUSCLE.save(workspace.path("models", "muscle.json"))
+    of = OF | {"model": "muscle", "use": "model"}
+    taking.code(workspace, silent, file="m.xml", options={"rest_length": 200.0}, of=of)
     for kind in ("loops", "time"):
         take(taking.figure, f"{kind}.svg", figure=kind)
+    workspace.path("models", "muscle.json").unlink()
     folder = workspace.folder / "takeaway"
+    assert (folder / "m.xml").read_text().count("<spatial") == 6
     held = {p.name: zipfile.ZipFile(p).namelist() for p in folder.glob("*.zip")}
     assert {"a_c.c", "a_c.h"} <= {Path(name).name for name in held["a-c.zip"]}
     assert any(name.endswith("package.xml") for name in held["b-ros2.zip"])

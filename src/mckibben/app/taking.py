@@ -17,7 +17,7 @@ from mckibben.app.jobs import Tell
 from mckibben.app.modelling import Json
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
-from mckibben.options import COptions, ExportOptions, FMUOptions, Option, StudyOptions
+from mckibben.options import COptions, ExportOptions, FMUOptions, MJCFOptions, Option, StudyOptions
 
 FIGURES = {
     "loops": "Measured and modelled loops",
@@ -89,6 +89,9 @@ def code(workspace: Workspace, tell: Tell, *, file: str, options: Json, of: Json
     to = workspace.path("takeaway", file)
     if path.suffix == ".json":
         found.save(to)
+        return f"{file} is written"
+    if path.suffix == ".xml":
+        export(found, to, "mjcf", force=True, **options)
         return f"{file} is written"
     target: Any = next((x for x in ("c", "ros2") if file.endswith(f"-{x}.zip")), "fmu")
     name = "".join(c if c.isalnum() else "_" for c in path.stem).strip("_")
@@ -172,6 +175,11 @@ THINGS = {
     "ros2": Thing(
         "ROS 2", "A controller of ros2_control, to be built by colcon.",
         *(code, "{stem}-ros2.zip", ExportOptions, ("name", "sample_time")),
+    ),
+    "mjcf": Thing(
+        "MuJoCo", "A muscle as plain XML, of a balance fitted within what MJCF carries.",
+        *(code, "{stem}.xml", MJCFOptions),
+        ("rest_length", "sheet", "site_from", "site_to", "example", "lag"),
     ),
     "recordings": Thing(
         "Recordings", "As they are after cuts and filters, by role, with units.",

@@ -53,7 +53,9 @@ def page(state: State) -> None:
             [thing.title, thing.purpose, partial(_options, state, key, thing),
              partial(_button, state, key, thing)]
             for key, thing in THINGS.items()
-            if (models or "{stem}" not in thing.file) and (key != "ros2" or use in following.KINDS)
+            if (models or "{stem}" not in thing.file)
+            and (key != "ros2" or use in following.KINDS)
+            and (key != "mjcf" or use == "model")
         ]  # fmt: skip
         mark(widgets.table(["", "What it is for", "", ""], rows), "things")
 

@@ -172,7 +172,8 @@ def test_its_body_attaches_to_another_model_and_its_sites_are_anywhere(tmp_path:
 @pytest.mark.parametrize("example", ["hanging", "joint", "arm"])
 def test_examples_stay_within_their_ranges(example: Any, step: float) -> None:
     model = compiled(mjcf(MUSCLE, rest_length=REST, example=example), step)
-    data, random, low, high = mujoco.MjData(model), np.random.default_rng(0), *model.jnt_range.T
+    data, random = mujoco.MjData(model), np.random.default_rng(0)
+    low, high = model.jnt_range.T
     for _ in range(60):  # pressures jump, at random
         data.ctrl[:] = random.choice([0.0, 6.0], model.nu)
         mujoco.mj_step(model, data, nstep=round(0.1 / step))

@@ -553,7 +553,9 @@ class MJCFOptions:
         Option("Without sites: a load on a muscle, a joint between two, or a plate on three."),
     ] = "hanging"
     lag: Annotated[float, Option("Time constant from command to pressure.", "SECONDS")] = 0.0
-    name: Annotated[str | None, Option("Name of the actuator. Default: muscle.", "NAME")] = None
+    name: Annotated[str | None, Option("Name of the actuator. Default: of the file.", "NAME")] = (
+        None
+    )
     force: Annotated[bool, Option("Replace files of yours, too; never what is read.")] = False
 
 

@@ -615,6 +615,7 @@ def export(
 def _export_mjcf(model: Any, out: Path, chosen: MJCFOptions) -> Exported:
     """Write a muscle as MJCF."""
     from mckibben.export.mjcf import Sites, export_mjcf
+    from mckibben.export.naming import name_from
     from mckibben.muscles import prior_of
 
     rest, sheet, ends = chosen.rest_length, chosen.sheet, (chosen.site_from, chosen.site_to)
@@ -625,7 +626,7 @@ def _export_mjcf(model: Any, out: Path, chosen: MJCFOptions) -> Exported:
     if sum(end is None for end in ends) == 1:
         remedy = "give both, or neither"
         raise ModelError("one site is missing", parameter="site_from", remedy=remedy)
-    name = chosen.name or "muscle"
+    name = chosen.name or name_from(out)
     export_mjcf(
         model,
         out,

@@ -111,7 +111,8 @@ def mjcf(
 ) -> str:
     """Return the text of `export_mjcf`."""
     muscle, name = carried(model), identifier(name)
-    require(1.0 <= rest_length <= 1e5, "rest_length", rest_length, "1 to 100000 mm")
+    shortest = MM * stroke(muscle)
+    require(shortest < rest_length <= 1e5, "rest_length", rest_length, f"{shortest:g} to 100000 mm")
     require(0.0 <= lag <= 10.0, "lag", lag, "0 to 10 s")
     root = ET.Element("mujoco", model=name)
     each = [sites] if sites is not None else WORLDS[example](root, muscle, rest_length / MM, name)
@@ -208,6 +209,11 @@ def _tendons(
         for site in sites:
             ET.SubElement(tendon, "site", site=site)
 
+    def beyond(side: float, place: float) -> str:
+        """Return the dead band of a spring met by shortening, or by lengthening, past a place [mm]."""
+        edge = rest - place / MM
+        return _row(edge, 1e3) if side > 0 else _row(0.0, edge)
+
     square, cube = [*muscle.elasticity[0], 0.0, 0.0][:2]  # by how much shorter it is
     own = muscle.bladders[0] if muscle.bladders else 0.0
     add(
@@ -224,11 +230,17 @@ def _tendons(
         if stiffness > 0:
             travel = limit * muscle.grip / MM
             add(f"_stop_{number}", MM * stiffness, springyield=_row(travel))
+    # beyond the shortenings known elasticity goes on straight: what bends there is taken away again
+    ends = [(f"_{end}", side, muscle.hull[0][side > 0]) for end, side in (("low", -1), ("high", 1))]
+    for suffix, side, place in ends:
+        bend = square + 3.0 * cube * place / muscle.scale
+        taken = bend * (MM / muscle.scale) ** 2, -cube * (MM / muscle.scale) ** 3
+        if any(taken):
+            add(suffix, 0.0, *taken, springlength=beyond(side, place))
     met = np.reshape(muscle.obstacles, (-1, 3)).tolist()
     for number, (side, place, stiffness) in enumerate(met, start=1):
-        free = (rest - place / MM, 1e3) if side > 0 else (0.0, rest - place / MM)
         if stiffness > 0:
-            add(f"_obstacle_{number}", MM * stiffness, springlength=_row(*free))
+            add(f"_obstacle_{number}", MM * stiffness, springlength=beyond(side, place))
 
 
 def _row(*numbers: float) -> str:
@@ -237,6 +249,11 @@ def _row(*numbers: float) -> str:
 
 
 # -- examples --------------------------------------------------------------------------------------
+
+
+def _range(muscle: Balance) -> str:
+    """Return the range of a joint that moves along a muscle: no end swings through the other."""
+    return _row(-0.5 * stroke(muscle), 1.5 * stroke(muscle))
 
 
 def _world(root: ET.Element, text: str) -> None:
@@ -256,7 +273,8 @@ def hanging(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[S
             <geom type="cylinder" size="0.015 0.005" contype="0" conaffinity="0"/>
             <site name="{name}_from"/>
             <body name="{name}_end" pos="0 0 {_row(-rest)}">
-              <joint name="{name}_shortening" type="slide" axis="0 0 1"/>
+              <joint name="{name}_shortening" type="slide" axis="0 0 1" limited="true"
+                     range="{_range(muscle)}"/>
               <geom type="cylinder" size="0.015 0.02" mass="{0.2 * pull(muscle) / GRAVITY:.3g}"/>
               <site name="{name}_to"/>
             </body>
@@ -313,9 +331,10 @@ def arm(root: ET.Element, muscle: Balance, rest: float, name: str) -> list[Sites
             <geom type="cylinder" size="{_row(1.2 * radius)} 0.004" contype="0" conaffinity="0"/>
             {tops}
             <body name="plate" pos="0 0 {_row(-rest)}">
-              <joint name="shortening" type="slide" axis="0 0 1"/>
-              <joint name="tilt_x" type="hinge" axis="1 0 0" damping="{_row(0.01)}"/>
-              <joint name="tilt_y" type="hinge" axis="0 1 0" damping="{_row(0.01)}"/>
+              <joint name="shortening" type="slide" axis="0 0 1" limited="true"
+                     range="{_range(muscle)}"/>
+              <joint name="tilt_x" type="hinge" axis="1 0 0" limited="true" range="-45 45"/>
+              <joint name="tilt_y" type="hinge" axis="0 1 0" limited="true" range="-45 45"/>
               <geom type="cylinder" size="{_row(1.2 * radius)} 0.004"
                     mass="{0.3 * pull(muscle) / GRAVITY:.3g}"/>
               {ends}

@@ -347,5 +347,4 @@ def working() -> Iterator[None]:
 
 def unreadable() -> LinkError:
     """Return the error of an answer that does not belong to the protocol."""
-    remedy = "check that it was exported by the same release of mckibben"
-    return LinkError("the device's answer cannot be read", remedy=remedy)
+    return LinkError("the device's answer cannot be read", remedy="export it by this release again")

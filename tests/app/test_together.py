@@ -1,4 +1,4 @@
-"""Recordings that are made alike: files of single signals, and other rates."""
+"""Recordings that are made alike, and what drives and moves in all of them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import pytest
 
 from mckibben import Recording
 from mckibben.app import together
+from mckibben.app.jobs import Jobs
+from mckibben.app.state import State
 from mckibben.app.workspace import Workspace
 
 
@@ -43,3 +45,18 @@ def test_other_rates_are_brought_to_one(tmp_path: Path) -> None:
     together.resample(workspace, 0.11)
     assert together.sample_times(workspace) is None
     assert len(workspace.entry("run-0-11").steps) == 0
+
+
+def test_channels_that_no_name_recognises_are_chosen_one_after_another(tmp_path: Path) -> None:
+    pytest.importorskip("nicegui")
+    workspace = Workspace(tmp_path)
+    workspace.add_recording(Recording({"dist": np.arange(9.0), "forc": np.arange(9.0)}), name="a")
+    state = State(workspace, Jobs(workspace))
+    state.settle()
+    assert (state.inputs, state.outputs) == ([], [])
+    state.inputs = ["dist"]
+    state.settle()
+    assert (state.inputs, state.outputs) == (["dist"], [])
+    state.outputs = ["forc"]
+    state.settle()
+    assert (state.inputs, state.outputs) == (["dist"], ["forc"])

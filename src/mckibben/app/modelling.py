@@ -105,8 +105,8 @@ def offered(workspace: Workspace, sides: Channels) -> Offered:
         Where nothing can be fitted to the recordings as they are.
     """
     if not (sides.inputs and sides.outputs):
-        problem = "the recordings in use have no input and output in common"
-        remedy = "correct how they are read, or set some to Unused, under Data"
+        problem = "no input, or no output, of all recordings in use is chosen"
+        remedy = "choose them under Data, or set recordings without them to Unused"
         raise DataError(problem, remedy=remedy)
     train, test = workspace.train_and_test()
     if not train:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import field
 from functools import wraps
@@ -87,13 +87,16 @@ class State:
         if self.model not in models:
             self.model = next(iter(models), "")
         known = self.workspace.channels()
-        if not self.inputs or not self.outputs or {*self.inputs, *self.outputs} - {*known}:
-            self.inputs, self.outputs = [], []
+
+        def choose(*sides: Sequence[str]) -> None:
+            self.inputs, self.outputs = ([n for n in side if n in known] for side in sides)
+
+        choose(self.inputs, self.outputs)
+        if known and not (self.inputs and self.outputs):  # what is chosen stays
             with suppress(DataError):
-                if known:
-                    used = [one.select(known) for one in self.workspace.used().values()]
-                    sides = channels_of(used)
-                    self.inputs, self.outputs = list(sides.inputs), list(sides.outputs)
+                used = [one.select(known) for one in self.workspace.used().values()]
+                found = channels_of(used, self.inputs or None, self.outputs or None)
+                choose(found.inputs, found.outputs)
 
     @property
     def sides(self) -> Channels:

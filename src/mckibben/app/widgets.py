@@ -184,14 +184,21 @@ def shielded(build: Callable[..., None]) -> Callable[..., None]:
 
 def primary(text: str, action: Callable[..., Any], icon: str = "") -> Any:
     """Make the primary button of a page, of which there is one."""
-    act = guarded(action)
-    return ui.button(text, icon=icon or None, on_click=lambda: act()).props("unelevated no-caps")
+    return button(text, action, icon).props("unelevated", remove="flat dense")
 
 
 def button(text: str, action: Callable[..., Any], icon: str = "") -> Any:
     """Make any other button; without text, the icon needs a tooltip and an ``aria-label``."""
     act = guarded(action)
-    return ui.button(text, icon=icon or None, on_click=lambda: act()).props("flat dense no-caps")
+
+    async def click() -> None:
+        made.props("loading")  # so that it is not clicked twice
+        await act()
+        if not made.is_deleted:
+            made.props(remove="loading")
+
+    made = ui.button(text, icon=icon or None, on_click=click).props("flat dense no-caps")
+    return made
 
 
 def icon_button(icon: str, label: str, action: Callable[..., Any]) -> Any:

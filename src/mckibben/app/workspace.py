@@ -187,11 +187,15 @@ class Workspace:
         return self.cached(path, reading.model_dump_json(), lambda: understand(path, reading)[0])
 
     def _made(self, entry: Entry) -> Recording:
-        path = self.raw_path(entry)
-        if entry.part >= len(parts := self._parts(path, entry.reading)):
-            problem = f"the file has {len(parts)} recordings, and this is number {entry.part + 1}"
-            raise DataError(problem, file=path, remedy="remove this recording")
-        return applied(parts[entry.part], entry.steps).with_meta(name=entry.name)
+        def make() -> Recording:
+            path = self.raw_path(entry)
+            if entry.part >= len(parts := self._parts(path, entry.reading)):
+                problem = f"it has {len(parts)} recordings, and this is number {entry.part + 1}"
+                raise DataError(problem, file=path, remedy="remove this recording")
+            return applied(parts[entry.part], entry.steps).with_meta(name=entry.name)
+
+        found: Recording = self._of(entry, "", make)
+        return found
 
     def _of(self, entry: Entry, what: str, make: Callable[[], Any]) -> Any:
         """Return what is made of a recording, until its raw file or description change."""
@@ -200,9 +204,7 @@ class Workspace:
 
     def recording(self, name: str) -> Recording:
         """Return a recording after its steps; it is read once. Errors are those of reading."""
-        entry = self.entry(name)
-        found: Recording = self._of(entry, "", lambda: self._made(entry))
-        return found
+        return self._made(self.entry(name))
 
     def add(
         self, upload: str, *, name: str = "", role: Role = "train", reading: Reading | None = None

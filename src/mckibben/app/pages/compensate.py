@@ -194,15 +194,15 @@ def _motion(state: State, names: list[str]) -> None:
             kind = ui.select(SHAPES, label="Shape").bind_value(own, "kind").props("dense outlined")
             mark(kind, "shape").on_value_change(reshaped)
             if ready:
-                field(own, "first", f"{'At' if own['kind'] == 'hold' else 'From'} [{unit}]")
+                field(own, "first", axis_label("At" if own["kind"] == "hold" else "From", unit))
             if own["kind"] in following.MOTIONS:
-                field(own, "other", f"To [{unit}]")
+                field(own, "other", axis_label("To", unit))
         with widgets.row(classes="fields" if ready or held else "hidden"):
             if ready:
                 field(wish, "seconds", "Duration [s]")
                 field(wish, "cycles", "Cycles")
             for key, channel in held.items():
-                field(wish["held"], key, f"{key}, held [{channel.unit}]")
+                field(wish["held"], key, axis_label(f"{key}, held", channel.unit))
         with widgets.row():
             mark(widgets.button("Edit points", lambda: _edit(state), "table_rows"), "edit-points")
             with ui.element("div").style("display: none"):

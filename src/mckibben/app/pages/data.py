@@ -115,7 +115,7 @@ def shown(state: State) -> None:
         if entry.name == state.recording:
             with widgets.card():
                 _recording(state, entry)
-    if any(one.role == "train" for one in entries):
+    if state.inputs and state.outputs:
         text = "Channels and roles are right? See what the muscle does."
         widgets.next_step(text, "Look", "/look")
 
@@ -216,9 +216,7 @@ def _recordings(state: State, entries: list[Entry]) -> None:
 
     def discard(upload: str) -> Any:
         _unread(state).pop(upload, None)
-        return _changed(
-            state, state.workspace.path("uploads", upload).unlink, True
-        )  # if it is there
+        return _changed(state, state.workspace.path("uploads", upload).unlink, True)
 
     def restore() -> Any:
         return _changed(state, state.workspace.restore, state.chosen.pop("data.removed"))

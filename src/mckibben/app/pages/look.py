@@ -11,6 +11,7 @@ from nicegui import ui
 from mckibben.app import forms, widgets
 from mckibben.app.later import later
 from mckibben.app.modelling import last_plan, plan, restored
+from mckibben.app.pages import parts
 from mckibben.app.state import State, view
 from mckibben.app.terms import said
 from mckibben.app.widgets import mark
@@ -55,14 +56,14 @@ def build(state: State) -> None:
 @view
 def content(state: State) -> None:
     """Show the recordings that are chosen, and what all of them tell."""
-    used, known = state.workspace.used(), state.workspace.channels()
-    if not {*state.inputs, *state.outputs} & {*known}:
+    used = state.workspace.used()
+    if not (state.inputs and state.outputs):
         text = (
-            "Add recordings with an input, such as pressure, and an output, such as displacement. "
+            "Recordings need an input, such as pressure, and an output, such as displacement. "
             "You then see how wide the loop is, whether speed matters, and what is missing."
         )
         with widgets.card(), widgets.empty("insights", "Nothing to look at yet", text):
-            ui.link("Add recordings →", "/")
+            ui.link("Add recordings, or choose their inputs and outputs →", "/")
         return
     sides, runs = state.sides, [*used.values()]
     found = coupling(runs, sides.inputs, sides.outputs)
@@ -197,22 +198,12 @@ def _gaps(state: State, sides: Channels, pair: Pair) -> None:
 
 def _planned(state: State) -> None:
     """Offer to plan the next recording, and show the plan."""
-    jobs = [job for job in state.jobs.jobs.values() if job.kind == "plan"]
-    made = last_plan(state.workspace)
-    if running := next((job for job in jobs if job.active), None):
-
-        def cancel() -> None:
-            state.jobs.cancel(running.name)
-            state.changed()
-
-        with widgets.row():
-            ui.spinner(size="20px")
-            ui.label("Planning the next recording …").classes("muted")
-            widgets.button("Cancel", cancel)
+    made, jobs = last_plan(state.workspace), parts.jobs_of(state, ["plan"])
+    for job in jobs:
+        parts.show_job(state, job)
+    if any(job.active for job in jobs):
         return
-    if jobs and jobs[-1].state == "failed":
-        widgets.error_box(jobs[-1].message)
-    elif made:
+    if made:
         items = restored(made[0])
         with mark(ui.element("div").classes("stack"), "planned"):
             ui.label("Planned").classes("subtitle")

@@ -98,15 +98,18 @@ def fits(state: State) -> None:
     with widgets.card() as card:
         mark(card, "fits")
         with widgets.row(classes="spread"):
-            text = f"Fitting, {len(active)} to go" if active else "Did not finish"
+            text = f"Fitting, {len(active)} to go" if active else f"{len(ended)} did not finish"
             ui.label(text).classes("subtitle")
             if active:
                 mark(widgets.button("Cancel all", partial(parts.end, state, active)), "cancel-all")
             else:
-                widgets.button("Clear", partial(parts.end, state, ended))
+                with widgets.row():
+                    again = partial(parts.again, state, ended, modelling.fit)
+                    mark(widgets.button("Do again", again, "replay"), "again")
+                    widgets.button("Clear", partial(parts.end, state, ended))
         for job in [*(job for job in active if job.state == "running"), *ended[: -ENDED - 1 : -1]]:
             title = f"{full_name(job.title)} · {job.title}"
-            parts.show_job(state, job, title, modelling.fit)
+            parts.show_job(state, job, title)
         if waiting := [job.title for job in active if job.state == "waiting"]:
             more = f" and {len(waiting) - ENDED} more" if len(waiting) > ENDED else ""
             ui.label(f"Next: {', '.join(waiting[:ENDED])}{more}").classes("muted")
@@ -182,7 +185,7 @@ def _title(row: Json) -> None:
 def _remarks(rows: list[Json], shown: Sequence[Column]) -> None:
     first = rows[0]
     if first["current"] and (mean := first.get("constant")):
-        errors = [f"{one.heading} {typeset(one.text(mean))} {one.unit}" for one in shown]
+        errors = [f"{one.heading} {typeset(one.text(mean))} {one.unit}".rstrip() for one in shown]
         text = f"The mean of the output, to compare with: {', '.join(errors)}."
         ui.label(text).classes("muted")
     if why := modelling.against(rows):
@@ -325,7 +328,7 @@ def _shown(state: State, tab: str, sides: Channels, row: Json) -> None:
         rows, unit = slice(tested or 0, None), run.units[wanted]
         off = float(np.sqrt(np.mean((y[rows] - run[wanted][rows]) ** 2)))
         what = f"{'the held-out part of ' if tested else ''}{run.name}"
-        text = [f"RMSE of {wanted} on {what}: {number(off, 3)} {unit}."]
+        text = [f"RMSE of {wanted} on {what}: {number(off, 3)} {unit}".rstrip() + "."]
         if isinstance(banded, Banded):
             band = banded.band.simulate(modelled, sample_time=run.sample_time)
             low, high = band.reshape(len(run), -1, 3)[:, place, 1:].T

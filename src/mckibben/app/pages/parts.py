@@ -115,15 +115,17 @@ def end(state: State, jobs: Sequence[Job]) -> None:
     state.changed()
 
 
-def show_job(state: State, job: Job, title: str = "", work: Work | None = None) -> None:
-    """Show how far a job is, or why it did not work; with its work, it can be done again."""
-
-    def again() -> None:
+def again(state: State, jobs: Sequence[Job], work: Work) -> None:
+    """Do jobs that ended again."""
+    for job in jobs:
         state.jobs.forget(job.name)
         given = {name: value for name, value in job.given.items() if name != "title"}
-        assert work is not None
         state.jobs.submit(work, job.title, **given)
-        state.changed()
+    state.changed()
+
+
+def show_job(state: State, job: Job, title: str = "") -> None:
+    """Show how far a job is, or why it did not work."""
 
     def tell() -> None:
         bar.set_value(round(job.share, 3))
@@ -140,8 +142,6 @@ def show_job(state: State, job: Job, title: str = "", work: Work | None = None) 
             share = ui.label().classes("muted")
             tell()
             ui.timer(0.3, tell)
-        elif work is not None:
-            widgets.icon_button("replay", f"Do {job.title} again", again)
         text = f"Cancel {job.title}" if job.active else f"Take {job.title} off the list"
         stop = widgets.icon_button("close", text, lambda: end(state, [job]))
         mark(stop, f"cancel-{job.title}")

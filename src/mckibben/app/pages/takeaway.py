@@ -97,10 +97,8 @@ def _button(state: State, key: str, thing: Thing) -> None:
         path = state.workspace.path("takeaway", file)
         path.unlink()  # only its name was reserved; exports replace what they wrote alone
         job = state.jobs.submit(thing.work, file, file=file, options=options, of=of)
-        button.props("loading")
         while job.active:
             await asyncio.sleep(0.1)
-        button.props(remove="loading")
         if job.state != "done":
             problem = f"{thing.title}: {job.message or job.state}"
             raise DataError(problem, remedy="see its options")

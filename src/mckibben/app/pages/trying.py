@@ -133,10 +133,8 @@ def reviewed(state: State) -> None:
 
 
 def start(state: State, work: Any, title: str, asked: dict[str, Any]) -> None:
-    """Start a job that writes a result, and forget those of its kind that failed."""
-    for job in parts.jobs_of(state, [work.__name__]):
-        if not job.active:
-            state.jobs.forget(job.name)
+    """Start a job that writes a result, and forget those of its kind that ended."""
+    state.jobs.forget_ended(work.__name__)
     state.jobs.submit(
         work, title, name=following.named(title.replace(" ", "-"), asked), asked=asked
     )

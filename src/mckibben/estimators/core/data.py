@@ -395,7 +395,7 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
         if recording[name].size and recording.units[name] != first.units[name]:
             raise DataError(
                 f"the unit is {recording.units[name]!r} here and {first.units[name]!r} in "
-                f"{first.source or first.name}",
+                f"{first.name or first.source}",
                 file=recording.source,
                 channel=name,
                 remedy="convert one of the recordings, or name its unit with `units[CHANNEL]=UNIT`",
@@ -418,9 +418,9 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
         )
     if one_rate and ours is not None and theirs is not None and abs(ours - theirs) > 1e-3 * theirs:
         raise DataError(
-            f"the sample time is {ours:g} s here and {theirs:g} s in {first.source or first.name}",
+            f"the sample time is {ours:g} s here and {theirs:g} s in {first.name or first.source}",
             file=recording.source,
-            remedy=f"give `resample={max(ours, theirs):.3g}`, or use mckibben.signals.resample",
+            remedy=f"give `resample={max(ours, theirs):.3g}`",
         )
 
 

@@ -67,13 +67,3 @@ def test_the_paper_is_short_and_its_sources_exist() -> None:
         assert made, f"no command makes {picture}"
         assert (ROOT / made.group(1)).is_file()
         assert (ROOT / "paper" / picture).is_file()
-
-
-def test_the_papers_table_is_that_of_the_page() -> None:
-    paper = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| .*? \| (`\S+`) \| ([\d.]+) \| (\w+) \| ([\d.]+) \|$", paper, re.M)
-    assert len(rows) > 5
-    page = (ROOT / "docs" / "measured" / "peers.md").read_text(encoding="utf-8").splitlines()
-    for model, error, peer, its_error in rows:
-        ours = f"| {model} {error} | {peer if peer != 'GRU' else 'torch GRU'}"
-        assert any(ours in line and f" {its_error} |" in line for line in page), (model, peer)

@@ -1,9 +1,9 @@
 """Make a release and check it: ``python -m tests.release [VERSION]``.
 
-With a version, `pyproject.toml`, `CITATION.cff` and `CHANGELOG.md` are brought to it first. Then the
-wheel and the source archive are built into `dist`, looked through, and tried as somebody would who has
-nothing else: the wheel alone in an empty environment, away from the repository, runs the README's main
-job. Nothing is uploaded; what is left to do is printed. See docs/releasing.md.
+With a version, the project, its citation, conda recipe and changelog are brought to it first. Then
+the wheel and the source archive are built into `dist`, looked through, and tried as somebody would who
+has nothing else: the wheel alone in an empty environment, away from the repository, runs the README's
+main job. Nothing is uploaded; what is left to do is printed. See docs/releasing.md.
 """
 
 from __future__ import annotations
@@ -22,14 +22,21 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 DIST = ROOT / "dist"
 
-LARGEST = 2_000_000
+LARGEST = 1_600_000
 """Bytes of a wheel, or of a source archive."""
 
-ROOM = 600
-"""Megabytes that an environment with the wheel may take, compiled, and with pip and setuptools aside."""
+ROOM = 450
+"""Megabytes of an environment with the wheel, without bytecode, pip and setuptools."""
 
 ALONGSIDE = {"pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "CITATION.cff", ".gitignore"}
 """What a source archive has beside the package."""
+
+VERSION_LINES = {
+    "pyproject.toml": 'version = "{}"',
+    "CITATION.cff": "version: {}",
+    "recipe/recipe.yaml": '  version: "{}"',
+}
+"""Lines that name the version, by file."""
 
 VERSION = re.compile(r"\d+\.\d+\.\d+((a|b|rc)\d+)?")
 
@@ -69,21 +76,24 @@ def set_version(root: Path, version: str) -> None:
     today = time.strftime("%Y-%m-%d")
     dated = changes.replace("## Unreleased\n", f"## Unreleased\n\n## {version} ({today})\n", 1)
     (root / "CHANGELOG.md").write_text(dated, encoding="utf-8")
-    for name, line in (("pyproject.toml", 'version = "{}"'), ("CITATION.cff", "version: {}")):
+    for name, line in VERSION_LINES.items():
         text = (root / name).read_text(encoding="utf-8")
-        old = re.compile("^" + re.escape(line).replace(r"\{\}", ".*?") + "$", re.M)
-        (root / name).write_text(old.sub(line.format(version), text, count=1), encoding="utf-8")
+        text = version_pattern(line).sub(line.format(version), text, count=1)
+        (root / name).write_text(text, encoding="utf-8")
+
+
+def version_pattern(line: str) -> re.Pattern[str]:
+    """Return what finds a line that names the version."""
+    return re.compile("^" + re.escape(line).replace(r"\{\}", "(.*?)") + "$", re.M)
 
 
 def agreed_version(root: Path) -> str:
     """Return the version that the project, its citation and its changelog agree on."""
+    patterns = {name: version_pattern(line) for name, line in VERSION_LINES.items()}
+    patterns["CHANGELOG.md"] = re.compile(r"^## (\d\S*)", re.M)
     found = {}
-    for name, pattern in (
-        ("pyproject.toml", r'^version = "(.*)"$'),
-        ("CITATION.cff", r"^version: (.*)$"),
-        ("CHANGELOG.md", r"^## (\d\S*)"),
-    ):
-        match = re.search(pattern, (root / name).read_text(encoding="utf-8"), re.M)
+    for name, pattern in patterns.items():
+        match = pattern.search((root / name).read_text(encoding="utf-8"))
         found[name] = match.group(1) if match else "none"
     if len(set(found.values())) > 1:
         told = ", ".join(f"{name} says {version}" for name, version in found.items())
@@ -93,7 +103,7 @@ def agreed_version(root: Path) -> str:
 
 def refuse_uncommitted() -> None:
     """Refuse to release what no commit holds, but for the files that name the version."""
-    named = {"pyproject.toml", "CITATION.cff", "CHANGELOG.md"}
+    named = {*VERSION_LINES, "CHANGELOG.md"}
     told = run("git", "status", "--porcelain", within=ROOT).splitlines()
     if left := [line[3:] for line in told if line[3:] not in named]:
         raise ReleaseError(f"these are in no commit: {', '.join(left[:5])}")
@@ -136,7 +146,7 @@ def try_alone(wheel: Path) -> str:
         venv.create(folder / "env", with_pip=True)
         python = folder / "env" / "bin" / "python"
         before = megabytes(folder / "env")  # pip's
-        run(str(python), "-m", "pip", "install", "--quiet", str(wheel))
+        run(str(python), "-m", "pip", "install", "--quiet", "--no-compile", str(wheel))
         size = megabytes(folder / "env") - before
         if size > ROOM:
             raise ReleaseError(f"its environment takes {size:.0f} MB, of {ROOM}")

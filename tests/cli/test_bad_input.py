@@ -82,7 +82,6 @@ BAD = [
     ("invert model.json -o out.json --horizon 5", "--predictive"),
     ("invert pi.json --for force -o out.json", "'pi'"),
     ("plot run.csv -o out.png --kind pie", "pie"),
-    ("info", "--models"),
     ("info gpi", "--models"),
     ("info run.csv gpi", "--models"),
     # Bands

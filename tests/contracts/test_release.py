@@ -25,8 +25,9 @@ def test_the_archives_hold_the_package_and_nothing_else(tmp_path: Path) -> None:
 
 
 def copied(folder: Path) -> Path:
-    for name in ("pyproject.toml", "CITATION.cff", "CHANGELOG.md"):
-        shutil.copy(ROOT / name, folder)
+    for name in (*release.VERSION_LINES, "CHANGELOG.md"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, folder / name)
     return folder
 
 

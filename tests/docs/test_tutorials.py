@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import runpy
 import shlex
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -86,3 +87,17 @@ def test_readme_runs_as_it_stands_from_top_to_bottom(
                     command(part.partition(" > ")[0], monkeypatch)
     for made in ("study/report.html", "inverse.json", "muscle", "loops.png", "loop.html"):
         assert (tmp_path / made).exists()
+    written = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
+    assert untracked(written) == []
+
+
+def untracked(paths: list[Path]) -> list[str]:
+    """Return the files that git would list as untracked if they were in the repository."""
+    names = [path.as_posix() for path in paths]
+    command = ["git", "check-ignore", "--no-index", *names]
+    found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return sorted(set(names) - set(found.stdout.splitlines()))
+
+
+def test_files_that_git_does_not_ignore_are_found() -> None:
+    assert untracked([Path("study/report.html"), Path("stray.txt")]) == ["stray.txt"]

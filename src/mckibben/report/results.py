@@ -177,6 +177,11 @@ def model(about: Mapping[str, Any]) -> list[Item]:
     return [Table(["", "Value"], rows)]
 
 
+def versions(installed: Mapping[str, str]) -> list[Item]:
+    """Return the versions of the package and what it runs with, for reports of problems."""
+    return [Table(["Package", "Version"], list(installed.items()))]
+
+
 def models(every: Mapping[str, Any]) -> list[Item]:
     """Return what every model is, and its settings."""
     rows = [[name, one["summary"]] for name, one in every.items()]

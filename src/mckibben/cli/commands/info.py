@@ -1,4 +1,4 @@
-"""Show what files contain and what recordings cannot identify, or list the models."""
+"""Show what files contain and what recordings cannot identify, list the models, or show versions."""
 
 from __future__ import annotations
 
@@ -29,13 +29,16 @@ def info(
     from mckibben.files import has_columns
     from mckibben.reading import look
     from mckibben.report import results, text
+    from mckibben.version import versions
 
     if models:
         every: dict[str, Any] = described()
         show(every, lambda: text.lines(results.models(every)), as_json)
         return
     if not files:
-        raise DataError("there is nothing to show", remedy="give a file, or `models`")
+        installed = versions()
+        show(installed, lambda: text.lines(results.versions(installed)), as_json)
+        return
     known = {*registry.names("estimators"), *registry.names("blocks")}
     if named := [str(one) for one in files if str(one) in known and not one.exists()]:
         raise DataError(

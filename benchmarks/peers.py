@@ -1,10 +1,16 @@
-"""Other libraries and a GRU beside this package's models, on the same splits of measured recordings.
+"""Other libraries and a GRU beside this package's models: their lines of the leaderboard.
 
 Their environment: python3 -m venv peers-env && peers-env/bin/pip install . -r benchmarks/peers.txt
-Run: peers-env/bin/python benchmarks/peers.py FOLDER [--page docs/measured/peers.md]
+Run: peers-env/bin/python benchmarks/peers.py FOLDER ENTRIES [--only SET] [--models NAME] [--again]
 
-FOLDER holds a folder for every set, as for ``mckibben.measured``. The page's introduction, which says
-how peers are fitted and started, is left as it is; the tables are written anew.
+FOLDER holds a folder for every set, as for ``mckibben measured``. Each model's predictions are written
+to ENTRIES, scored as anybody's are (docs/measured/rules.md), and replace its lines in
+docs/measured/leaderboard.csv; then run docs/measured/leaderboard.py.
+
+Peers are given inputs and outputs of zero mean and unit variance, and start from the last known outputs.
+Their settings are searched for by the free-running error on a quarter of the training side, the cheapest
+first, within a budget of processor time; the best are fitted again to all of the training side. This
+package's models are fitted as they are offered. ``--again`` takes the settings that the leaderboard has.
 """
 
 from __future__ import annotations
@@ -23,22 +29,24 @@ from types import FrameType
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from mckibben import compare
-from mckibben.blocks.free_run import predecessor
+from mckibben.blocks.free_run import predecessor, run_free
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.leaderboard import Leaderboard
-from mckibben.comparison.planning import plan_of
 from mckibben.errors import MckibbenError
-from mckibben.measured.sets import Set, Task, parted, sets_in
-from mckibben.numerals import numeral
+from mckibben.measured.scoring import START, Part, entries, parts_of
+from mckibben.measured.sets import Set, chosen_in
 from mckibben.recording import Recording
-from peers_libraries import GRU, PEERS, START, Array, Peer, Run, Settings, Trial
+from peers_libraries import PEERS, Array, Peer, Run, Settings, Trial
 
-OURS = ("balance", "balance-force", "gpi", "cpi", "preisach")
+OURS = (
+    *("balance", "balance-force", "gpi", "cpi", "preisach", "coupled-memory", "force-chou"),
+    *("state-network", "narx-play", "bouc-wen-oscillator"),
+)
 
 BUDGET = 30.0
-"""Seconds that a search may take: the same for every peer but the GRU."""
+"""Seconds of processor time that a search may take."""
 
 HELD_BACK = 4
 """One of so many recordings is held back of the training side; of fewer, each one's last such part."""
@@ -46,51 +54,44 @@ HELD_BACK = 4
 AWAY = 1e3
 """Times the spread of the training output beyond which a free run has run away."""
 
-TABLES = "## The best of each"
-"""Heading at which the page's introduction ends."""
+BOARD = Path("docs/measured/leaderboard.csv")
+"""With the lines of the leaderboard."""
+
+KEY = ["model", "set", "task"]
+"""Columns that say which line it is."""
 
 
 @dataclass(frozen=True)
 class Data:
     """A task's recordings as peers are given them.
 
-    Of `train`, `fitted` is what is left where a quarter is `held` back; `scale` and `span` are the
-    outputs' standard deviation in training and their largest range in the tests.
+    Of `train`, `fitted` is what is left where a quarter is `held` back; `offset` and `scale` are the
+    outputs' mean and standard deviation in training.
     """
 
     train: Sequence[Run]
     fitted: Sequence[Run]
     held: Sequence[Trial]
     tests: Sequence[Trial]
+    offset: Array
     scale: Array
-    span: float
 
 
 @dataclass(frozen=True)
-class Row:
-    """What came of a model on a task; without an error, the reason.
-
-    `validation` is the free-running RMSE on the quarter held back, of the settings searched for.
-    """
+class Result:
+    """A model's predictions (n, k) on the tests of a task; without any, the reason."""
 
     name: str
-    chosen: bool = False
-    settings: str = ""
+    how: str = ""
     validation: float = np.inf
-    rmse: float = np.inf
-    percent: float = np.inf
+    found: Sequence[Array] = ()
     reason: str = ""
 
-    @property
-    def best(self) -> str:
-        """The row in the overview."""
-        name = self.name.strip("*")
-        return f"{name} {self.percent:.2f}" if np.isfinite(self.percent) else "none"
 
-
-def data_of(train: Sequence[Recording], test: Sequence[Recording], channels: Channels) -> Data:
+def data_of(part: Part) -> Data:
     """Return recordings as peers are given them, scaled as they are on the training side."""
-    names = inputs_of([*train, *test], channels)
+    train, channels = part.split.train, part.channels
+    names = inputs_of([*train, *part.split.test], channels)
     inputs = np.vstack([one.matrix(names) for one in train])
     outputs = np.vstack([one.matrix(channels.outputs) for one in train])
     middle, spread = inputs.mean(axis=0), inputs.std(axis=0)
@@ -111,8 +112,7 @@ def data_of(train: Sequence[Recording], test: Sequence[Recording], channels: Cha
 
     runs = [scaled(one) for one in train]
     fitted, held = held_back(runs)
-    span = max(float(np.ptp(np.concatenate([r[name] for r in test]))) for name in channels.outputs)
-    return Data(runs, fitted, held, [trial(one) for one in test], scale, span)
+    return Data(runs, fitted, held, [trial(one) for one in part.split.test], offset, scale)
 
 
 def inputs_of(recordings: Sequence[Recording], channels: Channels) -> list[str]:
@@ -148,13 +148,13 @@ def rms(trials: Sequence[Trial], found: Sequence[Array], scale: Array) -> float:
 
 @contextlib.contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Stop what takes longer, and keep libraries quiet."""
+    """Stop what takes more processor time, and keep libraries quiet."""
 
     def stop(signum: int, frame: FrameType | None) -> None:
         raise TimeoutError(f"takes more than {seconds:.0f} s")
 
-    signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, max(seconds, 0.01))
+    signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, max(seconds, 0.01))
     try:
         with (
             warnings.catch_warnings(),
@@ -164,7 +164,7 @@ def limited(seconds: float) -> Iterator[None]:
             warnings.simplefilter("ignore")
             yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
 
 
 def reason(error: BaseException) -> str:
@@ -172,33 +172,34 @@ def reason(error: BaseException) -> str:
     return f"{type(error).__name__}: {words[0]}"[:200]
 
 
-def tested(peer: Peer, how: Settings, data: Data, row: Row) -> Row:
-    """Return the row of a peer with these settings: fitted to the whole training side, and tested."""
+def tested(peer: Peer, how: Settings, data: Data, part: Part, row: Result) -> Result:
+    """Return the result of a peer with these settings, fitted to the whole training side."""
     try:
-        with limited(4 * BUDGET):
-            simulate = peer.fit(data.fitted if peer is GRU else data.train, how, data.held)
-            if peer is GRU:
+        with limited(peer.seconds or 4 * BUDGET):
+            simulate = peer.fit(data.fitted if peer.stops_early else data.train, how, data.held)
+            if peer.stops_early:
                 held = rms(data.held, [one.run(simulate) for one in data.held], data.scale)
                 row = replace(row, validation=held)
             found = [one.run(simulate) for one in data.tests]
-            error = rms(data.tests, found, data.scale)
-            if not np.isfinite(error):
-                return replace(row, reason="its free run on the test runs away")
-            return replace(row, rmse=error, percent=100 * error / data.span)
     except (Exception, SystemExit) as error:  # a peer may fail in ways of its own
         return replace(row, reason=reason(error))
+    if not np.isfinite(rms(data.tests, found, data.scale)):
+        return replace(row, reason="its free run on the test runs away")
+    lengths = [len(run) for run in part.split.test]
+    own = [y[len(y) - n :] for y, n in zip(found, lengths, strict=True)]
+    return replace(row, found=[y * data.scale + data.offset for y in own])
 
 
-def searched(peer: Peer, data: Data, row: Row) -> Row:
-    """Return the row of a peer with the settings that do best on what is held back, in the budget.
+def searched(peer: Peer, data: Data, part: Part, row: Result) -> Result:
+    """Return the result of a peer with the settings that do best on what is held back, in the budget.
 
     One that takes a quarter of the budget is given up, so that others get their turn.
     """
     best: Settings = {}
     best_error, tries, why = float("inf"), 0, "none of its settings runs free"
-    started = time.perf_counter()
+    started = time.process_time()
     for how in peer.grid:
-        left = BUDGET - (time.perf_counter() - started)
+        left = BUDGET - (time.process_time() - started)
         if left <= 0:
             break
         tries += 1
@@ -213,105 +214,124 @@ def searched(peer: Peer, data: Data, row: Row) -> Row:
             best, best_error = how, error
     there = len(peer.grid)
     count = f"the best of {tries}" + (f" in time, of {there}" if tries < there else "")
-    row = replace(row, settings=", ".join([*words(best), count]), validation=best_error)
-    return tested(peer, best, data, row) if best else replace(row, reason=why)
+    row = replace(row, how=", ".join([*words(best), count]), validation=best_error)
+    return tested(peer, best, data, part, row) if best else replace(row, reason=why)
 
 
 def words(how: Settings) -> list[str]:
     return [f"{name}={value}" for name, value in how.items()]
 
 
-def rows_of(peer: Peer, data: Data) -> list[Row]:
-    """Return the rows of a peer: by its defaults and by a search, or of the seed that is the median."""
-    row = Row(f"{peer.package} {peer.name}")
-    if peer is GRU:
-        seeds = [tested(peer, how, data, replace(row, settings=words(how)[0])) for how in peer.grid]
-        return [sorted(seeds, key=lambda one: one.rmse)[len(seeds) // 2]]
-    defaults = tested(peer, {}, data, replace(row, name=f"{row.name}, defaults"))
-    return [defaults, searched(peer, data, row)]
+def results_of(peer: Peer, data: Data, part: Part, again: str) -> list[Result]:
+    """Return the results of a peer: by its defaults and by a search, or of the median of its seeds.
+
+    ``again`` has the settings found before, which are then neither searched for nor tried beside others.
+    """
+    row = Result(peer.name, again)
+    matching = [how for how in peer.grid if again and {*words(how)} <= {*again.split(", ")}]
+    if before := next(iter(matching), None):
+        found = [tested(peer, before, data, part, row)]
+    elif peer.seconds:
+        tries = [
+            tested(peer, how, data, part, replace(row, how=", ".join(words(how))))
+            for how in peer.grid
+        ]
+        found = [sorted(tries, key=lambda one: one.validation)[len(tries) // 2]]
+    else:
+        found = [searched(peer, data, part, row)]
+    if not peer.seconds:
+        found.append(tested(peer, {}, data, part, Result(f"{row.name} defaults")))
+    return found
 
 
-def own_rows(board: Leaderboard, span: float) -> Iterator[Row]:
-    """Yield the rows of this package's models, and of the one that it chooses."""
-    for one in board.rows:
-        chosen = board.best is not None and one.model == board.best.model
-        if one.model not in OURS and not chosen:
+def own_results(part: Part, models: Sequence[str]) -> Iterator[Result]:
+    """Yield the results of this package's models."""
+    task, split = part.task, part.split
+    asked = [name for name in OURS if f"mckibben {name}" in models or not models]
+    about: dict[str, Any] = task.model_dump(include={"inputs", "outputs", "load"})
+    for name in (one for one in asked if task.models == "all" or one in task.models):
+        settings = {name: task.settings[name]} if name in task.settings else {}
+        row = Result(f"mckibben {name}")
+        try:
+            board = compare(
+                split.train,
+                split.test,
+                models=[name],
+                settings=settings,
+                n_folds=0,
+                jobs=1,
+                **about,
+            )
+        except MckibbenError:
+            continue  # it does not apply to these channels
+        block = board.rows[0].block
+        if block is None:
+            yield replace(row, reason=board.rows[0].reason or "")
             continue
-        row = Row(f"**`{one.model}`**", chosen=chosen, reason=one.reason or "")
-        if one.test is not None:
-            row = replace(row, rmse=one.test.rmse, percent=100 * one.test.rmse / span)
-        yield row
+        outputs = part.channels.outputs
+        yield replace(row, found=[run_free(block, run, outputs, split.train) for run in split.test])
 
 
-def run(one: Set, task: Task, recordings: list[Recording]) -> tuple[str, str]:
-    """Return a task's line in the overview, and its section."""
-    title = f"{one.title}: {task.name}" if task.name else one.title
-    print(title, file=sys.stderr, flush=True)
-    train, test = parted(task, recordings, one.folder)
-    about = task.model_dump(include={"models", "settings", "inputs", "outputs", "load"})
-    asked: dict[str, Any] = about | {"seed": 0}
-    plan = plan_of(train, test, **asked)
-    split, channels = plan.data.split, plan.data.channels
-    data = data_of(split.train, split.test, channels)
-    peers = [row for peer in PEERS for row in rows_of(peer, data)]
-    board = compare(train, test, jobs=1, **asked)
-    if board.stopped:
-        raise SystemExit("stopped")
-    ours = list(own_rows(board, data.span))
-    chosen = next((row for row in ours if row.chosen), Row(""))
-    pairs = (
-        (chosen, min(peers, key=lambda row: row.validation)),
-        (min(ours, key=lambda row: row.rmse), min(peers, key=lambda row: row.rmse)),
-    )
-    cells = [f"{a.best} | {b.best} | {b.rmse / a.rmse:.2f}" for a, b in pairs]
-    given = ", ".join(inputs_of([*train, *test], channels))
-    lines = [
-        f"## {title}\n",
-        f"{', '.join(channels.outputs)} [{plan.empty.unit}] from {given}; {plan.board().split}.\n",
-        f"| model | test RMSE [{plan.empty.unit}] | of range [%] | settings |",
-        "|---|---:|---:|---|",
-        *section([*peers, *ours]),
-    ]
-    return f"| {title} | {' | '.join(cells)} |", "\n".join(lines) + "\n"
+def frame_of(one: Set, part: Part, result: Result) -> pd.DataFrame:
+    """Return predictions as docs/measured/rules.md asks for them."""
+    frames = []
+    for run, found in zip(part.split.test, result.found, strict=True):
+        columns = dict(zip(part.channels.outputs, found.T, strict=True))
+        keys = {"set": one.name, "task": part.task.name, "recording": run.name}
+        frames.append(pd.DataFrame(keys | {"row": np.arange(len(run))} | columns))
+    return pd.concat(frames)
 
 
-def section(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield lines of a table, the best first, and of what failed."""
-    for row in sorted(rows, key=lambda row: row.rmse):
-        name = f"{row.name}, chosen" if row.chosen else row.name
-        if np.isfinite(row.rmse):
-            cells = (name, numeral(row.rmse, 3), f"{row.percent:.2f}", row.settings)
-            yield f"| {' | '.join(cells)} |"
-        else:
-            yield f"\n- {name}: {row.reason}{f' ({row.settings})' if row.settings else ''}."
+def takes_part(peer: Peer, one: Set, part: Part) -> bool:
+    """Return whether a peer takes part: not where models are given equations, or a data sheet."""
+    grey = part.task.name == "grey" or part.task.folds == 0
+    return not grey and (one.name in peer.sets if peer.sets else not part.task.leave_out)
 
 
 def main() -> None:
-    """Write the tables of the page."""
+    """Write predictions, and their lines of the leaderboard."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--page", type=Path, default=Path("docs/measured/peers.md"))
+    parser.add_argument("entries", type=Path)
+    parser.add_argument("--only", action="append", default=[])
+    parser.add_argument("--models", action="append", default=[])
+    parser.add_argument("--again", action="store_true")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
-    tasks = []
-    for one in sets_in(given.folder):
-        try:
-            recordings = one.recordings()
-            tasks += [run(one, task, recordings) for task in one.tasks() if not task.leave_out]
-        except MckibbenError as error:
-            print(f"{one.title}: not read: {error}", file=sys.stderr)
-    introduction = given.page.read_text(encoding="utf-8").partition(TABLES)[0]
-    overview = [
-        f"{TABLES}\n",
-        "Test RMSE in per cent of range. Chosen without the test: of ours by cross-validation, of the "
-        "peers by the error on the quarter held back. The best are known by the test alone.\n",
-        "| set | ours, chosen | peer, chosen | ratio | ours, best | peer, best | ratio |",
-        "|---|---:|---:|---:|---:|---:|---:|",
-        *(line for line, _ in tasks),
-        "",
-    ]
-    text = introduction + "\n".join([*overview, *(section for _, section in tasks)])
-    given.page.write_text(text, encoding="utf-8")
+    peers = [one for one in PEERS if one.name in given.models or not given.models]
+    for one in chosen_in(given.folder, given.only):
+        lines = [pd.read_csv(BOARD, keep_default_na=False)] if BOARD.exists() else []
+        before = {(*key,): how for board in lines for *key, how in board[[*KEY, "how"]].to_numpy()}
+        frames: dict[str, list[pd.DataFrame]] = {}
+        how: dict[tuple[str, str], str] = {}
+        failed = set[tuple[str, str]]()
+        for part in parts_of(one, one.recordings()):
+            data, task = data_of(part), part.task.name
+            results = list(own_results(part, given.models))
+            for peer in (peer for peer in peers if takes_part(peer, one, part)):
+                again = before.get((peer.name, one.name, task), "") if given.again else ""
+                results += results_of(peer, data, part, again)
+            for result in results:
+                said = f"{one.name} {task} {part.task.leave_out}: {result.name}: {result.reason}"
+                print(said, file=sys.stderr, flush=True)
+                if result.found:
+                    frames.setdefault(result.name, []).append(frame_of(one, part, result))
+                    how[result.name, task] = result.how
+                else:
+                    failed.add((result.name, task))
+        (given.entries / one.name).mkdir(parents=True, exist_ok=True)
+        for name, parts in frames.items():
+            whole = pd.concat(parts)
+            whole = whole[[(name, task) not in failed for task in whole["task"]]]
+            if whole.empty:
+                continue
+            file = given.entries / one.name / f"{name}.csv"
+            whole.to_csv(file, index=False)
+            scored = pd.DataFrame([vars(line) for line in entries(file, [one])])
+            scored["how"] = [how[name, task] for task in scored["task"]]
+            lines.append(scored)
+        board = pd.concat(lines).drop_duplicates(KEY, keep="last")
+        board.to_csv(BOARD, index=False, float_format="%.5g")
 
 
 if __name__ == "__main__":

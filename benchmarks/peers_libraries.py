@@ -27,9 +27,6 @@ Simulate = Callable[[Array, Array], Array]
 
 Settings = Mapping[str, Any]
 
-START = 20
-"""Measured outputs that a peer is given to start from; also the most lags that any may have."""
-
 MOST_KNOWN = 200
 """Known outputs, the last ones, that the state of a linear model is found from."""
 
@@ -38,7 +35,7 @@ MOST_TERMS = 30
 
 UNITS, RATE, CHUNK, EPOCHS, PATIENCE, SECONDS = 32, 5e-3, 100, 400, 60, 25.0
 """Of the network: units, Adam's rate, samples after which gradients are cut, most epochs, epochs without
-a lower error on the trials after which training stops, and most seconds."""
+a lower error on the trials after which training stops, and most seconds of processor time."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +57,16 @@ class Peer:
     """A way to identify a model, and the settings to search among, cheapest first.
 
     From training runs, settings (none: the library's defaults), and trials to stop a training early by,
-    `fit` makes a model.
+    `fit` makes a model. With `seconds`, for one fit, the grid is not searched: the median is taken.
+    `sets` are those that it is for, where it is not for all.
     """
 
     name: str
-    package: str
     fit: Callable[[Sequence[Run], Settings, Sequence[Trial]], Simulate]
     grid: Sequence[Settings]
+    seconds: float = 0.0
+    stops_early: bool = False
+    sets: tuple[str, ...] = ()
 
 
 def grid(**choices: Sequence[Any]) -> list[Settings]:
@@ -207,7 +207,7 @@ def gru(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate
     given, wanted = batch([u for u, _ in runs]), batch([y for _, y in runs])
     counted = batch([np.ones((len(u), 1)) for u, _ in runs])
     best, best_error, best_epoch = parts.state_dict(), math.inf, 0
-    ends = time.perf_counter() + SECONDS
+    ends = time.process_time() + SECONDS
     for epoch in range(EPOCHS):
         state = torch.tanh(parts["start"](torch.cat([given[:, 0], wanted[:, 0]], dim=1)))[None]
         for first in range(0, longest, CHUNK):
@@ -225,27 +225,152 @@ def gru(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate
         if error < best_error:
             best = {name: value.clone() for name, value in parts.state_dict().items()}
             best_error, best_epoch = error, epoch
-        if epoch - best_epoch > PATIENCE or time.perf_counter() > ends:
+        if epoch - best_epoch > PATIENCE or time.process_time() > ends:
             break
     parts.load_state_dict(best)
     return simulate
 
 
-GRU = Peer(f"GRU, {UNITS} units", "torch", gru, grid(seed=[0, 1, 2]))
+def jax_rnn(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
+    """Fit jax-sysid's recurrent network as its authors' script for the Bouc-Wen benchmark does.
+
+    Three states and 16 hidden units each for state and output, beside a linear model that starts it;
+    200 epochs of Adam, then L-BFGS. The test's start is learned from its known outputs alone.
+    """
+    del trials
+    jax, models = import_module("jax"), import_module("jax_sysid.models")
+    jax.config.update("jax_enable_x64", True)
+    gelu, states, hidden = jax.nn.gelu, 3, 16
+    inputs, outputs = runs[0][0].shape[1], runs[0][1].shape[1]
+    u, y = [u for u, _ in runs], [y for _, y in runs]
+
+    def step(x: Any, u: Any, params: Any) -> Any:
+        p = params
+        return p[0] @ x + p[1] @ u + p[5] @ gelu(p[3] @ x + p[4] @ u + p[6]) + p[7]
+
+    def output(x: Any, u: Any, params: Any) -> Any:
+        del u
+        p = params
+        return p[2] @ x + p[9] @ gelu(p[8] @ x + p[10]) + p[11]
+
+    linear = models.LinearModel(states, outputs, inputs, feedthrough=False)
+    linear.loss(rho_x0=1e-3, rho_th=1e-2)
+    linear.optimization(adam_epochs=0, lbfgs_epochs=1000, iprint=-1)
+    linear.fit(y, u)
+    rng = np.random.default_rng(how["seed"])
+    shapes: list[Any] = [(hidden, states), (hidden, inputs), (states, hidden), hidden, states]
+    shapes += [(hidden, states), (outputs, hidden), hidden, outputs]
+    small = [
+        0.1 * rng.standard_normal(n) if isinstance(n, tuple) else np.zeros((n,)) for n in shapes
+    ]
+    model = models.Model(states, outputs, inputs, state_fcn=step, output_fcn=output)
+    model.init([*linear.params, *small])
+    model.loss(rho_x0=1e-8, rho_th=1e-12)
+    model.optimization(adam_epochs=200, lbfgs_epochs=how["epochs"], iprint=-1)
+    model.fit(y, u)
+
+    def simulate(u: Array, known: Array) -> Array:
+        start = model.learn_x0(u[: len(known)], known, RTS_epochs=10, verbosity=False)
+        return np.asarray(model.predict(start, u)[0])
+
+    return simulate
+
+
+MUSCLE = """<mujoco>
+  <option timestep="1" gravity="0 0 0"/>
+  <worldbody><body><joint name="end" type="slide"/>
+    <inertial pos="0 0 0" mass="1e12" diaginertia="1 1 1"/></body></worldbody>
+  <actuator><general name="muscle" joint="end" dyntype="filterexact" dynprm="1"
+    gaintype="affine" gainprm="1 0 0" biastype="affine"
+    forcelimited="true" forcerange="-9 99"/></actuator>
+  <sensor><actuatorfrc name="force" actuator="muscle"/></sensor>
+</mujoco>"""
+"""A muscle that is held: an actuator whose gain and bias are linear in length, behind a lag."""
+
+
+def mujoco_sysid(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
+    """Fit such a muscle with MuJoCo's own `sysid`: gain, bias, lag in samples, and least force.
+
+    The input is the length, held, and the pressure.
+    """
+    del how, trials
+    mujoco, sysid = import_module("mujoco"), import_module("mujoco.sysid")
+    spec = mujoco.MjSpec.from_string(MUSCLE)
+    model = spec.compile()
+
+    def setter(table: str, place: int) -> Callable[[Any, Any], None]:
+        def put(spec: Any, parameter: Any) -> None:
+            values = getattr(spec.actuator("muscle"), table)
+            values[place] = float(parameter.value[0])
+
+        return put
+
+    parameters = sysid.ParameterDict()
+    for name, table, place, nominal, low, high in (
+        ("gain", "gainprm", 0, 1.0, -10.0, 10.0),
+        ("gain_length", "gainprm", 1, 0.1, -10.0, 10.0),
+        ("bias", "biasprm", 0, 0.1, -10.0, 10.0),
+        ("bias_length", "biasprm", 1, 0.1, -10.0, 10.0),
+        ("lag", "dynprm", 0, 2.0, 0.05, 50.0),
+        ("least", "forcerange", 0, -2.0, -9.0, 1.0),
+    ):
+        put = setter(table, place)
+        parameters.add(sysid.Parameter(name, nominal, low, high, modifier=put))
+
+    def start(u: Array) -> Any:
+        return sysid.create_initial_state(model, u[0, :1], np.zeros(1), u[0, 1:])
+
+    def control(u: Array) -> Any:
+        return sysid.TimeSeries.from_control_names(np.arange(len(u)), u[:, 1:], model)
+
+    sequences = sysid.ModelSequences(
+        name="muscle",
+        spec=spec,
+        sequence_name=[str(place) for place in range(len(runs))],
+        initial_state=[start(u) for u, _ in runs],
+        control=[control(u) for u, _ in runs],
+        sensordata=[sysid.TimeSeries.from_names(np.arange(len(y)), y, model) for _, y in runs],
+    )
+    residual = sysid.build_residual_fn(models_sequences=[sequences])
+    found, _ = sysid.optimize(parameters, residual, verbose=False)
+    fitted = sysid.apply_param_modifiers_spec(found, spec).compile()
+
+    def simulate(u: Array, known: Array) -> Array:
+        del known
+        data = mujoco.MjData(fitted)
+        data.qpos[:], data.act[:] = u[0, 0], u[0, 1]
+        forces = []
+        for _, pressure in u:
+            data.ctrl[:] = pressure
+            mujoco.mj_forward(fitted, data)
+            forces.append(data.sensordata.copy())
+            mujoco.mj_step(fitted, data)
+        return np.array(forces)
+
+    return simulate
+
 
 PEERS = (
-    Peer("ARX", "SIPPY", arx, grid(present=[False, True], poles=[1, 2, 3, 5], zeros=[1, 2, 4])),
+    Peer("SIPPY ARX", arx, grid(present=[False, True], poles=[1, 2, 3, 5], zeros=[1, 2, 4])),
     Peer(
-        "N4SID",
-        "SIPPY",
+        "SIPPY N4SID",
         n4sid,
         grid(SS_f=[10, 20], SS_D_required=[False, True], SS_fixed_order=[1, 2, 3, 4, 6, 8]),
     ),
     Peer(
-        "FROLS, polynomial NARX",
-        "sysidentpy",
+        "sysidentpy FROLS",
         frols,
         grid(lags=[1, 2, 3, 5], degree=[1, 2, 3], present=[True, False]),
     ),
-    GRU,
+    Peer(f"torch GRU {UNITS}", gru, grid(seed=[0, 1, 2]), seconds=4 * SECONDS, stops_early=True),
+    Peer(
+        "jax-sysid RNN",
+        jax_rnn,
+        grid(seed=[3], epochs=[500]),
+        seconds=1200.0,
+        sets=("bouc_wen_benchmark",),
+    ),
+    Peer(
+        "MuJoCo sysid", mujoco_sysid, grid(seed=[0]), seconds=300.0, sets=("festo_isometric_20mm",)
+    ),
 )

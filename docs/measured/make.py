@@ -3,14 +3,15 @@
 FOLDER holds the public recordings named in src/mckibben/measured/known. In turn: every model on every
 set (measured.md); the library of identified muscles (src/mckibben/muscles/library); how far forces at
 held lengths repeat (repeats.txt); what priors from the library are worth (priors.txt); and, with the
-Python of an environment that has the peers (benchmarks/peers.txt), these beside ours (peers.md). Takes
-about an hour on two cores.
+Python of an environment that has the peers (benchmarks/peers.txt), theirs and our lines of the
+leaderboard (leaderboard.csv, leaderboard.md). Takes about an hour on two cores.
 """
 
 from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -26,8 +27,11 @@ def main() -> None:
     for name in ("repeats", "priors"):
         with (HERE / f"{name}.txt").open("w", encoding="utf-8") as file:
             subprocess.run([sys.executable, HERE / f"{name}.py", folder], check=True, stdout=file)
-    for python in peers:
-        subprocess.run([python, ROOT / "benchmarks" / "peers.py", folder], check=True)
+    with tempfile.TemporaryDirectory() as entries:
+        for python in peers:
+            script = ROOT / "benchmarks" / "peers.py"
+            subprocess.run([python, script, folder, entries], check=True, cwd=ROOT)
+    subprocess.run([sys.executable, HERE / "leaderboard.py"], check=True)
 
 
 if __name__ == "__main__":

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from mckibben import GPI, DataError, Recording, compare, write
+from mckibben import GPI, DataError, Recording, compare, read, write
 from mckibben.measured.page import page
 from mckibben.measured.running import outcomes
+from mckibben.measured.scoring import KEYS, START, entries
 from mckibben.measured.sets import parted, sets_in, split_of
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
@@ -162,3 +165,113 @@ def test_results_among_recordings_are_refused(cli: Cli, folder: Path) -> None:
         assert result.code == 2
         assert str(folder) in result.err
     assert sorted(folder.rglob("*")) == before
+
+
+def predictions(folder: Path, task: str, names: list[str], first: int = 0) -> pd.DataFrame:
+    """Return the true outputs of recordings of the set "volts" as predictions."""
+    (volts,) = (one for one in sets_in(folder) if one.name == "volts")
+    frames = []
+    for run in volts.recordings():
+        if run.name in names:
+            y = run["displacement"][first:]
+            keys = {"set": "volts", "task": task, "recording": run.name, "row": np.arange(len(y))}
+            frames.append(pd.DataFrame(keys | {"displacement": y}))
+    return pd.concat(frames)
+
+
+def scored(folder: Path, tmp_path: Path, given: pd.DataFrame) -> list[tuple[str, float, float]]:
+    file = tmp_path / "mine.csv"
+    given.to_csv(file, index=False)
+    return [(one.task, one.rmse, one.width or 0.0) for one in entries(file, sets_in(folder))]
+
+
+def test_exact_predictions_have_no_error_and_all_of_the_width(folder: Path, tmp_path: Path) -> None:
+    every = [
+        predictions(folder, "last run", ["run4"]),
+        predictions(folder, "in turn", ["run2", "run3"]),
+        predictions(folder, "cut", ["run2"], first=900),
+    ]
+    found = scored(folder, tmp_path, pd.concat(every))
+    assert [task for task, *_ in found] == ["last run", "in turn", "cut"]
+    for _, rmse, width in found:
+        assert rmse == pytest.approx(0.0, abs=1e-9)
+        assert width == pytest.approx(100.0)
+
+
+def test_an_error_is_over_the_scored_rows_of_all_that_is_left_out(
+    folder: Path, tmp_path: Path
+) -> None:
+    given = predictions(folder, "in turn", ["run2", "run3"])
+    given.loc[given["row"] < START, "displacement"] = np.nan  # not scored, may be absent
+    given.loc[given["recording"] == "run3", "displacement"] += 0.3
+    ((_, rmse, width),) = scored(folder, tmp_path, given)
+    assert rmse == pytest.approx(0.3 / np.sqrt(2))
+    assert width == pytest.approx(100.0)
+
+
+def test_a_cut_recording_is_scored_from_its_first_row(folder: Path, tmp_path: Path) -> None:
+    given = predictions(folder, "cut", ["run2"], first=900)
+    given.loc[given["row"] == 0, "displacement"] += 3.0
+    ((_, rmse, _),) = scored(folder, tmp_path, given)
+    assert rmse == pytest.approx(3.0 / np.sqrt(600))
+
+
+def test_the_metrics_are_those_of_the_comparison(folder: Path, tmp_path: Path) -> None:
+    runs = [recorded(seed) for seed in (2, 3, 4)]
+    row = compare(runs[:2], [runs[2]], models=["gpi"], n_folds=0, jobs=1).rows[0]
+    assert row.block is not None
+    assert row.test is not None
+    assert row.memory is not None
+    given = predictions(folder, "last run", ["run4"])
+    given["displacement"] = row.block.simulate(runs[2])["displacement"]
+    ((_, rmse, width),) = scored(folder, tmp_path, given)
+    assert rmse == pytest.approx(row.test.rmse, rel=0.05)  # without the start
+    assert width == pytest.approx(100 * (row.memory.gap_ratio or 0.0), abs=2.0)
+    line = np.polynomial.Polynomial.fit(runs[2]["pressure"], runs[2]["displacement"], 1)
+    given["displacement"] = line(runs[2]["pressure"])
+    ((_, _, none),) = scored(folder, tmp_path, given)
+    assert none == pytest.approx(0.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda rows: rows[rows["row"] != 700], "run4"),
+        (lambda rows: rows.assign(displacement=np.inf), "run4"),
+        (lambda rows: rows.drop(columns="displacement"), "displacement"),
+        (lambda rows: rows.drop(columns="row"), "row"),
+        (lambda rows: pd.concat([rows, rows[-1:]]), "twice"),
+        (lambda rows: rows.assign(set="other"), "volts"),
+        (lambda rows: rows.assign(task="other"), "none of the tasks"),
+    ],
+)
+def test_predictions_that_are_not_whole_are_refused(
+    folder: Path, tmp_path: Path, change: Callable[[pd.DataFrame], pd.DataFrame], said: str
+) -> None:
+    with pytest.raises(DataError, match=r"mine\.csv") as caught:
+        scored(folder, tmp_path, change(predictions(folder, "last run", ["run4"])))
+    assert said in str(caught.value)
+
+
+def test_splits_are_written_and_predictions_of_them_scored_in_lines(
+    cli: Cli, folder: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "splits"
+    assert cli("measured", folder, "--only", "volts", "--splits", out).code == 0
+    assert sorted(path.name for path in (out / "volts").iterdir()) == [
+        *("cut", "in turn without run2", "in turn without run3", "last run"),
+    ]
+    (test,) = read(out / "volts" / "cut" / "test" / "run2.csv")
+    assert len(test) == 600
+    keys = {"set": "volts", "task": "cut", "recording": test.name, "row": np.arange(600)}
+    file = tmp_path / "mine.csv"
+    rows = pd.DataFrame(keys | {"displacement": test["displacement"] + 0.1})
+    rows.to_csv(file, index=False)
+    assert [*rows][:4] == [*KEYS]
+    result = cli("measured", folder, "--only", "volts", "--score", file)
+    assert result.code == 0
+    head, line = result.out.splitlines()[:2]
+    found = dict(zip(head.split(","), line.split(","), strict=True))
+    assert (found["model"], found["set"], found["unit"]) == ("mine", "volts", "mm")
+    assert float(found["rmse"]) == pytest.approx(0.1)
+    assert float(found["width"]) == pytest.approx(100.0)

@@ -57,24 +57,50 @@ def memory_test(
     pairs : sequence of (str, str), length k
         Every output's own input, or where that rests the first of the block's that moves; the output.
     """
-    measured, modelled = [], []
-    pairs = [(_moving(block, recordings, given), output) for given, output in pairs]
-    for recording, found in zip(recordings, outputs, strict=True):
-        for place, (input_name, output_name) in enumerate(pairs):
-            both = np.column_stack([recording[output_name], found[:, place]])
-            gaps = branch_gaps(recording[input_name], both)
-            measured.append(gaps[:, 0])
-            modelled.append(gaps[:, 1])
-    gap, own = np.concatenate(measured), np.concatenate(modelled)
-    power = float(gap @ gap)
-    ratio = float(own @ gap) / power if gap.size and power > 0 else None
+    names = [channel.name for channel in block.inputs]
+    gaps = paired_gaps(recordings, outputs, pairs, names)
+    pairs = [(_moving(names, recordings, given), output) for given, output in pairs]
     held = [hold_test(block, recordings[0], *pair) for pair in pairs]
     kept = [share for share in held if share is not None]
-    return Memory(ratio, gap.size, float(np.mean(kept)) if kept else None)
+    return Memory(gap_ratio(gaps), len(gaps), float(np.mean(kept)) if kept else None)
 
 
-def _moving(block: Block, recordings: Sequence[Recording], given: str) -> str:
-    for name in (given, *(channel.name for channel in block.inputs if channel.name != given)):
+def paired_gaps(
+    recordings: Sequence[Recording],
+    outputs: Sequence[Array],
+    pairs: Sequence[tuple[str, str]],
+    names: Sequence[str],
+) -> Array:
+    """Return measured and modelled branch gaps, shape (n, 2), of all recordings and outputs.
+
+    Parameters
+    ----------
+    outputs : sequence of array, shape (n, k)
+        Modelled outputs on each recording; samples that are NaN do not count.
+    pairs : sequence of (str, str), length k
+        As for `memory_test`.
+    names : sequence of str
+        Inputs, of which the first that moves stands in for one that rests.
+    """
+    pairs = [(_moving(names, recordings, given), output) for given, output in pairs]
+    return np.concatenate(
+        [
+            branch_gaps(run[given], np.column_stack([run[output], found[:, place]]))
+            for run, found in zip(recordings, outputs, strict=True)
+            for place, (given, output) in enumerate(pairs)
+        ]
+    )
+
+
+def gap_ratio(gaps: Array) -> float | None:
+    """Return the slope of modelled branch gaps over the measured ones (n, 2); None without any."""
+    measured, modelled = gaps.T
+    power = float(measured @ measured)
+    return float(modelled @ measured) / power if power > 0 else None
+
+
+def _moving(names: Sequence[str], recordings: Sequence[Recording], given: str) -> str:
+    for name in (given, *(name for name in names if name != given)):
         if any(name in r and np.ptp(r[name]) > 0 for r in recordings):
             return name
     return given

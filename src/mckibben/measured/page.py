@@ -14,7 +14,7 @@ from mckibben.checkpoints import Checkpoints
 from mckibben.comparison.leaderboard import Leaderboard, Row
 from mckibben.errors import DataError
 from mckibben.measured.running import Outcome, outcomes
-from mckibben.measured.sets import sets_in
+from mckibben.measured.sets import chosen_in
 from mckibben.numerals import numeral
 from mckibben.report import words
 from mckibben.report.builder import Code, Item, Page, Section, Table, Text
@@ -205,15 +205,10 @@ def measure(
     from mckibben.outputs import results_in
     from mckibben.system import workers
 
-    sets = sets_in(folder)
-    if unknown := sorted({*only} - {one.name for one in sets}):
-        listed = ", ".join(one.name for one in sets)
-        problem = f"there is no set {unknown[0]!r} in it"
-        raise DataError(problem, file=folder, remedy=f"use one of {listed}")
+    chosen = chosen_in(folder, only)
     if out.resolve().is_relative_to(folder.resolve()):
         problem = f"it is inside {folder}, where the next run would read results as recordings"
         raise DataError(problem, file=out, remedy="give a folder elsewhere")
-    chosen = [one for one in sets if not only or one.name in only]
     if jobs != 1:
         workers.prepare()
     inputs = [one.folder for one in chosen]

@@ -138,8 +138,15 @@ def outcomes(
             continue
         if board.stopped:
             raise KeyboardInterrupt
-        tested = test if test and not task.leave_out else [*train, *test]
-        span = max(float(np.ptp(np.concatenate([r[y] for r in tested]))) for y in board.outputs)
+        span = span_of(task, train, test, board.outputs)
         seconds = time.perf_counter() - started
         notes = tuple(f"{r.name}: {note}" for r in (*train, *test) for note in r.notes)
         yield Outcome(one, task, board, span, seconds, notes=notes)
+
+
+def span_of(
+    task: Task, train: Sequence[Recording], test: Sequence[Recording], outputs: Sequence[str]
+) -> float:
+    """Return the range of what is tested on, the largest of all outputs'; see `Outcome`."""
+    tested = test if test and not task.leave_out else [*train, *test]
+    return max(float(np.ptp(np.concatenate([r[y] for r in tested]))) for y in outputs)

@@ -209,6 +209,16 @@ def sets_in(folder: Path) -> list[Set]:
     return [_set(place) for place in places or [folder]]
 
 
+def chosen_in(folder: Path, only: Sequence[str] = ()) -> list[Set]:
+    """Return the sets of a folder with these names; without names all."""
+    sets = sets_in(folder)
+    if unknown := sorted({*only} - {one.name for one in sets}):
+        listed = ", ".join(one.name for one in sets)
+        problem = f"there is no set {unknown[0]!r} in it"
+        raise DataError(problem, file=folder, remedy=f"use one of {listed}")
+    return [one for one in sets if not only or one.name in only]
+
+
 def _has_recordings(place: Path) -> bool:
     every = (place, *place.iterdir())
     return any(is_bag(one) or one.suffix.casefold() in SOUGHT for one in every)

@@ -2,10 +2,14 @@
 
 The table [split] in a set's channels.toml states what is fitted and what is tested; without it the
 last quarter is tested. Ctrl-C stops at once, and the same command goes on from there.
+
+Models of any other software enter by their predictions: --splits writes what each task trains and tests
+on, --score prints both metrics of predictions, in lines for docs/measured/leaderboard.csv.
 """
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,6 +37,12 @@ def measured(
         str | tuple[str, ...], Option("Models by short name.", "all|quick|NAME,...", parse=names)
     ] = "all",
     quick: Quick = False,
+    splits: Annotated[
+        Path | None, Option("Only write what each task trains and tests on, to DIR.", "DIR")
+    ] = None,
+    score: Annotated[
+        tuple[Path, ...], Option("Only score a CSV of predictions; repeatable.", "FILE")
+    ] = (),
     seed: Seed = 0,
     jobs: Jobs = None,
     force: Force = False,
@@ -40,7 +50,18 @@ def measured(
 ) -> None:
     from mckibben.errors import DataError
     from mckibben.measured.page import FILES, measure
+    from mckibben.measured.scoring import HEAD, entries, write_splits
+    from mckibben.measured.sets import chosen_in
     from mckibben.report import words
+
+    if splits is not None or score:
+        sets = chosen_in(folder, only)
+        if splits is not None:
+            write_splits(sets, splits)
+        scored = [one for file in score for one in entries(file, sets)]
+        lines = [HEAD] * bool(scored) + [one.line() for one in scored]
+        show([asdict(one) for one in scored], lambda: lines, as_json, written=[splits])
+        return
 
     def done(one: Outcome) -> None:
         if not as_json:

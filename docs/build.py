@@ -26,7 +26,8 @@ def build(into: Path, jobs: int) -> int:
     """Run Sphinx over all pages; every warning is an error."""
     from sphinx.cmd.build import build_main
 
-    options = ["-W", "--keep-going", "-q", "-j", str(jobs), "-b", "html"]
+    # all pages are written (-a): the search index holds the index entries of those written only
+    options = ["-W", "-a", "--keep-going", "-q", "-j", str(jobs), "-b", "html"]
     return build_main([*options, "-d", str(into.with_name("doctrees")), str(DOCS), str(into)])
 
 

@@ -1,4 +1,4 @@
-"""Measure how long the README's first line takes: quiet, beside other work, and with nothing compiled.
+"""Measure how long the README's main job takes: quiet, beside other work, and with nothing compiled.
 
 Run: python benchmarks/study.py [--cold] [--runs N]
 """

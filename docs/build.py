@@ -2,8 +2,8 @@
 
     python docs/build.py            # into docs/_build/html; warnings are errors
 
-Nothing is fitted for it but in the gallery: examples of models are kept (docs/models/fits.py), and so
-are the pictures of the workbench (docs/tour.py).
+Only the gallery fits models. The examples on pages of models are fitted by docs/models/fits.py, and the
+pictures of the workbench are made by docs/tour.py, both by hand.
 """
 
 from __future__ import annotations
@@ -12,9 +12,11 @@ import argparse
 import shutil
 import sys
 import warnings
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from making.api import write_api
+from making.commands import write_commands
 from making.gallery import write_gallery
 from making.models import write_models
 from making.pages import DOCS, MADE
@@ -24,14 +26,15 @@ def build(into: Path, jobs: int) -> int:
     """Run Sphinx over all pages; every warning is an error."""
     from sphinx.cmd.build import build_main
 
-    options = ["-W", "--keep-going", "-q", "-j", str(jobs), "-b", "html"]
+    # all pages are written (-a): the search index holds the index entries of those written only
+    options = ["-W", "-a", "--keep-going", "-q", "-j", str(jobs), "-b", "html"]
     return build_main([*options, "-d", str(into.with_name("doctrees")), str(DOCS), str(into)])
 
 
 def main() -> int:
     """Build everything."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--clean", action="store_true", help="forget what earlier builds made")
+    parser.add_argument("--clean", action="store_true", help="delete what earlier builds made")
     parser.add_argument(
         "--into", type=Path, default=DOCS / "_build" / "html", help="folder to build into"
     )
@@ -43,8 +46,11 @@ def main() -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         write_api()
-        write_models()
-        write_gallery()
+        write_commands()
+        with ProcessPoolExecutor(1) as pool:  # the gallery's fits, beside the pages of models
+            gallery = pool.submit(write_gallery)
+            write_models()
+            gallery.result()
     code = build(given.into, given.jobs)
     print(f"Built: {given.into / 'index.html'}" if code == 0 else "There were warnings.")
     return code

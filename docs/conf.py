@@ -1,5 +1,6 @@
 """How the documentation is built; run `python docs/build.py`."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -13,7 +14,8 @@ copyright = "the developers of mckibben"  # noqa: A001  # Sphinx's name
 version = release = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "making.typeset"]
 html_theme = "furo"
-html_title = "mckibben"
+html_title = f"mckibben {os.environ.get('READTHEDOCS_VERSION_NAME', version)}"
+html_baseurl = os.environ.get("READTHEDOCS_CANONICAL_URL", "")  # of the hosted site, by version
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_search_scorer = str(Path(__file__).parent / "making" / "scorer.js")

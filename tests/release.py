@@ -160,12 +160,12 @@ def try_alone(wheel: Path) -> str:
 
 
 def main_job() -> list[list[str]]:
-    """Return the commands of the package in the README's first line."""
+    """Return the commands of the package of the README's main job."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     block = text.partition("<!-- study -->")[2].partition("```bash")[2].partition("```")[0]
     found = re.findall(r"(?:^|\s)(?:\S*/)?mckibben +([^&\n]+)", block)
     if not found:
-        raise ReleaseError("the README's first line calls no command of the package")
+        raise ReleaseError("the README's main job calls no command of the package")
     return [words.split() for words in found]
 
 

@@ -1,112 +1,135 @@
-"""The API reference: a page a module, found from a page a part, with what each holds in a table."""
+"""The API reference: one page for each use of the package, filled from the docstrings by Sphinx."""
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Iterator
-from functools import cache
-from pathlib import Path
+import importlib
+import inspect
+import sys
+from typing import Any, NamedTuple
 
 import mckibben
 from making.pages import MADE, plain, table, toctree, write
-from mckibben import registry
-
-SOURCE = Path(mckibben.__file__).parent
-
-PARTS = (
-    *("recording", "signals", "metrics", "diagnosis", "files", "rigs", "environments"),
-    *("blocks", "estimators", "control", "comparison", "planning", "validation", "muscles"),
-    *("papers", "report", "studying", "export", "stream", "link", "ros"),
-    *("diagnosis", "measured", "example", "errors"),
-)
-"""Of the package, in the order of its layers."""
 
 
-def first_sentence(node: ast.AST) -> str:
-    """Return the first line of a docstring."""
-    text = (
-        ast.get_docstring(node)
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
-        else ""
-    )
-    return plain((text or "").partition("\n\n")[0])
+class Use(NamedTuple):
+    """A page: what somebody wants to do, and the names that do it."""
+
+    title: str
+    names: str
 
 
-@cache
-def offered() -> frozenset[str]:
-    """Return the modules meant for others: those of plug-ins, and of names that packages hand on."""
-    found = {
-        value.partition(":")[0] for group in registry.PLUGINS.values() for value in group.values()
-    }
-    for face in (*SOURCE.rglob("__init__.py"), SOURCE / "__init__.pyi"):
-        package = ".".join(("mckibben", *face.parent.relative_to(SOURCE).parts))
-        for node in ast.walk(ast.parse(face.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.module:
-                found.add(f"{package}.{node.module}" if node.level else node.module)
-    return frozenset(found)
+USES = {
+    "recordings": Use(
+        "Recordings and files",
+        "mckibben: Recording read write; mckibben.files: columns_of has_columns",
+    ),
+    "signals": Use(
+        "Signals: excitations, cycles, filters",
+        "mckibben.signals: triangle decaying_triangle progressive_triangle irregular_triangle sine "
+        "decaying_sine progressive_sine chirp multisine random_wave random_steps binary_steps "
+        "staircase ramps constant pulls build settings_of cut resample decimate_minmax coarsened "
+        "made_manageable detrend low_pass zeroed noise_level reversals branches branches_of cycles "
+        "split_cycles split_time",
+    ),
+    "describe": Use(
+        "Describe a muscle",
+        "mckibben: characterize data_gaps plan; mckibben.diagnosis: Characterization Cycle; "
+        "mckibben.metrics: Scores score rmse mae nrmse max_error r2 err loop_width loop_area crosstalk",
+    ),
+    "fit": Use(
+        "Fit a model",
+        "mckibben: fit identify; mckibben.studying.results: Fit; "
+        "mckibben.estimators.core.estimator: Estimator Diagnostics; "
+        "mckibben: PIEstimator GPIEstimator MPIEstimator EUPIEstimator",
+    ),
+    "choose": Use(
+        "Choose among models",
+        "mckibben: compare study check review calibrate; mckibben.comparison.leaderboard: Leaderboard",
+    ),
+    "models": Use(
+        "Run, combine and save models",
+        "mckibben: Block load Series Parallel PerChannel Channel Banded PI RateDependentPI GPI EUPI "
+        "Play Affine PiecewiseLinear Polynomial check_block",
+    ),
+    "control": Use(
+        "Invert, and close the loop",
+        "mckibben: invert track; mckibben.studying.results: Inverse Tracking; "
+        "mckibben.control: track Tracked control_law Controller BlockController tune_pid "
+        "DisturbanceObserver EstimatedLoad Twin dead_time_undone previewed before Before slow_rise "
+        "uncompensated; mckibben.stream: run FixedRate Deadlines UDPLink Step",
+    ),
+    "rigs": Use(
+        "Virtual rigs and environments",
+        "mckibben: Rig load_rig check_rig; "
+        "mckibben.rigs: rig_names describe rig_from_data_sheet save_rig record; "
+        "mckibben.environments: Tracking; mckibben.vector_environment: JointTracking",
+    ),
+    "muscles": Use(
+        "Muscle library",
+        "mckibben.muscles: list load show Muscle Sheet Prior prior_of described scaled",
+    ),
+    "export": Use(
+        "Export, and drive a device",
+        "mckibben.export: export_c Serving state_of export_fmu export_ros2; "
+        "mckibben.link: Link LinkError Port Device State Statistics Note",
+    ),
+    "report": Use(
+        "Reports", "mckibben: write_report; mckibben.report: StudyFolder write_leaderboard"
+    ),
+    "errors": Use(
+        "Errors and warnings",
+        "mckibben: MckibbenError DataError ModelError DataWarning ModelWarning",
+    ),
+}
+
+PACKAGES = ("control", "diagnosis", "export", "files", "link", "muscles", "report", "rigs")
+PACKAGES += ("signals", "stream")
+"""Packages whose names are public, beside those of `mckibben` itself."""
 
 
-def modules(part: str) -> Iterator[tuple[str, ast.Module]]:
-    """Give the modules of a part that hold something public and documented, and are offered."""
-    place = SOURCE / part
-    paths = sorted(place.rglob("*.py")) if place.is_dir() else [SOURCE / f"{part}.py"]
-    for path in paths:
-        names = path.relative_to(SOURCE).with_suffix("").parts
-        name = ".".join(("mckibben", *names))
-        if names[-1] != "__init__" and (name in offered() or not place.is_dir()):
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            if public(tree):
-                yield name, tree
+def listed(use: Use) -> list[tuple[str, str]]:
+    """Return the module and name of everything on a page."""
+    pairs = [part.split(":") for part in use.names.split(";")]
+    return [(module.strip(), name) for module, names in pairs for name in names.split()]
 
 
-def public(tree: ast.Module) -> list[ast.ClassDef | ast.FunctionDef]:
-    """Return what classes and functions a module gives to others."""
-    return [
-        node
-        for node in tree.body
-        if isinstance(node, ast.ClassDef | ast.FunctionDef)
-        and not node.name.startswith("_")
-        and ast.get_docstring(node)
-    ]
+def missing() -> list[str]:
+    """Return public classes and functions that are on no page."""
+    shown = {id(found(*pair)) for use in USES.values() for pair in listed(use)}
+    lacking = []
+    for module in ("mckibben", *(f"mckibben.{name}" for name in PACKAGES)):
+        held = importlib.import_module(module)
+        for name in getattr(held, "__all__", None) or vars(held):
+            value = getattr(held, name)
+            own = getattr(value, "__module__", "").startswith("mckibben")
+            if callable(value) and own and not name.startswith("_") and id(value) not in shown:
+                lacking.append(f"{module}.{name}")
+    return lacking
+
+
+def found(module: str, name: str) -> Any:
+    """Return a class or function."""
+    return getattr(importlib.import_module(module), name)
 
 
 def write_api() -> None:
-    """Write the pages, which Sphinx fills from the docstrings."""
+    """Write the pages; exits where a public name is on none of them."""
+    if lacking := missing():
+        sys.exit(f"on no page of docs/making/api.py: {', '.join(lacking)}")
     rows = []
-    for part in PARTS:
-        found = list(modules(part))
-        lines = [f"# mckibben.{part}", ""]
-        place = SOURCE / part / "__init__.py"
-        about = first_sentence(
-            ast.parse(
-                (place if place.is_file() else place.parent.with_suffix(".py")).read_text("utf-8")
-            )
-        )
-        lines += [about, ""]
-        for module, tree in found:
-            lines += [f"## {module.removeprefix(f'mckibben.{part}.')}", ""]
-            lines += [f"{first_sentence(tree)} [Details]({module}.rst)", ""]
-            lines += table(
-                ["name", "what it is"],
-                [[f"`{node.name}`", first_sentence(node)] for node in public(tree)],
-            )
-            write_module(module)
-        rows.append([f"[{part}](mckibben.{part}.part.md)", about])
-        write(MADE / "api" / f"mckibben.{part}.part.md", "\n".join(lines))
-    lines = [
-        "# API reference",
-        "",
-        "From the docstrings, in the order of the package's layers.",
-        "",
-    ]
-    lines += [
-        *table(["part", "what it is"], rows),
-        *toctree([f"mckibben.{part}.part" for part in PARTS], "hidden"),
-    ]
+    for page, use in USES.items():
+        lines = [use.title, "=" * len(use.title), ""]
+        for module, name in listed(use):
+            if inspect.isclass(found(module, name)):
+                lines += [f".. autoclass:: {module}.{name}", "   :members:", ""]
+            else:
+                lines += [f".. autofunction:: {module}.{name}", ""]
+        write(MADE / "api" / f"{page}.rst", "\n".join(lines))
+        names = ", ".join(f"`{name}`" for _, name in listed(use))
+        rows.append([f"[{use.title}]({page}.rst)", names])
+    version = f"Version {plain(mckibben.__version__)}."
+    lines = ["# API reference", "", "```{index} !API, !reference, !functions", "```", ""]
+    lines += [f"Names by what they are used for. {version} Every model's"]
+    lines += ["estimator, with its settings, is on [its own page](../models/index.md).", ""]
+    lines += [*table(["use", "names"], rows), *toctree(list(USES), "hidden")]
     write(MADE / "api" / "index.md", "\n".join(lines))
-
-
-def write_module(module: str) -> None:
-    """Write the page of a module, which no list of pages but that of its part leads to."""
-    title = f"{module}\n{'=' * len(module)}"
-    write(MADE / "api" / f"{module}.rst", f":orphan:\n\n{title}\n\n.. automodule:: {module}\n")

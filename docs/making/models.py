@@ -107,7 +107,7 @@ def page(model: str, name: str, group: str, cost: Mapping[str, list[str]]) -> li
     """Return the lines of a model's page."""
     estimator = declared(model)
     block = mckibben.load(example(model))
-    lines = [f"# {name}", "", plain(summary(model)), ""]
+    lines = [f"# {name}", "", f"```{{index}} !{model}", "```", "", plain(summary(model)), ""]
     lines += table(
         ["", ""],
         [

@@ -1,10 +1,10 @@
-/* What a search puts first: pages written for people, then pages of models, then the API. */
+/* Order of search results: pages written by hand, pages of models, the API. Main index entries score 100. */
 var Scorer = {
   score: function (result) {
     const page = result[0];
     const score = result[4];
-    if (page.startsWith("_generated/api/")) return score / 100 - 50;
-    if (page.startsWith("_generated/models/") && page !== "_generated/models/index") return score / 4;
+    if (page.startsWith("_generated/api/") && score < 90) return score / 100 - 50;
+    if (page.startsWith("_generated/models/") && page !== "_generated/models/index" && score < 90) return score / 4;
     return score;
   },
   objNameMatch: 11,

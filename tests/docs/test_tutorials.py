@@ -20,7 +20,13 @@ ROOT = Path(__file__).parents[2]
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 NOTEBOOKS = runpy.run_path(str(ROOT / "docs" / "notebooks.py"))
 
-SETTING_UP = ("python3 -m venv .venv", ". .venv/bin/activate", "pip install", "uv sync")
+SETTING_UP = (
+    "python3 -m venv .venv",
+    ". .venv/bin/activate",
+    "pip install",
+    "uv sync",
+    "jupyter lab",
+)
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", flags=re.M | re.S)
 
@@ -66,26 +72,33 @@ def test_tutorial_runs_as_a_notebook(
         running.run_cell(cell).raise_error()
 
 
-def test_readme_runs_as_it_stands_from_top_to_bottom(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("page", "written"),
+    [
+        ("README.md", ("study/report.html", "study/gpi.json")),
+        ("docs/jupyter.md", ("model.json", "loops.png", "loop.html")),
+    ],
+)
+def test_page_runs_from_top_to_bottom(
+    page: str, written: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / page).read_text(encoding="utf-8")
     text = re.sub(r"<!-- test -->\n```bash\n.*?```\n", "", text, flags=re.S)  # this very suite
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
     monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {"__name__": "readme"}
+    names: dict[str, object] = {"__name__": "page"}
     blocks = BLOCK.findall(text)
     assert blocks
     for language, body in blocks:
         if language == "python":
-            exec(compile(body, "README.md", "exec"), names)
+            exec(compile(body, page, "exec"), names)
             continue
         for line in filter(None, body.splitlines()):
             for part in line.split(" && "):
                 if not part.startswith(SETTING_UP):
                     command(part.partition(" > ")[0], monkeypatch)
-    for made in ("study/report.html", "inverse.json", "muscle", "loops.png", "loop.html"):
+    for made in written:
         assert (tmp_path / made).exists()
     written = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
     assert untracked(written) == []

@@ -1,0 +1,12 @@
+"""A leaderboard: four models fitted to one recording, chosen by cross-validation, tested on another."""
+
+import sys
+
+import mckibben
+from mckibben import example
+from mckibben.report.figures import write_figure
+
+(train,) = mckibben.read(example.TRAIN)
+(test,) = mckibben.read(example.TEST)
+board = mckibben.compare(train, test, models=["pi", "gpi", "mpi", "preisach"])
+write_figure(board, sys.argv[1], "errors")

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 """Double-precision numbers, of any shape."""
 
 NARROWEST = 1e-30
-"""Least range of a channel that can be computed with, in its unit: products of less would vanish."""
+"""Smallest range of a channel, in its unit; products of smaller ranges would underflow."""
 
 
 def check_finite(

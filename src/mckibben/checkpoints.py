@@ -35,7 +35,7 @@ from mckibben.system.atomic import PART, write_text, written
 Result = TypeVar("Result")
 
 _NAMES = re.compile(rf"-[0-9a-f]{{16}}\.json$|^{re.escape(PART)}[0-9a-f]{{16}}\.part$")
-"""Of checkpoints, and of what was being written when the program was killed."""
+"""Names of checkpoints, and of temporary files left by a killed process."""
 
 
 class Checkpoints:

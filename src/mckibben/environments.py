@@ -44,13 +44,15 @@ FASTEST = 0.3
 """Highest frequency of the commands behind a reference [Hz]."""
 
 SLOWEST = 0.03
-"""Lowest frequency of them, so that an episode sees several turns [Hz]."""
+"""Lowest frequency of the commands behind a reference [Hz], so that an episode has several
+reversals.
+"""
 
 FARTHEST = 5.0
-"""Observations are clipped to this, far beyond what they reach."""
+"""Bound to which observations are clipped, well outside their usual range."""
 
 SPREAD_PARAMETERS = ("muscle.c10", "muscle.friction.contracting", "muscle.friction.extending")
-"""What ``spread`` varies from episode to episode."""
+"""Parameters that ``spread`` varies between episodes."""
 
 
 class Tracking(gymnasium.Env[Vector, Vector]):

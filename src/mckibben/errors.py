@@ -24,7 +24,7 @@ _NAMED = re.compile(r"`(\w+)(\(\)|\[([^`\]]*)\])?(?:=([^`]*))?`")
 """A parameter or an operation in a remedy."""
 
 Parameter = Callable[[str, str | None, str | None], str]
-"""Renders a parameter by its name, the key in it and its value, where there are any."""
+"""Renders a parameter from its name, its key and its value; the latter two may be None."""
 
 
 class MckibbenError(Exception):
@@ -222,6 +222,6 @@ def require(
 def unforeseen(error: Exception) -> MckibbenError:
     """Return what nobody has foreseen, as an error: it is a fault of the program."""
     return MckibbenError(
-        f"this is a fault of the program, not of the data ({type(error).__name__}: {error})",
+        f"internal error, not an error in the data ({type(error).__name__}: {error})",
         remedy="try other settings or another model, and report it",
     )

@@ -44,7 +44,7 @@ def typeset(text: str) -> str:
 
 
 ROUNDING = 1e-9
-"""Share that is rounding, and shown as none."""
+"""Relative size below which a number is shown as 0."""
 
 
 def number(value: float | None, digits: int = 3) -> str:

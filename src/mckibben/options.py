@@ -264,7 +264,7 @@ class ReadOptions:
     ] = None
     zero: Annotated[
         tuple[str, ...],
-        Option("Channel that counts from where the input is lowest; repeatable.", "CHANNEL"),
+        Option("Channel set to 0 where the input is lowest; repeatable.", "CHANNEL"),
     ] = ()
 
     def arguments(self) -> dict[str, Any]:
@@ -307,12 +307,12 @@ class FitOptions:
     target: Annotated[
         Literal["mjcf"] | None,
         Option(
-            "Fit what a format can carry, and compare the error without its limits.", flag="--for"
+            "Fit what an export format supports; report the error without that limit.", flag="--for"
         ),
     ] = None
     settings: Settings = field(default_factory=dict)
     validation: Annotated[
-        tuple[Path, ...], Option("Recording that stops a search; repeatable.", "FILE")
+        tuple[Path, ...], Option("Validation recording for early stopping; repeatable.", "FILE")
     ] = ()
     seed: Seed = 0
 
@@ -340,9 +340,9 @@ class CompareOptions:
         Option("Most samples to fit to: longer recordings are thinned.", "N", "--samples"),
     ] = None
     allow_shared: Annotated[
-        bool, Option("Test on data fitted to, and state so in every result.")
+        bool, Option("Allow test data that were fitted; every result states it.")
     ] = False
-    allow_early: Annotated[bool, Option("Compare although the output moves before its input.")] = (
+    allow_early: Annotated[bool, Option("Compare even if the output moves before its input.")] = (
         False
     )
 
@@ -365,15 +365,15 @@ class StudyOptions(CompareOptions):
 class TrackOptions:
     """Options of `track`: the plant, the controller, and imperfections of the loop."""
 
-    rig: Annotated[Any, Option("Virtual rig to try it on; see rig list.", "NAME|FILE")] = None
+    rig: Annotated[Any, Option("Virtual rig to test it on; see rig list.", "NAME|FILE")] = None
     plant: Annotated[
         Path | Any | None,
-        Option("Model of your own muscle to try it on (JSON); with a band, it scatters.", "MODEL"),
+        Option("Model of your own muscle to test it on (JSON); a band adds scatter.", "MODEL"),
     ] = None
     limits: Annotated[
         Mapping[str, tuple[float | None, ...]],
         Option(
-            "Of the plant, where its model has none, as pressure=0:6; repeatable.",
+            "Limits of the plant, if its model has none, as pressure=0:6; repeatable.",
             "CHANNEL=LOW:HIGH",
             parse=limits,
         ),
@@ -383,15 +383,15 @@ class TrackOptions:
     ] = "feedforward"
     approach: Annotated[float, Option("Time to reach the first reference [s].", "S")] = 20.0
     settle: Annotated[float, Option("Time after that not scored [s].", "S")] = 0.0
-    noise: Annotated[float, Option("Added to what is measured [mm or N].", "X")] = 0.0
-    delay: Annotated[int, Option("Steps by which measurements are late.", "N")] = 0
+    noise: Annotated[float, Option("Standard deviation of measurement noise [mm or N].", "X")] = 0.0
+    delay: Annotated[int, Option("Delay of measurements, in steps.", "N")] = 0
     slew: Annotated[float | None, Option("Fastest pressure change [bar/s].", "X")] = None
     preview: Annotated[
         float | None,
-        Option("Time by which the reference is known ahead [s].  [default: dead time]", "S"),
+        Option("Preview time of the reference [s].  [default: dead time]", "S"),
     ] = None
     pressure_loop: Annotated[
-        bool, Option("Feed measured pressures back inside, as regulators do.")
+        bool, Option("Correct pressures by measured ones, as regulators do.")
     ] = True
     fields: Fields = field(default_factory=dict)
     seed: Seed = 0
@@ -399,7 +399,7 @@ class TrackOptions:
 
 @dataclass(frozen=True)
 class InvertOptions:
-    """Options of `invert`: what the compensator is for, and whether it learns or looks ahead."""
+    """Options of `invert`: purpose of the compensator, adaptation, and prediction."""
 
     wanted: Annotated[
         Literal["input", "force"],
@@ -408,32 +408,34 @@ class InvertOptions:
     ] = "input"  # fmt: skip
     adaptive: Annotated[bool, Option("Learn the model's parameters from measurements.")] = False
     time: Annotated[
-        float | None, Option("Of adaptive: how long it takes to learn [s].  [default: 60]", "S")
+        float | None, Option("With --adaptive: adaptation time [s].  [default: 60]", "S")
     ] = None
     noise: Annotated[
-        float | None, Option("Of adaptive: standard deviation of the measured output.", "X")
+        float | None, Option("With --adaptive: standard deviation of the measured output.", "X")
     ] = None
-    predictive: Annotated[bool, Option("Look ahead, so that limits cost less.")] = False
+    predictive: Annotated[bool, Option("Optimise pressures over a horizon, within limits.")] = False
     horizon: Annotated[
-        int | None, Option("Of predictive: samples it looks ahead.  [default: 20]", "N")
+        int | None, Option("With --predictive: samples of the horizon.  [default: 20]", "N")
     ] = None
     rate_limit: Annotated[
-        float | None, Option("Of predictive: fastest change of a pressure [bar/s].", "X")
+        float | None, Option("With --predictive: fastest change of a pressure [bar/s].", "X")
     ] = None
     pressures: Annotated[
         tuple[float, float] | None,
-        Option("Of predictive: lowest and highest pressure [bar].", "LOW HIGH"),
+        Option("With --predictive: lowest and highest pressure [bar].", "LOW HIGH"),
     ] = None
     total_limit: Annotated[
-        float | None, Option("Of predictive: highest sum of pressures [bar].", "X")
+        float | None, Option("With --predictive: highest sum of pressures [bar].", "X")
     ] = None
     flow_limit: Annotated[
-        float | None, Option("Of predictive: fastest rise of all pressures together [bar/s].", "X")
+        float | None,
+        Option("With --predictive: fastest rise of the sum of pressures [bar/s].", "X"),
     ] = None
     learned: Annotated[
         tuple[Path, ...],
         Option(
-            "Of sdchm: train an inverse network on recordings, as the paper; repeatable.", "FILE"
+            "For sdchm: train an inverse network on recordings, as in the paper; repeatable.",
+            "FILE",
         ),
     ] = ()
     fields: Fields = field(default_factory=dict)
@@ -481,13 +483,13 @@ class PlanOptions:
     ] = None
     model: Annotated[
         Any,
-        Option("Model of the standard errors, to fit, or saved (.json). Default: by the channels.",
+        Option("Model whose standard errors are planned: its name or file (.json).",
                "NAME|FILE"),
     ] = None  # fmt: skip
     minutes: Annotated[float, Option("How long to record.", "X")] = 3.0
     limits: Annotated[
         Mapping[str, tuple[float | None, ...]],
-        Option("Commands, and how fast they change a second; repeatable.",
+        Option("Limits of a command, and its rate per second; repeatable.",
                "CHANNEL=LOW:HIGH[:RATE]", parse=limits),
     ] = field(default_factory=dict)  # fmt: skip
     seed: Seed = 0
@@ -501,11 +503,13 @@ class ExportOptions:
         str | None, Option("Name of functions and files. Default: the file's name.", "NAME")
     ] = None
     sample_time: Annotated[
-        float | None, Option("Time between steps, where it matters.", "SECONDS")
+        float | None, Option("Sample time [s], if the model needs one.", "SECONDS")
     ] = None
     inverse: Annotated[bool, Option("Export the model's inverse.")] = False
     fields: Fields = field(default_factory=dict)
-    force: Annotated[bool, Option("Replace files of yours, too; never what is read.")] = False
+    force: Annotated[bool, Option("Replace files that mckibben did not write, except inputs.")] = (
+        False
+    )
 
 
 @dataclass(frozen=True)
@@ -520,15 +524,19 @@ class COptions(ExportOptions):
     link: Annotated[bool, Option("Add a server that answers over a serial line.")] = False
     limits: Annotated[
         Mapping[str, tuple[float, float]],
-        Option("Of link: limits of a channel; repeatable.", "NAME=LOW:HIGH", "--limit", limits),
+        Option("With --link: limits of a channel; repeatable.", "NAME=LOW:HIGH", "--limit", limits),
     ] = field(default_factory=dict)
     safe: Annotated[
         Mapping[str, float],
-        Option("Of link: an output while no host leads; repeatable.", "NAME=VALUE", parse=number),
+        Option(
+            "With --link: safe value of an output without a host; repeatable.",
+            "NAME=VALUE",
+            parse=number,
+        ),
     ] = field(default_factory=dict)
     watchdog: Annotated[
         float | None,
-        Option("Of link: silence after which outputs are safe [s]. Default: 0.5.", "S"),
+        Option("With --link: silence until outputs take safe values [s]. Default: 0.5.", "S"),
     ] = None
 
 
@@ -554,7 +562,9 @@ class MJCFOptions:
     ] = "hanging"
     lag: Annotated[float, Option("Time constant from command to pressure.", "SECONDS")] = 0.0
     name: Annotated[str | None, Option("Name of the actuator. Default: muscle.", "NAME")] = None
-    force: Annotated[bool, Option("Replace files of yours, too; never what is read.")] = False
+    force: Annotated[bool, Option("Replace files that mckibben did not write, except inputs.")] = (
+        False
+    )
 
 
 @dataclass(frozen=True)

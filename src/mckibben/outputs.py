@@ -23,23 +23,23 @@ from mckibben.system import ordinary
 from mckibben.system.atomic import demand_room, digest, write_json, write_text, written
 
 RUN = "run.json"
-"""Lists the files of the last complete run of a folder."""
+"""File that lists the files of the last complete run in a folder."""
 
 UNFINISHED = "unfinished"
-"""In a folder of results: the files of a run that is not complete, and its checkpoints."""
+"""Folder, in a folder of results, with the files and checkpoints of an incomplete run."""
 
 JOURNAL = "journal.json"
-"""In that folder: what goes where, from when a run is complete until all of it is there."""
+"""File in that folder that lists the moves of a complete run until all are done."""
 
 FORMAT = "mckibben-run"
 
 MAKER = "drawn by mckibben"
-"""In the metadata of figures."""
+"""Creator in the metadata of figures."""
 
 FIGURES = (".png", ".svg", ".pdf")
 
 LARGEST = 2**28
-"""Bytes of a file that is looked at; a larger one counts as the user's."""
+"""Largest file that is inspected [bytes]; a larger one counts as the user's."""
 
 
 def unfinished(folder: Path) -> Path:
@@ -193,7 +193,7 @@ class Results:
             path = _inside(self.folder, name)
             nearest = next(each for each in path.parents if os.path.lexists(each))
             if not nearest.is_dir():
-                problem = "there is a file where a folder will be"
+                problem = "the output folder has the name of a file"
                 raise DataError(
                     problem, file=nearest, remedy="move it away, or give another folder"
                 )
@@ -274,7 +274,7 @@ def results_in(
     lock, existed = place / "lock", folder.exists()
     with written(folder):
         if new.exists() and not lock.exists():  # which stays as long as there is a run to finish
-            problem = "this is in the way of unfinished results, and is not this program's"
+            problem = "it blocks unfinished results, and mckibben did not write it"
             raise DataError(problem, file=new, remedy="move it away, or give another folder")
         place.mkdir(parents=True, exist_ok=True)
         held = FileLock(lock, timeout=0)
@@ -307,7 +307,7 @@ def _finish(folder: Path) -> None:
         journal = json.loads(ordinary.read_text(place, most=ordinary.DESCRIPTION))
         files, removed = list(journal["files"]), dict(journal["removed"])
     except (ValueError, TypeError, KeyError):
-        remedy = "move it away, and look at the files in the folder 'new' beside it"
+        remedy = "move it away, and look at the files in the folder 'new' next to it"
         raise DataError("the journal is damaged", file=place, remedy=remedy) from None
     for name, old in removed.items():
         path = _inside(folder, name)

@@ -375,7 +375,7 @@ class Recording(DrawsItself):
             raise DataError(
                 f"samples {start}:{stop} are not within 0:{self.n_samples}",
                 file=self.source,
-                remedy="cut inside the recording",
+                remedy="give a range inside the recording",
             )
         return replace(
             self,
@@ -427,7 +427,7 @@ def _frozen(name: str, samples: ArrayLike) -> Array:
         values = np.array(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise DataError(
-            f"these are no samples ({error})", channel=name, remedy="give real numbers"
+            f"the samples are not numbers ({error})", channel=name, remedy="give real numbers"
         ) from None
     if values.ndim != 1:
         raise DataError(

@@ -160,7 +160,7 @@ def _residuals(base: Block, estimator: Any, runs: list[Recording]) -> list[Recor
     names = [channel.name for channel in base.outputs]
     if names != [estimator.output]:
         raise ModelError(
-            f"the model gives {', '.join(names)}, and {estimator.output} is fitted",
+            f"the model gives {', '.join(names)}, but {estimator.output} is fitted",
             parameter="residual_of",
             remedy="name a model of the same output, or `output=NAME`",
         )
@@ -342,9 +342,9 @@ def track(
     if not any(drives(channel) or channel.name.startswith(COMMAND) for channel in block.outputs):
         gives = ", ".join(channel.name for channel in block.outputs)
         raise ModelError(
-            f"it gives {gives}, and a compensator gives pressures or commands",
+            f"its outputs are {gives}, but a compensator's are pressures or commands",
             parameter="compensator",
-            remedy="give what `invert()` makes of the model",
+            remedy="give the result of `invert()`",
         )
     (run, *_) = read_files(reference, None, reading)
     wanted = asked(plant, run, block)
@@ -654,7 +654,9 @@ def _serving(chosen: COptions) -> Any:
     if not chosen.link:
         for name in ("limits", "safe", "watchdog"):
             if getattr(chosen, name):
-                raise ModelError("it is of served code", parameter=name, remedy="add `link`")
+                raise ModelError(
+                    "it applies to code with a serial link", parameter=name, remedy="add `link`"
+                )
         return None
     watchdog = 0.5 if chosen.watchdog is None else chosen.watchdog
     return Serving(chosen.limits, chosen.safe, watchdog)

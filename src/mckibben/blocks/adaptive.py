@@ -66,22 +66,23 @@ from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError, require
 
 TRUSTED = 1 / 3
-"""Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
+"""Initial standard deviations of the fitted parameters, relative to those of the expected changes.
+"""
 
 TIMES = 1e-3, 1e9
-"""Shortest and longest time to learn in [s]."""
+"""Shortest and longest adaptation time [s]."""
 NOISES = 1e-9, 1e3
-"""Least and most noise, by the width of what is reached."""
+"""Smallest and largest noise, relative to the reachable range."""
 
 FARTHEST = 1e6
-"""Scales, and variances expected, that no parameter goes beyond."""
+"""Bounds of scales and variances of all parameters."""
 MOST = 1e12
-"""Beyond what memory of an inverse is, and samples are counted."""
+"""Bound of the inverse's state and of sample counts."""
 
 FALSE_ALARMS = 1e-3
-"""An hour, where nothing drifts."""
+"""Expected false alarms per hour without drift."""
 FIT_ERROR = 0.01
-"""Standard error of a fit itself, of every group."""
+"""Assumed standard error of the fit itself, by group."""
 
 
 @plain_dataclass(frozen=True)
@@ -166,8 +167,8 @@ def learning_part(model: Block) -> tuple[tuple[Block, ...], Block, tuple[Block, 
     places = [k for k, part in enumerate(parts) if learnable_of(part) is not None]
     if len(places) != 1:
         raise ModelError(
-            f"{len(places)} parts of {model.title!r} can learn while it runs",
-            remedy="adapt a pi, gpi, mpi, cpi or balance model, of one part that learns",
+            f"{len(places)} parts of {model.title!r} can adapt",
+            remedy="adapt a pi, gpi, mpi, cpi or balance model with one adaptive part",
         )
     return parts[: places[0]], parts[places[0]], parts[places[0] + 1 :]
 
@@ -597,7 +598,7 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
     Parameters
     ----------
     model : Block
-        Of one part that can learn: pi, gpi, mpi, cpi, balance.
+        One with a single adaptive part: pi, gpi, mpi, cpi, balance.
     time : float
         How long it takes to learn what the motion shows [s].
     noise : float, optional
@@ -607,7 +608,7 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive:
     Raises
     ------
     ModelError
-        If nothing of the model can learn, or it has no inverse.
+        If no part of the model can adapt, or it has no inverse.
     """
     if isinstance(model, Adaptive):
         raise ModelError(

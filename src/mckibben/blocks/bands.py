@@ -164,8 +164,8 @@ def check_level(level: float, units: int, unit: str) -> None:
         most, needed = 100 * units / (units + 1), int(np.ceil(level / (1.0 - level) - 1e-9))
         raise ModelError(
             f"a band calibrated on {units} {unit}(s) holds at most {numeral(most, 3)} %, "
-            f"and {numeral(100 * level, 4)} % are asked for",
-            remedy=f"ask for less, or calibrate on at least {needed} {unit}s",
+            f"and {numeral(100 * level, 4)} % are requested",
+            remedy=f"request less, or calibrate on at least {needed} {unit}s",
         )
 
 

@@ -39,18 +39,18 @@ Run = Callable[[], None]
 Start = Callable[..., None]
 
 VIRGIN = {"first_sample": False, "fitted": False, "virgin": True}
-"""Named starts, and whether a start kernel takes them as if nothing had happened before.
-
-"fitted" is "first_sample" where no outputs are known, see `mckibben.blocks.dynamics.starts`."""
+"""Named start states, and whether a start kernel computes them without past inputs. "fitted" is
+"first_sample" where no outputs are known, see `mckibben.blocks.dynamics.starts`.
+"""
 
 SHORT = Repr()
 SHORT.maxother = 100  # characters of a part in the `repr` of a block
 
 Ports = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
-"""Names of fields of channels: driven, scheduling, and given."""
+"""Names of the channel fields: driven, scheduling and output channels."""
 
 SEVERAL: Ports = ("driven",), ("scheduled",), ("given",)
-"""Of blocks of several channels."""
+"""Channel fields of blocks with several channels."""
 
 
 @dataclass(frozen=True)
@@ -80,14 +80,15 @@ class Block(DrawsItself, Parametrised):
     face: ClassVar[str] = "block"
 
     kernel: ClassVar[Step]
-    """Advances one sample, ``kernel(coefficients, state, inputs, outputs)``. One with a parameter
-    ``scratch`` behind the state is given `n_scratch` numbers to compute in."""
+    """Advances one sample, ``kernel(coefficients, state, inputs, outputs)``. A kernel with a
+    parameter ``scratch`` after the state receives `n_scratch` numbers of working memory.
+    """
 
     start_kernel: ClassVar[Start | None] = None
     """Fills the state, ``start_kernel(coefficients, state, first inputs, virgin)``, by a named rule."""
 
     ports: ClassVar[Ports] = ("input",), (), ("output",)
-    """Fields of the channels driven, of those that schedule, and of those given."""
+    """Fields of the driven channels, the scheduling channels and the outputs."""
 
     layout: ClassVar[tuple[str, ...]] = ()
     """Attributes whose numbers the kernel reads, in order; its parameters where none are named."""
@@ -96,43 +97,46 @@ class Block(DrawsItself, Parametrised):
     """Arguments of `example`."""
 
     rate_dependent: ClassVar[bool] = False
-    """Whether the sample time matters to any block of this class."""
+    """Whether the response of blocks of this class depends on the sample time."""
 
     path_dependent: ClassVar[bool] = False
-    """Whether it matters how an input goes from one turning point to the next, as where several
-    muscles find their equilibrium together."""
+    """Whether the path of an input between two turning points matters, as for coupled muscles in
+    equilibrium.
+    """
 
     of_local_rules: ClassVar[bool] = False
-    """Whether it is made of rules that each know a part of the inputs' joint range, so that nothing says
-    what it gives where none was shown any data."""
+    """Whether the model is a set of local rules, whose output is arbitrary in regions of the joint
+    input range without data.
+    """
 
     undoing: ClassVar[bool] = False
-    """Whether blocks of this class undo another, which `forward_model` gives."""
+    """Whether blocks of this class invert another block, see `forward_model`."""
 
     no_inverse: ClassVar[str] = "has no exact inverse"
-    """Why it cannot be undone, if it cannot: behind its kind, as an error."""
+    """Why there is no inverse, if there is none; in the error it follows the kind."""
 
     instead: ClassVar[str] = "invert a hysteresis model (pi, gpi, mpi, cpi)"
-    """What to do then: the remedy of that error."""
+    """The remedy of that error."""
 
     increasing: ClassVar[tuple[str, ...]] = ()
-    """Fields of numbers in increasing order, which single precision must not make one."""
+    """Fields that must be strictly increasing, also after rounding to single precision."""
 
     filters: ClassVar[bool] = False
-    """Whether it is linear with poles of its own, which may be too slow for single precision."""
+    """Whether the block is a linear filter, whose poles may be too slow for single precision."""
 
     settable: ClassVar[Mapping[str, str | None]] = {}
-    """Fields that are not identified and can be set on a saved model: each with the field that has the
-    lowest and highest value it was identified at, or None; see `mckibben.blocks.setting`."""
+    """Fields that are not identified and can be set on a saved model: each with the field of the
+    lowest and highest value in its identification, or None; see `mckibben.blocks.setting`.
+    """
 
     sample_time: float | None = None
-    """Time between samples that a discrete block is bound to [s]; None for any."""
+    """Sample time of a discrete block [s]; None if it has no fixed one."""
 
     samples_ahead: int = 0
-    """By how many samples it wants references before they are due, to plan with."""
+    """Preview of the reference that the block needs [samples]."""
 
     dead_time: float = 0.0
-    """By how long outputs come late, which its inverse leaves as it is [s]."""
+    """Delay of the outputs [s], which the inverse does not compensate."""
 
     @property
     def title(self) -> str:
@@ -191,7 +195,7 @@ class Block(DrawsItself, Parametrised):
             if not names or len(set(names)) < len(names):
                 raise ModelError(
                     f"channels of {self.kind!r} are: {', '.join(names) or 'none'}",
-                    remedy="give each a name of its own",
+                    remedy="give each a different name",
                 )
 
     @property
@@ -431,7 +435,8 @@ class Block(DrawsItself, Parametrised):
             array = np.asarray(data, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise DataError(
-                f"these are no inputs ({error})", remedy="give a recording or an array of numbers"
+                f"the inputs cannot be used ({error})",
+                remedy="give a recording or an array of numbers",
             ) from None
         outputs = self._run(self._inputs_from_array(array), sample_time, initial)
         return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs

@@ -22,7 +22,9 @@ from mckibben.errors import ModelError
 from mckibben.system.compiling import Deferred, deferred
 
 STEP = 1e-200
-"""h. Slopes up to 1e150 and down to 1e-100 are numbers with it, and its square is 0."""
+"""Complex step h: derivatives from 1e-100 to 1e150 are representable, and its square underflows to
+0.
+"""
 
 
 @deferred
@@ -126,13 +128,13 @@ HELPERS: dict[str, Callable[..., Any]] = {
     "tan": _carried("tan", lambda _, value: 1.0 + value * value),
     "tanh": _carried("tanh", lambda _, value: 1.0 - value * value),
 }
-"""What stands in twins for functions of the kernel language, and, ``over``, for division."""
+"""Complex-step replacements of functions of the kernel language, and ``over`` for division."""
 
 BY_REAL_PART = ("ceil", "floor", "trunc", "isfinite", "isinf", "isnan")
-"""Functions of ``math`` that are constant, step by step."""
+"""Piecewise constant functions of ``math``, evaluated on real parts."""
 
 PREFIX = "_twin_"
-"""Before the names of helpers."""
+"""Prefix of the helpers' names."""
 
 
 class _Rewriting(ast.NodeTransformer):

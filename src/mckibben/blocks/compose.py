@@ -28,10 +28,10 @@ from mckibben.registry import load
 from mckibben.system.compiling import in_turn
 
 DEEPEST, MOST_BLOCKS = 32, 1000
-"""Compositions in compositions, and blocks in all."""
+"""Maximum depth of nested compositions, and maximum number of blocks."""
 
 AT_REST = ("first_sample", "fitted")
-"""Rules by which a block starts at rest at its first input, where no output is known."""
+"""Start rules by which a block is at rest at its first input if no output is known."""
 
 
 @plain_dataclass
@@ -253,8 +253,8 @@ class Series(Composition):
             if len(before.outputs) != driven:
                 raise ModelError(
                     f"{before.kind!r} gives {len(before.outputs)} output(s), "
-                    f"{after.kind!r} behind it wants {driven}",
-                    remedy="connect blocks that fit",
+                    f"{after.kind!r} after it takes {driven}",
+                    remedy="connect blocks with matching channels",
                 )
 
     @cached_property  # asked for at every level of a nested model

@@ -152,7 +152,7 @@ def written(part: Parametrised, title: str = "", units: Units | None = None) -> 
         if isinstance(value, Parametrised)
     ]
     numbers = (*part.worked(), *_channels(part), *_numbers(part, units))
-    remark = f"More than {MANY} numbers are not written out: the model file holds them."
+    remark = f"More than {MANY} numbers are not listed here; see the model file."
     large = any(r"\mathbb{R}" in line for line in numbers)
     equations = part.equations()
     return Written(title or _title(part), equations, numbers, remark * large, tuple(inner))

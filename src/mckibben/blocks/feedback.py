@@ -30,10 +30,10 @@ from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 MEASURED = "_measured"
-"""What the name of a reference ends with where it is measured."""
+"""Suffix of the name of a measured channel."""
 
 BASE = "_base"
-"""What the name of a command ends with that feedback is added to."""
+"""Suffix of the name of the command that feedback is added to."""
 
 
 @step

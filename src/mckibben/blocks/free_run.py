@@ -18,13 +18,15 @@ from mckibben.recording import Recording
 Mask = NDArray[np.bool_]
 
 PERIODIC = "periodic"
-"""In the ``meta`` of a recording that is one period of a motion which repeats itself."""
+"""Key in the ``meta`` of a recording that is one period of a periodic motion."""
 
 AWAY = 1e3
-"""Ranges of the measured output by which a model that is off has run away."""
+"""Error, in ranges of the measured output, above which a model has diverged."""
 
 SETTLING = 256
-"""Samples for which the first input is held after the peak before it, so that rates die away."""
+"""Number of samples for which the first input is held after the preceding peak, so that rates
+decay.
+"""
 
 
 def run_free(

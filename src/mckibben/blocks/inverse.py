@@ -27,10 +27,11 @@ if TYPE_CHECKING:
     from mckibben.blocks.learning import Learnable
 
 USUAL_TRIALS, MOST_TRIALS = 12, 600
-"""In a step of an inverse that is solved for: on smooth references, and at worst."""
+"""Trials per step of an inverse without a closed form: typical on smooth references, and maximum.
+"""
 
 COMMANDS = ("pressure", "voltage")
-"""How channels that drive a muscle are called."""
+"""Names of channels that drive a muscle."""
 
 
 @kernel
@@ -54,16 +55,16 @@ class Invertible(Block):
     """Fills the inverse's state, as `start_kernel` fills the block's."""
 
     inverse_path_dependent: ClassVar[bool] = False
-    """Whether it matters how a reference goes from one turning point to the next."""
+    """Whether the path of a reference between two turning points matters."""
 
     inverse_remembers: ClassVar[Literal["input", "output"] | None] = None
-    """What the inverse knows of the last sample beside this block's state."""
+    """What the inverse stores of the last sample in addition to this block's state."""
 
     counts_clipped: ClassVar[bool] = True
-    """Whether the last of the inverse's state counts the samples that `inverse_complaint` is about."""
+    """Whether the last number of the inverse's state counts the samples of `inverse_complaint`."""
 
     solved: ClassVar[bool] = False
-    """Whether the inverse is solved for by trials in every sample, having no closed form."""
+    """Whether the inverse is solved iteratively in every sample, having no closed form."""
 
     def inverse(self) -> Block:
         """Return the block that undoes this one; refused where `check_invertible` does."""

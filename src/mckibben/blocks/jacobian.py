@@ -31,13 +31,13 @@ from mckibben.system.threads import cores
 Complex = NDArray[np.complex128]
 
 CHANGES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
-"""Of a parameter, relative, between the places of a central difference of its coefficients."""
+"""Relative steps of a parameter in the central difference of its coefficients."""
 
 AGREEING = 1e-11
 """Relative difference of derivatives of coefficients that is rounding."""
 
 WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
-"""Of such a difference of eighth order, from the nearest places on."""
+"""Weights of the eighth-order central difference, nearest points first."""
 
 
 def _laid_out(block: Block) -> Layout:

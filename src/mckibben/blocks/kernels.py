@@ -19,18 +19,19 @@ from mckibben.system.compiling import deferred
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 SUMS = {"reassoc", "contract"}
-"""Freedom of the compiler in weighted sums."""
+"""Fast-math flags of the compiler in weighted sums."""
 
 
 ROUNDING, BRACKET, SLACK = 1e-12, 1e-15, 1e-9
-"""Relative differences: of rounding, of closed brackets, and by which limits may be passed."""
+"""Relative tolerances: rounding, width of a closed bracket, and violation of limits."""
 
 NOTHING = 1e-300
-"""Weights below do not count."""
+"""Weight below which an operator is ignored."""
 
 SINGLE = {"ROUNDING": 1e-6, "BRACKET": 1e-7, "SLACK": 1e-4, "NOTHING": 1e-37}
-"""What constants are in single precision, where they are of double precision in Python. A module with
-constants of its own of this kind has a table of its own."""
+"""Constants with a different value in single precision. A module with such constants of its own has
+its own table.
+"""
 
 
 def kernel(function: Function) -> Function:
@@ -86,8 +87,9 @@ def fill(to: Array, numbers: Array) -> None:
 
 
 DERIVED = False
-"""Whether derivatives are taken: true in the twins of `mckibben.blocks.complex_step` alone. What
-``if DERIVED:`` guards is neither compiled nor translated to C."""
+"""Whether derivatives are taken: true only in the complex-step versions of
+`mckibben.blocks.complex_step`. Code under ``if DERIVED:`` is neither compiled nor translated to C.
+"""
 
 
 @inlined

@@ -23,10 +23,10 @@ from mckibben.recording import Recording, standard_unit
 from mckibben.registry import load, names
 
 DEFAULT_LIMITS = (0.0, 5.0)
-"""Inputs to try where a block names no input range of its own."""
+"""Test inputs of a block without an input range."""
 
 MARGIN = 0.02
-"""Share of a range left out at both ends, so that rounding does not decide what is reachable."""
+"""Share of a range excluded at both ends, so that rounding does not decide what is reachable."""
 
 EXACT = 1e-9
 """Largest error of an inverse, relative to the range of the output."""
@@ -192,8 +192,8 @@ def _sizes_agree(trial: Trial) -> None:
     block, packed = trial.block, trial.block.pack()
     state = block.initial_state(trial.inputs[0])
     sized = packed.shape == (block.n_parameters,)
-    trial.demand(sized, "pack gives n_parameters numbers in one vector")
-    trial.demand(state.shape == (block.n_states,), "initial_state gives n_states numbers")
+    trial.demand(sized, "pack returns n_parameters numbers in one vector")
+    trial.demand(state.shape == (block.n_states,), "initial_state returns n_states numbers")
     trial.demand(block.unpack(packed) == block, "unpack(pack()) equals the block")
     trial.refused(ModelError, "", block.unpack, np.append(packed, 0.0))
     if block.n_states:
@@ -209,11 +209,11 @@ def _simulates(trial: Trial) -> None:
     kept = list(state)
     outputs = trial.run(given, state)
     shape = (len(given), len(trial.block.outputs))
-    trial.demand(trial.outputs.shape == shape, "simulate gives one column to every output")
+    trial.demand(trial.outputs.shape == shape, "simulate returns one column per output")
     trial.demand(bool(np.isfinite(trial.outputs).all()), "outputs are finite")
-    trial.demand(np.array_equal(given, trial.inputs), "simulate leaves its inputs alone")
-    trial.demand(state == kept, "simulate leaves the state it is given alone")
-    law = "simulating again, from the state that initial_state gives, gives the same"
+    trial.demand(np.array_equal(given, trial.inputs), "simulate does not change its inputs")
+    trial.demand(state == kept, "simulate does not change its initial state")
+    law = "simulating again, from the state of initial_state, returns the same"
     trial.same(outputs, trial.outputs, law)
 
 
@@ -248,7 +248,7 @@ def _saves(trial: Trial) -> None:
     copy = saving.from_dict(content)
     trial.demand(copy == trial.block, "a saved and loaded copy equals the block")
     trial.demand(copy.to_dict() == trial.block.to_dict(), "a copy saves as the block does")
-    trial.same(trial.run(trial.inputs, block=copy), trial.outputs, "a copy gives the same")
+    trial.same(trial.run(trial.inputs, block=copy), trial.outputs, "a copy simulates the same")
     trial.refused(ModelError, "surplus", saving.from_dict, {**content, "surplus": 1})
 
 
@@ -258,9 +258,9 @@ def _takes_recordings(trial: Trial) -> None:
     columns = dict(zip(units, trial.inputs.T, strict=True))
     modelled = block.simulate(Recording(columns, trial.sample_time, units))
     for index, channel in enumerate(block.outputs):
-        law = "a recording gives the outputs that an array gives"
+        law = "a recording and an array have the same outputs"
         trial.same(modelled[channel.name], trial.outputs[:, index], law)
-        trial.demand(modelled.units[channel.name] == channel.unit, "outputs carry their units")
+        trial.demand(modelled.units[channel.name] == channel.unit, "outputs have their units")
     half = len(trial.inputs) // 2
     first = {name: samples[:half] for name, samples in columns.items()}
     state = block.final_state(Recording(first, trial.sample_time, units))
@@ -295,7 +295,7 @@ def _knows_its_time(trial: Trial) -> None:
         return
     for sample_time in (None, 7.0):
         outputs = block.simulate(trial.inputs, sample_time=sample_time)
-        law = "a rate-independent block at any sample time gives the same"
+        law = "a rate-independent block returns the same at any sample time"
         trial.same(outputs, trial.outputs, law)
     for moving in range(trial.inputs.shape[1]):
         path = np.tile(trial.inputs[0], (len(trial.inputs), 1))
@@ -323,8 +323,8 @@ def _inverts(trial: Trial) -> None:
         return
     swapped = (*block.outputs, *block.inputs[trial.n_driven :])
     driven = block.inputs[: trial.n_driven]
-    trial.demand(inverse.inputs == swapped, "an inverse takes the outputs, then what schedules")
-    trial.demand(inverse.outputs == driven, "an inverse gives the driven inputs")
+    trial.demand(inverse.inputs == swapped, "an inverse takes the outputs, then scheduling inputs")
+    trial.demand(inverse.outputs == driven, "an inverse returns the driven inputs")
     again = trial.run(trial.inputs, block=inverse.inverse())
     trial.agree(again, trial.outputs, 1e-12, "the inverse of the inverse is the block")
     _tracks(trial, inverse, trial.outputs)
@@ -346,9 +346,7 @@ def _tracks(trial: Trial, inverse: Block, references: Array) -> None:
     given = np.column_stack([trial.run(wanted, block=inverse), scheduling])
     late = _late(trial, inverse)
     due = references[: n - late]
-    law = (
-        "forward of inverse gives the reference, after the dead time, to 1e-9 of the output's range"
-    )
+    law = "forward of inverse returns the reference, after the dead time, to 1e-9 of the output's range"
     trial.agree(trial.run(given)[late:], due, EXACT, law)
     half = n // 2
     forward_state = _state_after(trial.block, given[:half], trial.sample_time)
@@ -401,4 +399,4 @@ LAWS: tuple[Callable[[Trial], None], ...] = (
     _knows_its_time,
     _inverts,
 )
-"""Each raises a `ContractError` where it is broken."""
+"""Contract checks; each raises a `ContractError` on violation."""

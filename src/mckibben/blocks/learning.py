@@ -109,36 +109,40 @@ class Learnable:
 
 
 SENSES = 12
-"""How many numbers are remembered of a sensor: whether it was read, usual error, surprise, last
-measured, what was predicted when that changed, product and square of errors, last error, ignored,
-square of the scatter that the covariance stands by, what the fit lacks times what is made up for, and
-the square of that."""
+"""Number of stored values per sensor: whether it was read, usual error, surprise, last measurement,
+the prediction when that changed, product and square of errors, last error, whether ignored, squared
+scatter of the covariance, product of misfit and correction, and square of the correction.
+"""
 
 READY, USUAL, SURPRISE, LAST, THEN, RELATED, SQUARED, BEFORE, IGNORED, STOOD = range(10)
 HELPED, APART = 10, 11
 
 GATE = 3.0
-"""Usual errors beyond which an error teaches no more."""
+"""Innovation, in usual errors, above which a measurement is rejected."""
 QUARTILE = 0.6745
-"""Median of the sizes of errors of unit variance."""
+"""Median absolute error of a unit-variance normal distribution."""
 SINGLE = {"ABSURD": 1e-6, "STILL": 1e-9, "UNMOVED": 1e-12}
-"""Here the same in single precision."""
+"""Constants with a different value in single precision."""
 NEAR = 0.1
-"""How near to it an error counts for less: single precision is to go the same way."""
+"""Width of the transition at the gate, so that single and double precision decide alike."""
 ABSURD = 1e-6
-"""Weight of an error too large to be one."""
+"""Weight of an error too large to be plausible."""
 ALIKE, MOST_ALIKE = 0.98, 0.9995
-"""Correlation of errors that follow one another: until it is known, and at most."""
+"""Correlation of successive errors: initial value, and maximum."""
 LARGEST = 1e9
-"""Usual error, by the noise."""
+"""Largest usual error, relative to the noise."""
 NEVER = 1e30
-"""What no output is."""
+"""Value that no output takes."""
 STILL, UNMOVED = 1e-9, 1e-12
-"""What is added to what is known, and squares of slopes by the noise, below which nothing changes."""
+"""Smallest information, and squared slope relative to the noise, below which parameters do not
+change.
+"""
 LATE = 3.0
-"""Of errors that what is used goes by: those of a third of the time."""
+"""Recent errors are averaged over the adaptation time divided by this."""
 SURPRISED = 5.0
-"""Mean square of errors, cut at the gate, by the usual one, beyond which all is learnt afresh."""
+"""Mean squared error (clipped at the gate), relative to the usual one, above which adaptation
+restarts.
+"""
 
 
 @kernel
@@ -414,7 +418,7 @@ def start_learning(c: Array, learnt: Array) -> None:
 # -- of weighted sums of play operators ---------------------------------------------------------------
 
 LEAST = 0.1
-"""Share of a fitted partial sum of weights that is left, whatever is measured."""
+"""Smallest share of a fitted partial sum of weights that adaptation leaves."""
 
 GROUPS = (
     Group("gain", "higher (softer springs, or more area)", "lower (stiffer springs, or less area)"),

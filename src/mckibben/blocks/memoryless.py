@@ -328,7 +328,7 @@ class Polynomial(Invertible):
 # -- logarithm and exponential ---------------------------------------------------------------
 
 FLOOR = 0.05
-"""Of u + offset, where the logarithm turns into its tangent."""
+"""Value of u + offset below which the logarithm is continued by its tangent."""
 
 
 @step
@@ -406,13 +406,13 @@ class Exponential(Raised):
 # -- contact ---------------------------------------------------------------------------------
 
 LOST = 0.95
-"""Share of the smallest pressures that does not act; with the rest, every output has one input."""
+"""Share of the smallest pressures without effect; keeps the map invertible."""
 
 MOST_STEPS = 60
-"""Of Newton's method, which comes from above and needs four to eight."""
+"""Maximum number of Newton steps; four to eight are needed."""
 
 SETTLED = 1e-16
-"""Relative step below which it has come."""
+"""Relative step at which Newton's method has converged."""
 
 SINGLE = {"SETTLED": 1e-7}
 

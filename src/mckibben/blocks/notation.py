@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from mckibben.blocks.fields import Channel
 
 FEW = 8
-"""Numbers of a vector that are written in one line; more stand in a table."""
+"""Longest vector that is written in one line; longer ones are tables."""
 
 MANY = 30
-"""Numbers above which only their shape is written."""
+"""Number of entries above which only the shape is written."""
 
 
 class Symbol(NamedTuple):

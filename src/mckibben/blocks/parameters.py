@@ -23,7 +23,7 @@ Made = TypeVar("Made")
 
 UNCOMPUTABLE = (ArithmeticError, np.linalg.LinAlgError)
 COMPUTING = {"coefficients", "initial_state", "inverse", "passes", "reachable"}
-"""Methods in which numbers may be too large or too small to compute with, as where one is made."""
+"""Methods in which numbers may overflow or underflow, such as constructors."""
 
 
 def _computing(method: Callable[..., Any]) -> Callable[..., Any]:
@@ -42,7 +42,7 @@ def _computing(method: Callable[..., Any]) -> Callable[..., Any]:
 def _beyond_sense(cls: type, error: Exception) -> ModelError:
     return ModelError(
         f"the numbers of {getattr(cls, 'kind', cls.__name__)!r} cannot be computed with ({error})",
-        remedy="identify the model again; numbers so large or small mean nothing",
+        remedy="identify the model again; values of this size are not meaningful",
     )
 
 

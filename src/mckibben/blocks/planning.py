@@ -25,19 +25,20 @@ from mckibben.arrays import Array
 from mckibben.blocks.kernels import SLACK, fill, kernel
 
 MOST_STEPS = 30
-"""Of the interior-point method; it takes about ten."""
+"""Maximum number of steps of the interior-point method; it needs about ten."""
 
 CLOSED = 1e-11
-"""Gap between primal and dual, over the mean squared slope [bar^2], that counts as none."""
+"""Duality gap, relative to the mean squared slope, that counts as zero [bar^2]."""
 
 STAYS, FLAT = 1e-9, 1e-30
-"""Weight of staying where no slope pulls, and mean squared slope below which there is none."""
+"""Weight on constant pressure where the slope is zero, and mean squared slope that counts as zero.
+"""
 
 STAYING = 1e-6
-"""The same of one muscle: share of the mean squared slope by which pressures stay."""
+"""The same for one muscle: weight on constant pressure, relative to the mean squared slope."""
 
 ROOM = 0.3
-"""Least room that limits are given at the start [bar], and their price."""
+"""Initial slack of the limits [bar], and its cost."""
 
 SINGLE = {"CLOSED": 1e-7, "STAYS": 1e-6, "FLAT": 1e-30, "STAYING": 1e-6}
 

@@ -45,19 +45,19 @@ from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 NUDGE = 1e-3
-"""Of the pressure range: by how much pressures are moved to see the model's slope."""
+"""Step of pressure for slopes of the model, relative to the pressure range."""
 
 MOST = 1e6
-"""Of limits: bar, or bar/s."""
+"""Largest limit [bar or bar/s]."""
 
 HEAD = 8
-"""Coefficients before the nudges."""
+"""Number of coefficients before the pressure steps."""
 
 PASSES = 2
-"""Times that a plan is made, each along what the model makes of the one before."""
+"""Number of optimisations per sample, each linearised about the result of the last."""
 
 STILL = 0.1
-"""By the nudge: what moves less counts as going on as before."""
+"""Motion, relative to the pressure step, that counts as unchanged."""
 
 Limit = Annotated[FiniteFloat, Gt(0), Le(MOST)]
 
@@ -84,7 +84,7 @@ def model_state(compensator: Block, state: Array) -> Array:
     if isinstance(compensator, Balance) or compensator.n_states == 0:
         return state.copy()
     raise ModelError(
-        f"{compensator.title!r} is no exact inverse whose memory could be foreseen",
+        f"{compensator.title!r} is not an exact inverse, so its state cannot be predicted",
         remedy="invert a model such as pi, gpi, mpi or balance with `invert()`, and give that",
     )
 
@@ -413,7 +413,7 @@ class Predictive(Block):
             )
         if self.total_limit is not None and self.total_limit <= low.sum():
             raise ModelError(
-                f"all pressures at their lowest come to {low.sum():g} bar, but "
+                f"all pressures at their lowest add up to {low.sum():g} bar, but "
                 f"total_limit is {self.total_limit:g}",
                 remedy="give a higher one",
             )
@@ -506,7 +506,7 @@ class Predictive(Block):
     def coefficients(self, sample_time: float | None) -> Array:
         if self._kernels is None:
             raise ModelError(
-                f"{self.compensator.title!r} cannot be run ahead in C",
+                f"{self.compensator.title!r} cannot be simulated ahead in C",
                 remedy="export pi, gpi or balance that starts at its first sample, or "
                 "stream this one from Python",
             )

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FORMAT = "mckibben-model"
 VERSION = 1
 LARGEST_FILE = 64 * 2**20
-"""Bytes; a longer file is refused before it is parsed."""
+"""Largest model file [bytes]; a larger one is refused before parsing."""
 
 
 def to_dict(block: Block) -> dict[str, Any]:
@@ -141,5 +141,5 @@ def _refuse(constant: str) -> None:
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content = dict(pairs)
     if len(content) < len(pairs):
-        raise ModelError("a field stands twice in the file", remedy="save the model again")
+        raise ModelError("a field occurs twice in the file", remedy="save the model again")
     return content

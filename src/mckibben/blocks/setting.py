@@ -12,7 +12,7 @@ from mckibben.errors import ModelError, ModelWarning
 from mckibben.numerals import numeral
 
 BEYOND = 0.05
-"""Share by which a value may lie beyond those that the model was identified at."""
+"""Share by which a value may exceed the range of the identification without a warning."""
 
 
 def settable(model: Block) -> dict[str, Any]:

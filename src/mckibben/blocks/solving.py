@@ -28,7 +28,7 @@ from mckibben.blocks.kernels import (
 )
 
 MOST_STEPS = 200
-"""Of bisection, of closing the bracket, and of the walk each way: far more than they take."""
+"""Maximum number of steps of bisection, of closing the bracket, and of each bracketing search."""
 
 
 @inlined
@@ -196,7 +196,7 @@ def solved_start(trial: Callable[..., float], start: Start, behind: int = 2) -> 
 
 
 USUAL_NEWTON, MOST_NEWTON = 3, 60
-"""Steps of Newton's method, on smooth references and at worst."""
+"""Steps of Newton's method: typical on smooth references, and maximum."""
 
 
 def newton_cost(step: int) -> Cost:

@@ -13,12 +13,12 @@ from mckibben.errors import MckibbenError, in_terms_of
 from mckibben.system.atomic import to_json
 
 INTERRUPTED = 130
-"""Exit code of a command that was stopped."""
+"""Exit code of an interrupted command."""
 
 _UNSEEN = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )
-"""What a terminal would obey instead of showing it, and halves of characters."""
+"""Control characters and surrogates, which are not printed."""
 
 
 class InterruptionError(MckibbenError):

@@ -38,10 +38,11 @@ COMMANDS = (
     *("track", "plan", "plot", "reproduce", "measured", "info", "link", "example", "export"),
     *("rig", "muscles", "app"),
 )
-"""Each is a module of `mckibben.cli.commands`, with a command of its name, and its help as docstring."""
+"""Commands: each is a module of `mckibben.cli.commands` of its name, whose docstring is its help.
+"""
 
 _flags: dict[str, str] = {}
-"""Of the command that runs: its flags by the names of their parameters."""
+"""Flags of the running command, by parameter name."""
 
 
 class Command(click.Command):
@@ -81,7 +82,7 @@ Files = Annotated[
 Test = Annotated[tuple[Path, ...], Option("Recording to test on; repeatable.", "FILE")]
 ModelFile = Annotated[Path, Argument("MODEL", "Saved model (JSON).")]
 Quick = Annotated[bool, Option("Models that take seconds; same as --models quick.")]
-Force = Annotated[bool, Option("Replace files of yours, too; never what is read.")]
+Force = Annotated[bool, Option("Replace files that mckibben did not write, except inputs.")]
 Json = Annotated[bool, Option("Print the result as JSON on standard output.", flag="--json")]
 
 

@@ -110,7 +110,7 @@ def how_to_go_on(folder: Path | None) -> str:
     place = folder / UNFINISHED
     if not any(place.rglob("*.*")):
         return "Stopped before anything was finished."
-    return f"Stopped; the same command goes on from what is in {place}."
+    return f"Stopped; the same command resumes from {place}."
 
 
 def stop_short(board: Leaderboard, folder: Path | None) -> None:

@@ -14,7 +14,7 @@ from mckibben.estimators.coupled.base import loads_among, schedules
 from mckibben.recording import Recording
 
 Names = str | Sequence[str] | None
-"""One channel, several, or None for what the recordings' names say."""
+"""One channel, several, or None to choose by the recordings' names."""
 
 DRIVING = ("pressure", "voltage", "command", "input", "u", "p")
 """Names of inputs, those nearest to the muscle first."""
@@ -23,28 +23,31 @@ ALONG, TURNED = ("displacement", "length", "contraction", "position"), ("angle",
 """Names of translations and of rotations."""
 
 COORDINATES = "[xyz]"
-"""Of one place; each is an output of its own."""
+"""Coordinates of a position; each is a separate output."""
 
 MOVED = (*ALONG, *TURNED, "output", COORDINATES)
 """Names of outputs."""
 
 UNITS_DRIVING, UNITS_MOVED = ("bar", "V"), ("mm", "rad")
-"""Units of either, where names are not recognised."""
+"""Units of inputs and of outputs, for names that are not recognised."""
 
 PLACES = "[a-z]|left|right|top|bottom|upper|lower|front|back|rear|flexor|extensor"
-"""Endings that distinguish channels of one quantity, where numbers do not."""
+"""Suffixes other than numbers that distinguish channels of one quantity."""
 
 DESIRED = ("reference_", "command_")
-"""Beginnings of names of what a loop is given: these are no measurements."""
+"""Prefixes of references of a loop, which are not measurements."""
 
 FORCE, PRESSURE, OF_FORCE = "force", "pressure", ("length", "displacement")
-"""Force laws are of the first of these that there is, beside the pressure."""
+"""Channels of force laws: the first of these that is present, with the pressure."""
 
 HELD = 0.01
-"""Share of its largest value by which a length must vary for a force to be learned of it."""
+"""Smallest variation of a length, relative to its largest value, for which a force law is fitted.
+"""
 
 STEADY = 0.05
-"""Largest variation within a run, over that of all runs, of a load that is a level of each run."""
+"""Largest variation of a load within a run, relative to that over all runs, for which it counts as
+constant in the run.
+"""
 
 Sides = tuple[tuple[str, ...], tuple[str, ...]]
 """Inputs and outputs."""
@@ -145,7 +148,7 @@ def channels_of(
         raise DataError(
             "the channel is named twice among inputs, outputs and load",
             channel=twice[0],
-            remedy="a model is not given what it predicts: name each channel once",
+            remedy="an output cannot also be an input: name each channel once",
         )
     for name in told:
         for recording in recordings:

@@ -15,13 +15,13 @@ CONSTANT = "constant"
 """Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
 
 CAUTION = 2.0
-"""Factor on the error of a model that is good only near its training data, where models are sorted."""
+"""Factor on the ranking error of a model that is reliable only near its training data."""
 
 USEFUL = 0.9
-"""Share of the constant's error on the test from which on a model is of no use."""
+"""Test error, relative to that of the constant, above which no model is recommended."""
 
 Against = Literal["validation", "test"]
-"""Where the constant is not beaten, so that no model is recommended."""
+"""The data on which no model is clearly better than the constant, so that none is recommended."""
 
 
 class Ranked(Protocol):

@@ -29,13 +29,15 @@ from mckibben.system.threads import cores
 from mckibben.system.workers import Outcome
 
 TIMED_SAMPLES = 20_000
-"""Of the simulation that the time of a step is measured by."""
+"""Number of samples of the simulation that measures the time of a step."""
 
 WORTH_A_PROCESS = 4.0
-"""Seconds of work below which starting processes takes longer than it saves."""
+"""Seconds of work below which starting processes costs more time than it saves."""
 
 PIECES = 8
-"""Consecutive pieces of a held-out recording that squared errors are summed over, to be resampled."""
+"""Number of consecutive pieces of a held-out recording whose squared errors are summed, for
+resampling.
+"""
 
 
 @dataclass(frozen=True)
@@ -301,7 +303,7 @@ def row_of(data: Data, name: str, found: FitResult, constant: Array | None, seed
             if constant is not None:
                 skill, least = skill_of(squares.sum(axis=1), constant.sum(axis=1), seed)
         else:
-            invalid = "its outputs ran away on a part of the data that it was not fitted to"
+            invalid = "its outputs diverged on data that it was not fitted to"
     return Row(
         model=name,
         n_parameters=found.diagnostics.get("n_free", len(names)),

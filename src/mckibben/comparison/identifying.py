@@ -85,14 +85,14 @@ def identify(
     Raises
     ------
     ModelError
-        On an unknown family, a family without usual orders where none are given, or where every
+        On an unknown family, a family without default orders if none are given, or where every
         combination fails.
     """
     estimator_class = registry.load("estimators", family)
     grid = orders or estimator_class.param_grid
     if not grid:
         raise ModelError(
-            f"there are no usual orders of {family!r}",
+            f"{family!r} has no default orders",
             remedy="give orders, settings with the values to try",
         )
     runs = listed(recordings)

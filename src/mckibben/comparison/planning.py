@@ -27,7 +27,7 @@ from mckibben.signals import made_manageable
 Settings = Mapping[str, Mapping[str, Any]]
 
 N_FOLDS = 4
-"""Parts of the cross-validation."""
+"""Number of folds of the cross-validation."""
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ from mckibben.system.workers import checked
 Watch = Callable[[str, float, float], None]
 
 SURE = 0.1
-"""Share of the work after which the time left is estimated by the pace so far."""
+"""Share of the work after which the remaining time is extrapolated from the progress so far."""
 
 
 @dataclass(frozen=True)

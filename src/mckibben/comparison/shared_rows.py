@@ -20,16 +20,18 @@ from mckibben.errors import DataError, DataWarning
 from mckibben.recording import Recording
 
 WINDOW = 64
-"""Movements of the output in a row that must agree; of short recordings, half of theirs."""
+"""Number of consecutive output changes that must agree; half of that of short recordings."""
 
 FEWEST = 8
-"""Movements below which recordings are not compared."""
+"""Number of output changes below which recordings are not compared."""
 
 ROUNDING = 2e-4
-"""What values are rounded to, as a share of a channel's largest magnitude in all recordings."""
+"""Rounding of values, relative to the largest magnitude of a channel over all recordings."""
 
 GRAVE = 0.05
-"""Share of the windows of the recording that has fewer from which two recordings share data."""
+"""Share of equal windows, in the recording with fewer of them, above which two recordings share
+data.
+"""
 
 _WEIGHTS = np.random.default_rng(0).integers(2**64, size=1024, dtype=np.uint64)  # any will do
 
@@ -124,7 +126,7 @@ def check_shared(
             remedy = f"{again}, or {remedy}"
         if allow is not None:
             remedy += (
-                "; to go on all the same (runs of a sensor with few levels may agree and be two), give "
+                "; or, if the runs are distinct (a coarse sensor may read the same in both), give "
                 "`allow_shared`: every result states it"
             )
         raise DataError(sentences[0], file=listed[found[0].second][1].source, remedy=remedy)
@@ -167,7 +169,7 @@ def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
     verb = {"validate": "validated", "calibrate": "calibrated"}.get(other_role, "tested")
     what = f"{verb} on data that it was {'fitted to' if role == 'fit' else 'chosen by'}"
     if role == other_role:
-        what = f"the same samples would count twice to {role}"
+        what = f"the same samples would be used twice to {role}"
     return (
         f"{what}: {start:.6g} to {stop:.6g} {unit} after the start of {names[1]} are those of "
         f"{names[0]} from {shared.begins - one.start_time:.6g} {unit} on, {100 * shared.share:.0f} % of "

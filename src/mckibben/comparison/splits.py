@@ -17,25 +17,27 @@ from mckibben.recording import Recording
 from mckibben.signals import reversals, split_cycles
 
 FEWEST = 10
-"""Samples in either part of a split."""
+"""Smallest number of samples on either side of a split."""
 
 HELD_OUT = 0.25
-"""Share of the input's travel that is held out where nothing else says what."""
+"""Share of the input's travel that is held out by default."""
 
 EVERY = 3
-"""Of the runs of several muscles, or of a muscle under loads, each so-manieth is held out."""
+"""Every how many runs one is held out, for several muscles or varying loads."""
 
 ENOUGH = 12
-"""Fewest runs of which a third can be held out in turn."""
+"""Smallest number of runs of which a third can be held out."""
 
 PIECES = 4
-"""Of a part that has pieces from all over a recording."""
+"""Number of pieces, spread over a recording, of a part."""
 
 HARDLY = 0.2
-"""Standard deviation of an output in a part, over that in all, below which it hardly moves there."""
+"""Standard deviation of an output in a part, relative to the whole, below which the part counts as
+at rest.
+"""
 
 BEYOND = 0.05
-"""Share of the range of an input that a part may go beyond, as noise does, and still be within it."""
+"""Share of an input's range by which a part may exceed it (noise) and count as inside."""
 
 
 @dataclass(frozen=True)

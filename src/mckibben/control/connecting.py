@@ -23,7 +23,7 @@ Channels = tuple[Channel, ...]
 
 
 Line = tuple[int, float, float]
-"""Where a value is in an array, and the gain and offset that convert it."""
+"""Index of a value in an array, and the gain and offset of its unit conversion."""
 
 
 def match(wanted: Channel, offered: Sequence[Channel], rest_length: float | None) -> Line | None:
@@ -50,7 +50,7 @@ def find(
         return line
     units = {plain(other.name): other.unit or "no unit" for other in offered}
     own, unit = plain(wanted.name), wanted.unit or "no unit"
-    problem = f"{taker} needs it, and {giver} gives {', '.join(units) or 'nothing'}"
+    problem = f"{taker} needs it, but {giver} has {', '.join(units) or 'nothing'}"
     remedy = f"give it under that name, in {unit}, or use a block and a plant of the same channels"
     if own in units:
         problem = f"{taker} has it in {unit}, and {giver} in {units[own]}"

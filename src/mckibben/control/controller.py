@@ -21,13 +21,13 @@ class Controller(ABC):
     """Asked once a control step for the commands of n muscles."""
 
     preview: float = 0.0
-    """How far ahead its compensator wants the reference, to make up for dead time [s]."""
+    """Preview of the reference for the compensator, to make up for dead time [s]."""
 
     forward_model: Block | None = None
-    """The model that its compensator undoes, if it has one."""
+    """The model that the compensator inverts, if there is one."""
 
     samples_ahead: int = 0
-    """How many samples further ahead it wants the reference, to plan with."""
+    """Further preview of the reference for prediction [samples]."""
 
     def connect(self, offer: Offer) -> None:
         """Learn what a loop gives and takes, before `reset`, and refuse what does not fit."""

@@ -17,7 +17,7 @@ GROUPS = ("stiffness", "friction", "gain")
 """What drifts: rubber, friction, and the calibration of pressure, commanded and measured alike."""
 
 PART = 1e-4
-"""Changes come in parts of this size, relative to what changes."""
+"""Relative size of one step of drift."""
 
 
 class Ageing(Plant, Protocol):

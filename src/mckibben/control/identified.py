@@ -18,7 +18,7 @@ from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
 BEYOND = 0.05
-"""Share of a range beyond which it is left: noise does less."""
+"""Share of a range beyond which a value counts as outside; noise is smaller."""
 
 Asked = list[tuple[Channel, Array, tuple[float, float]]]
 

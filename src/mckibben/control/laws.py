@@ -70,7 +70,7 @@ def observer(compensator: Block, tuned: Tuned) -> Controller:
     del tuned
     if compensator.samples_ahead:
         raise ModelError(
-            "an observer cannot correct references that a compensator has used ahead",
+            "an observer cannot be used with a compensator that looks ahead",
             remedy="use feedforward or feedforward-pid with a compensator that looks ahead",
         )
     return DisturbanceObserver(compensator)

@@ -26,7 +26,7 @@ from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
 
 ROUNDING = 1e-9
-"""Share of what is reached by which a reference touches its end."""
+"""Share of the reachable range within which a reference counts as at its end."""
 
 
 class Beyond(NamedTuple):
@@ -83,13 +83,13 @@ class Tracked(DrawsItself):
 
 
 MOST_STEPS = 10**7
-"""Of the approach, and of the time not scored."""
+"""Largest number of steps of the approach, and of the time not scored."""
 
 MOST_DELAY = 10**4
-"""Steps."""
+"""Largest delay [steps]."""
 
 MOST_NOISE = 1e6
-"""[mm or N]."""
+"""Largest measurement noise [mm or N]."""
 
 
 def track(

@@ -13,14 +13,17 @@ import numpy as np
 from mckibben.arrays import Array
 
 SLIGHT = 0.05
-"""Of the range: pressure that is off by more, to and fro, swings, where less was asked for meanwhile."""
+"""Share of the range: an alternating pressure error above this is an oscillation."""
 
 
 QUICK = 0.1
-"""Longest step that sees a regulator get to its pressure [s]; in longer ones it is there already."""
+"""Longest step in which a regulator's transient is visible [s]; with longer steps it has settled.
+"""
 
 STEADY = 0.2
-"""Most that the integral takes in of a step's error: with all of it, what is seen a step late swings."""
+"""Largest share of a step's error that is integrated: with more, the delay of a step causes
+oscillation.
+"""
 
 
 @dataclass

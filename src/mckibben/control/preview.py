@@ -15,7 +15,7 @@ from mckibben.errors import require
 from mckibben.recording import Recording, sample_time_of
 
 MOST_PREVIEW = 1e4
-"""Seconds."""
+"""Longest preview [s]."""
 
 
 def dead_time_undone(compensator: Block) -> float:

@@ -17,10 +17,10 @@ from mckibben.errors import DataError
 from mckibben.recording import REST_LENGTH, Recording, conversion, standard_unit
 
 MOVED = ("displacement", "angle")
-"""What motions are called: of a muscle, and of a joint."""
+"""Names of motions of muscles and joints."""
 
 NOISE = 0.01
-"""Share of a rig's range by which what is held may begin beyond it: noise of a sensor."""
+"""Share of a rig's range by which a constant input may exceed it, for sensor noise."""
 
 
 class Plant(Protocol):

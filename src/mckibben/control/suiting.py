@@ -16,14 +16,16 @@ from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
 APART = 0.25
-"""Share of a model's stroke by which a plant's slow rise begins or ends elsewhere that is another
-muscle: specimens of a type, temperatures and loads differ by less, the next size by more."""
+"""Share of a model's stroke by which the ends of the plant's slow rise may differ before it counts
+as another muscle: specimens, temperatures and loads differ by less, muscle sizes by more.
+"""
 
 BEYOND = 0.25
-"""Share of a model's range of pressure that a plant does not let through, and that is another muscle:
-recordings of one muscle begin and end a few tenths of a bar apart."""
+"""Share of a model's pressure range beyond the plant's limits above which it counts as another
+muscle: recordings of one muscle differ by a few tenths of a bar.
+"""
 
-REMEDY = "try it on a model of your own muscle (`plant=model.json`), where that was identified"
+REMEDY = "test it on a model of your own muscle (`plant=model.json`), where that was identified"
 
 
 def of_itself(model: Block | None, plant: Plant) -> bool:
@@ -44,12 +46,12 @@ def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
     if model is None:
         return []
     if of_itself(model, plant):
-        same = "the plant is the very model that the compensator undoes"
+        same = "the plant is the model that the compensator inverts"
         if isinstance(plant, Twin) and plant.scatters:
             return [f"{same}, with its band: errors without feedback are draws from the band"]
         return [
-            f"{same}, which makes it right by construction: only limits and rates show: try it "
-            "on another model of the muscle, or give this one the band of recordings held back "
+            f"{same}, so errors come from limits and rates alone: test it "
+            "on another model of the muscle, or calibrate this one on held-out recordings "
             "(`calibrate()`; `plant=banded.json`)"
         ]
     return [*_pressures(model, plant, rise), *_strokes(model, plant, rise)]
@@ -60,8 +62,8 @@ def doubts_of_feedback(law: str, plant: Plant) -> list[str]:
     if law == "feedforward" or not isinstance(plant, Twin) or plant.forward.rate_dependent:
         return []
     return [
-        "the plant is a model without time, which answers at once: feedback is better on it than it "
-        "will be on the muscle: compare feedback on a model with time, such as balance of "
+        "the plant is a static model, which responds within one sample: feedback performs better on it "
+        "than on the muscle; test feedback on a model with dynamics, such as balance fitted to "
         "recordings that have time"
     ]
 

@@ -25,12 +25,15 @@ from mckibben.errors import ModelError
 from mckibben.system.progress import Tell, one_by_one, telling
 
 NEVER = 1e9
-"""Longer than any tuning [s]."""
+"""Time longer than any tuning [s]."""
 
 STEPS = (0.1, 0.2, 0.4)
-"""Of pressure, relative to its range: larger ones only where smaller ones move nothing."""
+"""Steps of pressure, relative to its range; larger ones are used only if smaller ones cause no
+motion.
+"""
 STEEPER = 2.0
-"""How many times steeper than at the step a muscle may be; more, and gains are for the steepest part."""
+"""Largest ratio of slopes, elsewhere to at the step; above it gains are set for the steepest part.
+"""
 
 
 def tune_pid(

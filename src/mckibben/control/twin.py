@@ -32,7 +32,7 @@ from mckibben.recording import Recording
 from mckibben.signals.checking import generator
 
 COMMAND = "command_"
-"""What commands are called in recordings, and not on plants."""
+"""Prefix of commands in recordings, which plants do not use."""
 
 
 def plain(name: str) -> str:
@@ -295,7 +295,7 @@ class Twin:
             raise DataError(
                 "the plant's model needs it, and it is not given",
                 channel=name,
-                remedy="add the column to the reference, or say at what it is held",
+                remedy="add the column to the reference, or set its constant value (held={...})",
             )
         return self.limits(name).low
 

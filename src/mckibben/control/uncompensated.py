@@ -24,16 +24,18 @@ from mckibben.errors import MckibbenError, ModelError
 from mckibben.recording import Recording
 
 UNCOMPENSATED = "no compensation"
-"""What that is called in tables and pictures."""
+"""Label of that loop in tables and figures."""
 
 RISE = 30.0
-"""Time in which pressures rise [s]: slow beside air and creep of a loop's length."""
+"""Duration of the slow rise of pressure [s]: long compared with air dynamics."""
 
 KNOTS = 65
-"""Of a curve."""
+"""Number of knots of a curve."""
 
 SMALLEST = 1e-3
-"""Weight of a command's size beside what it moves: of all that move alike, the smallest are given."""
+"""Weight of the command's size against the motion error: of equivalent commands the smallest is
+chosen.
+"""
 
 
 @dataclass

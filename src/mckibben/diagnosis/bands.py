@@ -34,21 +34,25 @@ if TYPE_CHECKING:
 Unit = Literal["auto", "run", "block"]
 
 LEVEL, LEVELS = 0.9, np.linspace(0.0, 1.0, 1001)
-"""Level of a band where none is asked for, or the highest that its units allow; those of the table of
-half widths."""
+"""Default level of a band, reduced to the highest that the number of units allows; levels in the
+table of half widths.
+"""
 
 RUNS = 9
-"""Runs that allow a level of 0.9: from here on runs are the units, below blocks of them."""
+"""Smallest number of runs for a level of 0.9: with fewer, blocks of runs are the exchangeable
+units.
+"""
 
 SHORTEST_BLOCK = 2.0
-"""Correlation lengths of the errors that a block lasts at least."""
+"""Shortest block, in correlation lengths of the errors."""
 
 WIDENINGS, FOLDS = (0.0, 0.3, 1.0, 3.0, 10.0), 5
-"""Shares by which a band may be wider at the mean speed than at rest, and parts of the units that are
-left out in turn to choose one."""
+"""Candidate increases of the width at mean speed, relative to that at rest, and number of
+cross-validation folds that choose among them.
+"""
 
 MARGIN = 0.05
-"""Share of a calibrated range up to which samples beyond it count as inside."""
+"""Share of a calibrated range by which samples may exceed it and count as inside."""
 
 
 @dataclass(frozen=True)
@@ -230,7 +234,7 @@ def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Calibr
     if n < 2:
         raise DataError(
             f"errors are correlated over {numeral(memory, 3)} samples, so {sum(map(len, errors))} of "
-            f"them are one {which}, which gives no band for another",
+            f"them are one {which}, which is too few for a band",
             remedy="calibrate on more, or longer, recordings",
         )
     level = min(LEVEL, n / (n + 1))

@@ -37,27 +37,29 @@ from mckibben.signals.reversals import whole_cycles
 from mckibben.system.showing import DrawsItself
 
 LEVEL, NO_GAP = 0.01, 0.01
-"""Of the test for a loop; branches whose mean gap is surely below the second share of the output range
-are no loop."""
+"""Significance level of the loop test; mean gap between branches, relative to the output range,
+below which there is no loop.
+"""
 
 EXPLAINED, POSITION = 0.5, 0.1
-"""Share of the output's variance that velocity explains at least, and the input at most, where the
-output follows direction; and that branches explain at least whose shape is measured."""
+"""Variance shares: the velocity's at least, and the input's at most, if the output depends on
+direction only; also the branches' at least, for their shape to be measured.
+"""
 
 REPEATS = 3
-"""Values of which an interval is made, at least."""
+"""Smallest number of values for an interval."""
 
 SHAPE = {
     *("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid"),
     *("dead_zone_upper", "dead_zone_lower", "closure_error", "rate_dependence", "speeds"),
 }
-"""What is measured only where there is a loop."""
+"""Quantities that are measured only if there is a loop."""
 
 BY_POSITION = {
     *("gain", "onset", "saturation", "asymmetry", "width_centroid", "branch_gap", "drift"),
     *("dead_zone_upper", "dead_zone_lower", "creep", "creep_time", "closure_error"),
 }
-"""What has no meaning where the output follows direction."""
+"""Quantities without meaning if the output depends on direction only."""
 
 
 @dataclass(frozen=True)
@@ -273,7 +275,7 @@ def characterize(
         found = replace(found, adjusted=True)
     else:
         raise DataError(
-            f"it never moves while {', '.join(others)} stand still, so its effect cannot be identified",
+            f"it never moves while {', '.join(others)} are constant, so its effect cannot be identified",
             file=runs[0].source,
             channel=input,
             remedy="record one in which it moves alone; models of several inputs need no such recording",

@@ -23,25 +23,27 @@ from mckibben.system.showing import DrawsItself
 from mckibben.system.threads import one_blas_thread
 
 LEVEL = 0.01
-"""How often a right model is said to miss something, all tests of all outputs together (Bonferroni)."""
+"""Probability of a false finding for a correct model, over all tests and outputs (Bonferroni)."""
 
 FEWEST_BLOCKS = 6
-"""Of a recording that is tested."""
+"""Smallest number of blocks of a recording that is tested."""
 
 ROUNDING, STEP = 1e-9, 0.5
-"""Shares of the span and of the sensor's step up to which a residual's root mean square says nothing."""
+"""RMS residuals that are not tested: shares of the span, and of the sensor's resolution."""
 
 UNMOVED, OFF_GRID = 0.05, 0.01
-"""A sensor shows its steps where so many samples equal the one before and none is further off a step."""
+"""A sensor is quantised if this share of samples equals the preceding one and none is further than
+this from the grid.
+"""
 
 AGAINST = {"curve": "input", "load": "load", "hysteresis": "branch"}
-"""What residuals are averaged over, by kind of group."""
+"""Axis over which residuals are averaged, by kind of group."""
 
 LAST = ("runs", "offset")
-"""Groups that have no shape: whatever else is missed shifts the mean, so they are tested beside it."""
+"""Groups without a shape, tested with the others: any other misfit shifts the mean."""
 
 ALONE = ("drift", "offset")
-"""Groups that are no finding beside others: what a wrong model leaves has a mean and a trend as well."""
+"""Groups that count as findings only if no other does: any misfit has a mean and a trend."""
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,15 @@ from mckibben.signals.holds import STILL, holds, moves
 from mckibben.statistics import correlation_length, dependence, hats
 
 ALIKE, COVERS = 0.02, 0.5
-"""Share of all that another input does within which levels are one, and of the input range over which
-the input moves in a stretch that is measured."""
+"""Share of another input's range within which its levels are equal, and share of the input range
+that a segment must cover.
+"""
 
 FOLLOWS = 0.9
-"""Share of an input's variance (R²) that others explain, from which their effects are not separate."""
+"""R² of an input's regression on the others above which their effects are not separable."""
 
 MOST, KNOTS = 2000, 12
-"""Samples of a recording by which effects are found, and knots of the curve of the input beside it."""
+"""Largest number of samples per recording for effects, and number of knots of the input's curve."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,9 @@ def others_of(
 
 
 Group = tuple[tuple[float, ...], list[tuple[int, Recording]]]
-"""Levels at which other inputs stand still; numbers of the recordings, and stretches where they do."""
+"""Levels at which the other inputs are constant, with the recordings and segments in which they
+are.
+"""
 
 
 def standing(recordings: Sequence[Recording], given: str, others: Sequence[str]) -> list[Group]:

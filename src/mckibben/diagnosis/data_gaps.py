@@ -28,25 +28,32 @@ if TYPE_CHECKING:
     from mckibben.comparison.channels import Names
 
 FEWEST_SAMPLES, MOST_SAMPLES = 10, 20_000
-"""Samples of a recording at least, and those in which correlations and sensor steps are looked for."""
+"""Smallest number of samples of a recording, and largest number used for correlations and sensor
+resolution.
+"""
 
 AT_END, OFF_REST = 0.1, 0.1
-"""Shares of a range: turning points this close to an end are at it; a channel this far off its most
-frequent value is off it."""
+"""Shares of a range: distance from an end for a turning point to be at it; distance from the most
+frequent value to be away from rest.
+"""
 
 LARGE, SIMILAR, FEWEST_BRANCHES = 0.25, 1.5, 4
-"""Speeds are compared of branches over this share of the range, that differ in length by this factor at
-most, and are so many at least; cycles of branches as long."""
+"""Speeds are compared among branches over this share of the range, whose lengths differ by at most
+this factor, if there are this many.
+"""
 
 REPEATED, LASTING, CYCLE_POINTS = 0.02, 1.1, 9
-"""Cycles are the same where channels are within this share of their ranges at so many points, and times
-within this factor."""
+"""Two cycles are equal if channels agree within this share of their ranges at this many points, and
+durations within this factor.
+"""
 
 OWN_NOISE = 3.0
-"""Scatter of an output over that of the inputs, in shares of their ranges, that is noise of its own."""
+"""Scatter of an output, relative to that of the inputs (in shares of their ranges), that counts as
+its own noise.
+"""
 
 Found = Iterator[tuple[float, tuple[str, ...]]]
-"""A number and the channels that it is of."""
+"""A value and the channels it belongs to."""
 
 
 @dataclass(frozen=True)
@@ -387,4 +394,4 @@ RULES = (
     Rule("resolution", _resolution, operator.gt, 0.02, "sensor", 0.45),
     Rule("repeats", _repeated_cycles, operator.lt, 1, "repeats", 0.2),
 )
-"""Numbers on which gaps rest, from which value on nothing is missing, and the run that identifies it."""
+"""Data gaps: the value computed, its threshold, and the run that closes the gap."""

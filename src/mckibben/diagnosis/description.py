@@ -29,13 +29,13 @@ from mckibben.recording import Recording
 from mckibben.system.atomic import plain
 
 LEVEL = 0.95
-"""Of intervals."""
+"""Confidence level of intervals."""
 
 MOST_PARAMETERS = 300
-"""Above which no parameter means anything alone."""
+"""Number of parameters above which single parameters are not interpreted."""
 
 MOST_OPERATIONS = 200_000_000
-"""Of all sensitivities; of longer recordings the beginnings are used, as if the rest were like them."""
+"""Limit of operations for all sensitivities; longer recordings are truncated."""
 
 
 @dataclass(frozen=True)

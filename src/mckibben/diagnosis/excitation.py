@@ -23,16 +23,20 @@ from mckibben.signals.reversals import (
 )
 
 MOVES, LOAD_MOVES = 0.01, 0.1
-"""Range, over the largest magnitude, from which a channel moves; a load, which inertia shakes."""
+"""Range, relative to the largest magnitude, above which a channel varies; the second is for loads,
+which inertia disturbs.
+"""
 
 BRANCH = 0.1
-"""Share of its range that a channel covers in a branch, at least."""
+"""Smallest share of its range that a channel covers in a branch."""
 
 MOST_BRANCHES, NOISY_RECORDINGS = 2000, 8
-"""Branches of a channel that are kept, and recordings in which noise is estimated, evenly taken."""
+"""Largest number of branches stored per channel, and of recordings used to estimate noise, evenly
+spaced.
+"""
 
 CROSSINGS = np.linspace(0.1, 0.9, 9)
-"""Shares of a branch between which its speed is taken."""
+"""Shares of a branch between which its speed is measured."""
 
 
 @dataclass(frozen=True)

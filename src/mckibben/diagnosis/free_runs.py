@@ -16,10 +16,10 @@ from mckibben.errors import DataError
 from mckibben.recording import Recording
 
 FEWEST, SHORTEST = 60, 10
-"""Samples that can be tested at least, of all recordings together and of each."""
+"""Smallest number of samples that can be tested, in total and per recording."""
 
 SHIFTS = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
-"""Root mean squares of the residual by which the first measured output may be off."""
+"""Largest error of the first measured output, in RMS residuals."""
 
 SAME_TIME = 1e-3
 """Relative difference up to which sample times are equal."""
@@ -131,7 +131,7 @@ def _refuse(recording: Recording, block: Block, step: float | None) -> None:
     check_units(recording, (*block.inputs, *block.outputs))
     if len(recording) < SHORTEST:
         raise DataError(
-            f"{len(recording)} samples are too few: what a residual remembers is longer",
+            f"{len(recording)} samples are too few: the residual is correlated over longer times",
             file=recording.source,
             remedy=f"leave this recording out, or record at least {SHORTEST} samples",
         )

@@ -15,26 +15,27 @@ from mckibben.signals.holds import STILL
 from mckibben.signals.reversals import whole_cycles
 
 SHARES = np.linspace(0.02, 0.98, 49)
-"""Input levels of a curve, as shares of its range; the middle one is mid input."""
+"""Input levels of a curve, as shares of the input range; the middle one is mid input."""
 
 WINDOW, FEWEST = 0.025, 8
-"""Samples this close to a level, as a share of the range, make the curve there; a branch whose shape is
-measured has this many at least."""
+"""Half width of the window of a curve's point, as a share of the range; smallest number of samples
+in it.
+"""
 
 LARGE, CLOSED = 0.9, 0.02
-"""Amplitudes from this share of the largest on are as large, or cover the input range; a closed loop
-ends within this share of its amplitude of where it began."""
+"""Share of the largest amplitude above which a cycle is a largest one; largest closure error of a
+closed loop, relative to its amplitude.
+"""
 
 PART, SLIGHT = 0.5, 0.005
 """Share of the other branch that a branch at either end of a recording must have to make a loop; mean
 width over the output range below which it is not measured where a loop is wide."""
 
 FLAT, REACH = 0.2, 2
-"""Share of the mean slope below which the output hardly follows the input; levels on either side
-over which a slope is taken."""
+"""Share of the mean slope below which the output saturates; half width of a slope's window."""
 
 BINS = 12
-"""Of input or velocity, by which variance is explained."""
+"""Number of bins of input or velocity, for explained variance."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,9 @@ class Cycle:
 
 
 FIGURES = ("loop_width", "mid_width", "loop_area", "loop_area_share", "asymmetry", "width_centroid")
-"""Of a loop, as in `Characterization`; asymmetry of closed ones, the centroid not of slight ones."""
+"""Quantities of a loop, as in `Characterization`; asymmetry only of closed loops, centroid only of
+wide ones.
+"""
 
 
 @dataclass(frozen=True)

@@ -13,19 +13,22 @@ from mckibben.recording import Recording
 from mckibben.signals.holds import STILL, holds, shortest_hold
 
 MOVED = 0.02
-"""Output change, as a share of its range, from which the output is taken to have moved."""
+"""Output change, relative to its range, above which the output has moved."""
 
 SAME, HUNTED, MINOR = 0.01, 0.05, 0.9
-"""Shares of the input range: a level is passed beyond the first; a regulator hunts over the second; a
-loop larger than the third is a major one."""
+"""Shares of the input range: hysteresis of a level crossing; amplitude of a regulator's hunting;
+largest minor loop.
+"""
 
 DENSE, SETTLED = 8, 0.1
-"""Samples that a branch must have for the output on it to be read between samples; share of a hold that
-is left out at its start, so that the lag of a jump is not taken for creep."""
+"""Smallest number of samples of an interpolated branch; share of a hold that is discarded at its
+start, so that lag does not count as creep.
+"""
 
 ALIKE, SPEED_RATIO = 0.05, 1.5
-"""Cycles are compared whose extremes differ by this share of the amplitude at most, where their speeds
-differ by this ratio at least."""
+"""Cycles are compared if their extremes differ by at most this share of the amplitude, and their
+speeds by at least this ratio.
+"""
 
 
 def dead_zones(tracks: Sequence[Track], scale: Scale) -> tuple[list[float], list[float]]:

@@ -12,16 +12,16 @@ from mckibben.diagnosis.regression import Regression
 from mckibben.statistics import NORMAL_95
 
 TESTED, PER_LAG = 12, 20
-"""Lags that are tested together at most, and samples of all recordings to one of them at least."""
+"""Largest number of lags tested together, and samples needed per lag."""
 
 SHOWN, PAIRS = 50, 5
-"""Lags that are drawn one by one at most; pairs of samples of a recording to a lag, as its multiple."""
+"""Largest number of single lags drawn; samples needed per lag, as its multiple."""
 
 NORMAL_99 = 2.5758
-"""Standard deviations in which 99 % of a normal distribution lie."""
+"""Half width, in standard deviations, of the central 99 % of a normal distribution."""
 
 BINS = 10
-"""Bins of as many samples each."""
+"""Number of bins, of equal numbers of samples."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from mckibben.recording import Recording
 from mckibben.statistics import BlockBootstrap, correlation_length, interval
 
 N_FOLDS = 4
-"""Parts of a log held out in turn."""
+"""Number of cross-validation folds of a log."""
 
 
 @dataclass(frozen=True, eq=False)

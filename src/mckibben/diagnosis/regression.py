@@ -19,19 +19,22 @@ from mckibben.arrays import Array
 from mckibben.statistics import Autoregression, autoregression
 
 MOST_ORDER, SAMPLES_PER_TERM = 6, 16
-"""Of the noise model: the largest order, and samples to a term beside those that columns take."""
+"""Largest order of the noise model, and samples needed per term."""
 
 SMOOTHEST = 3.8
-"""Partial correlations of noise are at most the tanh of this: 0.999."""
+"""Bound of partial correlations of the noise: at most the tanh of this, 0.999."""
 
 STEP, LEAST_CURVATURE = 0.02, 0.1
-"""Of the likelihood: step of finite differences, and the least curvature along a partial correlation."""
+"""Step of finite differences of the likelihood, and smallest curvature along a partial correlation.
+"""
 
 DEPENDENT, ROUNDING = 1e-9, 1e-12
-"""Shares of the energy of columns: what adds less to others adds nothing; what is added to every one."""
+"""Shares of a column's energy: below the first it is linearly dependent; the second is added for
+regularisation.
+"""
 
 MOST_LEVERAGE = 0.9
-"""Share of a sample in its own fit that is corrected for."""
+"""Largest leverage of a sample that is corrected for."""
 
 Places = tuple[int, ...]
 

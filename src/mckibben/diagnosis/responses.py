@@ -17,10 +17,10 @@ from mckibben.estimators.core.uncertainty import DIFFERENCE, relative_sizes
 from mckibben.recording import Recording
 
 FREQUENCIES, COHERENT = 80, 0.6
-"""How many there are, and the coherence above which what was measured is shown."""
+"""Number of frequencies, and smallest coherence of measurements that are shown."""
 
 LEAST, MOST = 16, 4096
-"""Samples of a segment of Welch's method."""
+"""Smallest and largest segment of Welch's method [samples]."""
 
 
 @dataclass(frozen=True, eq=False)

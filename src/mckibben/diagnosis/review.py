@@ -29,11 +29,12 @@ from mckibben.statistics import NORMAL_95, block_length, correlation_length
 from mckibben.system.showing import DrawsItself
 
 REFERENCE = "reference_"
-"""What names of channels of a desired motion begin with."""
+"""Prefixes of the names of references."""
 
 LONGEST, HELD = 1.0, 3
-"""Delay that is looked for [s], an eighth of the log at most; samples in a row at an extreme, while the
-reference moves, from which a command is at a limit."""
+"""Longest delay searched [s], at most an eighth of the log; number of successive samples at an
+extreme, while the reference moves, above which a command is at a limit.
+"""
 
 ROUNDING = 1e-9
 """Share of a range up to which values are equal."""
@@ -213,7 +214,7 @@ def _ran(model: Block | None, compensator: Block | None) -> tuple[Block, Block |
         raise ModelError(
             f"the compensator gives {', '.join(c.name for c in compensator.outputs)}, "
             f"but the model takes {', '.join(sorted(driven))}",
-            remedy="give a compensator and the model that it undoes",
+            remedy="give a compensator and the model that it inverts",
         )
     return model, compensator
 
@@ -223,7 +224,7 @@ def _check(logs: Sequence[Recording], model: Block, inputs: Sequence[str], follo
     if not logs or not followed:
         name = REFERENCE + model.outputs[0].name
         raise DataError(
-            f"there is no {name} beside what the model gives",
+            f"there is no {name} to compare with the model's",
             file=logs[0].source if logs else None,
             remedy=f"map its column, as in `columns[{name}]=COLUMN`",
         )

@@ -21,29 +21,31 @@ from mckibben.signals.reversals import reversals
 from mckibben.statistics import hats
 
 PER_BRANCH, PER_COLUMN = 24, 6
-"""Blocks to a usual branch of the input, and to a column at least."""
+"""Smallest number of blocks per typical branch of the input, and per column."""
 
 FEWEST, MOST = 400, 6000
-"""Blocks looked at, at least where there are as many samples, and at most."""
+"""Smallest and largest number of blocks, if there are as many samples."""
 
 KNOTS = 8
-"""Of curves over inputs, shared among them."""
+"""Total number of knots of curves over the inputs."""
 
 COVERED, START = (0.25, 0.75), 8
-"""Quantiles of an input that it has passed when memory from before a run no longer acts, within the
-first of so many parts of it."""
+"""Quantiles that an input must have passed for its earlier memory to be erased, and the first part
+of a run in which it must.
+"""
 
 WAYS = (0.05, 0.2, 0.6)
-"""Parts of half its range by which an input moves back until it is on the other branch."""
+"""Distances of reversal, in shares of half the range, after which the input is on the other branch.
+"""
 
 HELD = 0.15
-"""Share of the samples in holds from which creep is told from the loop."""
+"""Share of samples in holds above which creep is distinguished from the loop."""
 
 MOST_DELAY, LONGER = 50, 8
-"""Samples that outputs are shifted by at most, and the shortest recording as a multiple of that."""
+"""Largest shift of outputs [samples], and the shortest recording as its multiple."""
 
 CAUSES = ("pressure", "voltage", "force", "torque")
-"""Channels of which a residual can be the effect, though the model does not read them."""
+"""Channels that may explain a residual although the model does not use them."""
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,12 @@ from mckibben.signals.reversals import branches_between, noise_level, reversals,
 Range = tuple[float, float]
 
 QUIET, ROUNDING = 1e-3, 1e-12
-"""Shares of the range: noise below the first is not averaged away, below the second is rounding."""
+"""Shares of the range: noise below the first is not averaged; below the second it is rounding."""
 
 MAJOR, FEWEST = 0.1, 10
-"""Swings of the input below this share of its range do not separate cycles; samples of all recordings,
-at least."""
+"""Smallest swing of the input, as a share of its range, that separates cycles; smallest number of
+samples in all recordings.
+"""
 
 
 @dataclass(frozen=True)

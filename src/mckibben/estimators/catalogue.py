@@ -33,16 +33,16 @@ class Need:
 
 NEEDS: dict[Purpose | None, tuple[str, str]] = {
     "memory": (
-        "Memory: loops of one muscle",
-        "From where an input turned, whatever the speed: pressure to displacement.",
+        "Hysteresis of one muscle",
+        "Rate-independent hysteresis, pressure to displacement.",
     ),
     "rate": (
-        "Rate: lags, creep and dynamics",
-        "What a muscle does depends on how fast, and goes on while pressure is held.",
+        "Dynamics: lag, creep and rate dependence",
+        "The response depends on speed, or continues while pressure is constant.",
     ),
     "several": (
-        "Several muscles, and loads",
-        "Muscles that move one another, or a muscle under a load that varies.",
+        "Several muscles and loads",
+        "Coupled muscles, or a muscle under a varying load.",
     ),
     "force": (
         "Force and activation pressure",

@@ -24,7 +24,7 @@ stdatomic stdbool stddef stdint stdio stdlib string tgmath time uchar wchar unit
 """
 
 RESERVED = frozenset((*WORDS.split(), *HEADERS.split()))
-"""Words of C and C++, and headers that a model's own would stand before."""
+"""Keywords of C and C++, and headers that a model's file must not shadow."""
 
 ELEMENTARY = """
 acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh erf erfc exp exp2 expm1 fabs fdim

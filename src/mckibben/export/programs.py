@@ -84,4 +84,4 @@ def self_test(folder: Path, name: str) -> str:
         sources = sorted((folder / "src").glob("*.c"))
         test = folder / "test" / f"{name}_selftest.c"
         compile_c([*sources, test], program, options=[f"-I{folder / 'src'}"])
-        return run([str(program)], "the exported C does not give Python's numbers").strip()
+        return run([str(program)], "the outputs of the exported C differ from Python's").strip()

@@ -18,10 +18,10 @@ MARKUP = (".xml.j2", ".html.j2")
 """Endings of templates whose values are escaped; those of C come through `naming.said`."""
 
 WIDTH = 92
-"""Of rows of numbers, in columns."""
+"""Width of rows of numbers [columns]."""
 
 CODE_WIDTH = 100
-"""Of lines of C, in columns."""
+"""Width of lines of C [columns]."""
 
 
 def render(package: str, template: str, content: Mapping[str, Any]) -> str:

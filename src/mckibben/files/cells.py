@@ -18,7 +18,7 @@ MISSING = (
     *("-", "--", "---", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None"),
     *("∞", "+∞", "-∞", "OL", "OVLD"),
 )
-"""Cells of samples that were not taken, or are beyond the instrument's range."""
+"""Cells of missing samples, or of samples beyond the instrument's range."""
 
 _COMMENT = r"#(?!N/?A\b|DIV/0|VALUE!|REF!|NUM!|NAME\?|NULL!)|%|//"  # not the errors of spreadsheets
 _FORMS = {

@@ -53,7 +53,7 @@ class Channel(_Strict):
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         if self.value is not None and {self.column, self.gain, self.offset} != {None}:
-            raise ValueError("a value is a constant: it goes with a unit alone")
+            raise ValueError("a value is a constant, with a unit and nothing else")
         if self.gain == 0:
             raise ValueError("a gain of 0 leaves nothing of the column; use value for a constant")
         if self.gain is not None and self.unit is None:

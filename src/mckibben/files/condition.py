@@ -13,7 +13,7 @@ DRIVING, DRIVEN = {"bar", "V"}, {"mm", "rad"}
 """Units of channels that move others, and of those that they move, never before they do."""
 
 MOST = 1 << 20
-"""Samples of a recording by which its lag is found."""
+"""Number of samples of a recording used to estimate its lag."""
 
 
 def condition(samples: Array) -> dict[str, float]:

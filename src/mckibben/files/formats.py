@@ -43,7 +43,7 @@ WRITERS = (".csv", ".tsv", ".parquet")
 """Endings whose module also has ``write(recording, path)``."""
 
 SOUGHT = tuple(ending for ending in READERS if ending not in (".log", ".json", ".jsonl"))
-"""Endings that a folder is searched for; programs write their own logs and settings in the others."""
+"""Endings that a folder is searched for; other formats also hold logs and settings."""
 
 _SIGNATURES: dict[bytes, tuple[str, ...]] = {
     b"PAR1": (".parquet",),

@@ -63,7 +63,7 @@ ROLES: dict[str, dict[str, str]] = {
         "en": "command commanded cmd", "de": "stellgröße stellgroesse", "fr": "commande",
         "it es pt": "comando", "ja zh": "指令 指令値 指令值", "ko": "명령 지령"},
 }  # fmt: skip
-"""References and commands of a loop -> the words for it beside, or instead of, a channel's name."""
+"""References and commands of a loop -> words for them, used with or instead of a channel's name."""
 
 
 def words_of(table: dict[str, dict[str, str]]) -> dict[str, str]:

@@ -20,7 +20,7 @@ from mckibben.system import ordinary
 from mckibben.system.atomic import digest
 
 STILL = ("calibration", "pressure_reference")
-"""What of a recording's meta applies to samples that were edited since."""
+"""Entries of a recording's meta that remain valid after its samples were edited."""
 
 
 class Stored(BaseModel):

@@ -43,17 +43,18 @@ PLAUSIBLE = {
     "degC": Plausible(-100.0, 1e3),
     "": Plausible(-1e4, 1e4, 0.2, 0.0, 1.5),
 }
-"""By the package's unit."""
+"""Plausible range, by the package's unit."""
 
 TOO_SMALL = {"bar": (1e-12, 1e-7)}
-"""By the package's unit: largest values that are in another unit, and more than the rounding of 0."""
+"""By the package's unit: largest values that suggest another unit, and are more than rounding of 0.
+"""
 
 _SIZES = (0.0, *(10.0**k - 1 for k in range(3, 8)), *(2.0**k - 1 for k in (15, 16)), 2.0**15)
 CODES = np.array([sign * size for size in _SIZES for sign in (1.0, -1.0)])
-"""What instruments write for a missing sample, be it a single one."""
+"""Codes of instruments for a missing sample, even a single one."""
 
 WRAPS = (2.0**8, 2.0**10, 2.0**12, 2.0**16, 2.0**32)
-"""Range of integer counters, which begin anew beyond it."""
+"""Ranges of integer counters, which wrap around."""
 
 
 def wraps(values: Array) -> tuple[float, Array] | None:

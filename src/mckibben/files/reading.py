@@ -24,7 +24,7 @@ from mckibben.recording import Recording
 MAY_BE_HELD = frozenset(
     {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
 )
-"""Channels that an experiment can hold constant."""
+"""Channels that may be constant in an experiment."""
 
 
 def read(

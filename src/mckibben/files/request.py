@@ -18,10 +18,10 @@ from mckibben.files.table import Table
 from mckibben.recording import conversion
 
 FEWEST = 10
-"""Fewest samples of a recording, or of a stretch of one, that can show a loop."""
+"""Smallest number of samples of a recording, or of a segment of one."""
 
 LONGEST = 1e6
-"""Rest length of a muscle [mm]."""
+"""Largest rest length of a muscle [mm]."""
 
 Gaps = Literal["error", "split", "interpolate"]
 

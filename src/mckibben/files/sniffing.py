@@ -15,7 +15,7 @@ from mckibben.files.notices import warn
 from mckibben.files.units import find, find_listed
 
 SEPARATORS = ("\t", ";", "|", ",", None)
-"""In the order in which they are preferred where a file can be read in two ways; None is blanks."""
+"""Separators in order of preference; None is whitespace."""
 
 _ENCODINGS = ("cp1252", "cp932", "gb18030", "cp949", "latin-1")
 _CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])

@@ -27,10 +27,10 @@ from mckibben.files.units import convert
 from mckibben.system.ordinary import DESCRIPTION, opened, read_text
 
 BAG = "metadata.yaml"
-"""In the folder of a bag of ROS 2."""
+"""Metadata file of a ROS 2 bag folder."""
 
 PROTOCOL = "protocol.json"
-"""Has the role of each recording in its folder."""
+"""File with the role of each recording in its folder."""
 
 ROLES = ("train", "validation", "test")
 

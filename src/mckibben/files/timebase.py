@@ -16,7 +16,7 @@ from mckibben.files.quality import wraps
 from mckibben.files.request import Source
 
 Spans = NDArray[np.intp]
-"""Samples from the first to, not including, the second, shape (m, 2)."""
+"""First samples, and those after the last, shape (m, 2)."""
 
 GAP = 3.0
 """Steps longer than this many median steps are gaps; shorter ones are jitter."""

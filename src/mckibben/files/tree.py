@@ -37,7 +37,7 @@ UNITS = {"unit", "units"}
 """Fields with the unit of such a signal, or with those of ``NAMES``."""
 
 INFO = "Info"
-"""Ending of a group that describes what is beside it, as ``DataInfo`` does ``Data``."""
+"""Suffix of a group that describes another, as ``DataInfo`` does ``Data``."""
 
 
 @dataclass(frozen=True)

@@ -50,13 +50,13 @@ RARE: dict[str, dict[str, str]] = {
     "mm": {"nm": "nm nanometer nanometers", "thou": "mil mils thou", "dm": "dm", "km": "km"},
     "N": {"daN": "daN", "cN": "cN"},
 }  # fmt: skip
-"""The same for units that are understood and never proposed."""
+"""The same for units that are understood and never suggested."""
 
 MASSES = {
     "gf": ("g", "gram", "grams"), "kgf": ("kg", "kilogram", "kilograms"),
     "lbf": ("lb", "lbs", "pound", "pounds"),
 }  # fmt: skip
-"""Unit of force -> those of the mass that hangs with it."""
+"""Unit of force -> units of the mass with that weight."""
 
 COUNTS = frozenset(
     (
@@ -64,7 +64,7 @@ COUNTS = frozenset(
         *("px", "pixel", "pixels", "adc", "raw", "pulse", "pulses", "inc", "steps"),
     )
 )
-"""What converters and cameras count: no unit, and never that of a channel."""
+"""Units of converter counts and pixels, which are no units of a channel."""
 
 GAUGE = re.compile(
     r"(?P<unit>m?bar|[hkM]?Pa|psi)[\s_(\[]*(?P<kind>gauge|absolute|abs|g|a)[)\]]?", re.IGNORECASE

@@ -26,7 +26,7 @@ from mckibben.recording import Recording
 from mckibben.signals import resample
 
 KNOWN = Path(str(resources.files("mckibben.measured"))) / "known"
-"""Descriptions of public recordings, by the name of their folder: ``NAME.toml``."""
+"""Descriptions of public data sets, by the name of their folder: ``NAME.toml``."""
 
 
 class _Strict(BaseModel):

@@ -23,12 +23,12 @@ from mckibben.system.ordinary import DESCRIPTION, read_text
 FORMAT, VERSION = "mckibben-muscle", 1
 
 HEADING = ("format", "version", "kind")
-"""Of a saved balance, which a muscle's file leaves out."""
+"""Fields of a saved balance that a muscle's file leaves out."""
 
 FOLDER = Path(__file__).parent / "library"
 
 UNSURE = 0.5
-"""Standard error of a trait's logarithm from which its recordings have not told it."""
+"""Standard error of a trait's logarithm above which its recordings do not determine it."""
 
 
 class Conditions(BaseModel):
@@ -221,7 +221,7 @@ def described(muscle: Muscle) -> str:
     text += [f"virtual = {_toml(muscle.virtual)}", "", "[sheet]"]
     text += _pairs(muscle.sheet.model_dump(exclude_none=True))
     text += ["", "[conditions]", *_pairs(muscle.conditions.model_dump(exclude_none=True))]
-    text += ["", "[uncertainty]  # standard errors of the logarithms of its traits; inf: not told"]
+    text += ["", "[uncertainty]  # standard errors of the logarithms of its traits; inf: unknown"]
     text += [f"{name} = {_toml(muscle.errors[place].tolist())}" for name, place in PLACES.items()]
     text += ["", "[balance]", *_pairs({k: v for k, v in block.items() if k not in left})]
     text += _pairs({k: block[k] for k in block if k in channels})

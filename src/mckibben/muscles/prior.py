@@ -18,25 +18,25 @@ from mckibben.muscles.sheet import Sheet, refused
 from mckibben.muscles.traits import COUNT, PLACES, POSITIONS
 
 ALIKE = 0.1
-"""Logarithm by which muscles of one make and size differ."""
+"""Standard deviation of the logarithm among muscles of one make and size."""
 
 NEAR = 0.25
-"""Logarithm of size, slenderness or braid over which muscles get unlike."""
+"""Correlation length of the logarithm of size, slenderness and braid."""
 
 ZERO = 0.03
-"""Share of the rest length by which displacements count from elsewhere."""
+"""Standard deviation of the origin of displacements, relative to the rest length."""
 
 SMOOTH, FINE = 1.0, 0.03
-"""Neighbours over which traits of a name go together, and what each has alone."""
+"""Correlation length of a trait's numbers, in neighbours, and the independent part of each."""
 
 FEWEST = 3
-"""Muscles that tell of a spread."""
+"""Smallest number of muscles for estimating a spread."""
 
 MIDDLE = 0.8413
-"""Quantile at which a Gaussian is one deviation from its mean."""
+"""Quantile of a normal distribution at one standard deviation."""
 
 UNTOLD = 1.0
-"""Spread of what fewer tell."""
+"""Spread assumed with fewer muscles."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from mckibben.errors import DataError
 NEWTON_PER_BAR_MM2 = 0.1
 
 USED = 0.75
-"""Share of the contraction at which a braid pulls no more that muscles reach without a load."""
+"""Largest contraction of a muscle without load, relative to that at which its braid's pull is zero.
+"""
 
 
 class Sheet(BaseModel):

@@ -31,7 +31,7 @@ Cell = str | float | None
 Curves = Mapping[str, tuple[Array, Array]]
 Progress = Callable[[float, str], None]
 
-OWN = "Recordings of one's own: where words name the paper's signals, they are those of its rig."
+OWN = "User recordings; descriptions of signals refer to the paper's rig."
 
 MOST = 2000
 """Points of a curve that is drawn."""

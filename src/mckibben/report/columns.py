@@ -71,10 +71,10 @@ class Column:
         """Return what is absurd about what a row holds, in words; most often nothing."""
         value = self.value(row)
         if self.key == "r2" and value is not None and value < 100 * (1 - RAN_AWAY**2):
-            return "ran away"
+            return "diverged"
         if self.key not in ("chosen", "test", "train", "worst") or value is None:
             return ""
-        return "ran away" if value > RAN_AWAY * _deviation(row) else ""
+        return "diverged" if value > RAN_AWAY * _deviation(row) else ""
 
     def sorted_by(self, row: Given) -> float | str | None:
         """Return what a table is sorted by: of two ends the middle."""
@@ -119,7 +119,7 @@ def columns_of(
         Column("interval", "95 % interval", unit, _inside("test", "rmse_interval")),
         Column(
             "difference",
-            "less the chosen’s",
+            "minus the chosen’s",
             unit,
             _inside("test", "difference_to_chosen_interval"),
         ),

@@ -42,12 +42,10 @@ CHOICES = {
 }
 """What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
 
-LEVEL = (
-    "not distinguished from the chosen model by this test: the interval of the difference holds 0"
-)
+LEVEL = "not distinguished from the chosen model by this test: the interval of the difference contains 0"
 """Of a model that is `level`."""
 
-CAREFUL = "good only near the motions fitted, so its error counts twice in the order"
+CAREFUL = "reliable only near the fitted motions, so its error is doubled in the ranking"
 """Of a model with a caution."""
 
 
@@ -100,9 +98,9 @@ def comparison(board: Leaderboard) -> list[str]:
     """Return what is to be said of a comparison beside its table."""
     best, said = board.best, list(board.shared)
     if board.loads:
-        said.append(f"Given to models beside the inputs: {', '.join(board.loads)}.")
+        said.append(f"Further inputs of all models: {', '.join(board.loads)}.")
     said += [
-        f"{name} varies, and no model is given it: see `inputs` and `load`."
+        f"{name} varies, but is not an input of the models; see `inputs` and `load`."
         for name in board.ignored
     ]
     said += [
@@ -143,8 +141,8 @@ class Quantity(NamedTuple):
 
 
 QUANTITIES = (
-    ("recordings", "n_recordings", "", "files or segments looked at"),
-    ("stretches", "n_stretches", "", "of them, those in which all other inputs stand still"),
+    ("recordings", "n_recordings", "", "files or segments analysed"),
+    ("stretches", "n_stretches", "", "those with all other inputs constant"),
     ("samples", "n_samples", "", "in all"),
     ("duration", "duration", "s", "in all; none without time"),
     ("sample time", "sample_time", "s", "none where unknown or not the same everywhere"),
@@ -160,18 +158,18 @@ QUANTITIES = (
     ("p of loop", "p_loop", "", "probability of such gaps between branches without a loop"),
     ("loop width e_w", "loop_width", "%", "largest cycles: branches at mid input over span"),
     ("branch distance at mid input", "mid_width", "{y}", "the same in the unit of the output"),
-    ("asymmetry", "asymmetry", "%", "from its image turned by half a turn; PI models have 0"),
+    ("asymmetry", "asymmetry", "%", "distance from its image rotated by 180°; 0 for PI models"),
     ("centre of width", "width_centroid", "", "-1 at low, 0 at mid, 1 at high input"),
     ("loop area", "loop_area", "{u} {y}", "enclosed by the largest cycles"),
-    ("loop area share", "loop_area_share", "%", "of the rectangle round it: a relay has 100"),
+    ("loop area share", "loop_area_share", "%", "of its bounding rectangle; 100 for a relay"),
     ("mean branch gap", "branch_gap", "{y}", "falling less rising output, free of steady drift"),
     ("dead zone after upper reversals", "dead_zone_upper", "{u}", "before the output moves back"),
     ("dead zone after lower reversals", "dead_zone_lower", "{u}", "the same from below"),
     ("gain", "gain", "{y}/{u}", "slope of the mean of both branches at mid input"),
     ("onset", "onset", "{u}", "below it the slope is under a fifth of its mean"),
     ("saturation", "saturation", "{u}", "above it the slope is under a fifth of its mean"),
-    ("creep", "creep", "{y}", "in a hold of all inputs; positive: on as it was going"),
-    ("creep time", "creep_time", "s", "the time over which it crept so far"),
+    ("creep", "creep", "{y}", "in a hold of all inputs; positive: in the direction of motion"),
+    ("creep time", "creep_time", "s", "time over which creep was measured"),
     ("drift", "drift", "{y}", "from one cycle to the next between the same extremes"),
     ("rate dependence", "rate_dependence", "%", "growth of e_w at twice the speed"),
     ("speed compared", "speeds", "{u}/s", "mean speed of the input in cycles alike"),
@@ -238,11 +236,11 @@ def characterization_sentences(found: Characterization) -> list[str]:
     elif found.adjusted:
         names = listing([effect.channel for effect in found.effects])
         said.append(
-            f"{u} covers no half of its range while {names} stand still: straight-line effects of these "
-            "are taken away, and loop width is not measured."
+            f"{u} covers less than half of its range while {names} are constant: their linear effects "
+            "are removed, and loop width is not measured."
         )
     elif found.branch_gap is not None:
-        open_ = "Too few branches, or too much noise, to tell a loop: "
+        open_ = "Too few branches, or too much noise, to detect a loop: "
         shown = {True: "", False: "No loop: ", None: open_}[found.has_loop]
         gap = f"the mean gap between branches is {size(found.output_unit, found.branch_gap)}."
         said.append(f"{shown}{gap}")
@@ -252,7 +250,7 @@ def characterization_sentences(found: Characterization) -> list[str]:
         )
     if found.branch_gap is not None and found.p_loop is None:
         said.append(
-            "No recording has four branches: drift would part rising and falling output as well."
+            "No recording has four branches: drift would also separate rising and falling output."
         )
     return [f"{sentence[0].upper()}{sentence[1:]}" for sentence in said]
 
@@ -389,7 +387,7 @@ GAPS = {
     "coupling": "Effects of {channels} cannot be separated: one follows from the others (R² = {value}).",
     "spring load": "Load and stiffness cannot be separated: {channels} are proportional (R² = {value}).",
     "resting": "The effect of {channels} cannot be identified: constant at {levels}.",
-    "together": "Joint effects cannot be identified: {channels} are off their rest together in "
+    "together": "Joint effects cannot be identified: {channels} are away from rest together in "
     "{percent} of the samples.",
     "range": "Behaviour beyond the recorded range of {channels} cannot be identified: tests go further "
     "by {percent} of it.",

@@ -87,7 +87,7 @@ def _saves(rig: Rig, inputs: Recording, seed: int) -> None:
 
 def _repeats(rig: Rig, inputs: Recording, seed: int) -> None:
     first, again = rig.run(inputs, seed), rig.run(inputs, seed)
-    _demand(rig, first == again, "running again with the same seed gives the same")
+    _demand(rig, first == again, "running again with the same seed returns the same outputs")
     _demand(rig, bool(np.isfinite(_matrix(rig, first)).all()), "measurements are finite")
     noisy = any(rig.sensor[quantity(name)].noise for name in rig.outputs)
     other = rig.run(inputs, seed + 1)
@@ -95,7 +95,7 @@ def _repeats(rig: Rig, inputs: Recording, seed: int) -> None:
     _demand(
         rig,
         rig.run(inputs, seed, ideal=True).channels.keys() >= set(rig.outputs),
-        "perfect sensors show every output",
+        "ideal sensors measure every output",
     )
 
 
@@ -134,7 +134,11 @@ def _saturates(rig: Rig, inputs: Recording, seed: int) -> None:
         dict(recording.meta.get("saturated", {})) == dict.fromkeys(rig.inputs, len(inputs)),
         "a recording says how many commands were limited",
     )
-    _demand(rig, bool(np.isfinite(_matrix(rig, recording)).all()), "extreme commands do no harm")
+    _demand(
+        rig,
+        bool(np.isfinite(_matrix(rig, recording)).all()),
+        "outputs stay finite under extreme commands",
+    )
 
 
 def _refuses(rig: Rig, inputs: Recording, seed: int) -> None:

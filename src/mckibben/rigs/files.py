@@ -108,7 +108,7 @@ def recorded_on(recording: Recording) -> Rig | None:
         )
     if not isinstance(given, dict):
         raise DataError(
-            f"{recording.name} does not say whether its rig {name} was changed",
+            f"{recording.name} does not record whether its rig {name} was changed",
             remedy="record it again, or name the rig",
         )
     return rig.changed(given)

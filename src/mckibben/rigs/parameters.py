@@ -43,11 +43,11 @@ class Friction(Section):
         "presliding stiffness of each element", "N/mm", max_length=MOST_ELEMENTS
     )
     contracting: tuple[Each, ...] = parameter(
-        "most that each resists contraction, per bar", "N/bar"
+        "limit of each element in contraction, per bar", "N/bar"
     )
-    extending: tuple[Each, ...] = parameter("most that each resists extension, per bar", "N/bar")
+    extending: tuple[Each, ...] = parameter("limit of each element in extension, per bar", "N/bar")
     preload: float = parameter(
-        "pressure that braid and bladder feel without air", "bar", ge=0, le=5
+        "contact pressure of braid and bladder without air", "bar", ge=0, le=5
     )
     viscosity: float = parameter("viscous resistance", "N s/mm", ge=0, le=100)
 
@@ -64,7 +64,7 @@ class Creep(Section):
     stiffness: tuple[EachPositive, ...] = parameter(
         "stiffness of each branch", "N/mm", max_length=MOST_BRANCHES
     )
-    time: tuple[EachPositive, ...] = parameter("time in which each branch fades", "s")
+    time: tuple[EachPositive, ...] = parameter("time constant of each branch", "s")
 
     @model_validator(mode="after")
     def _same_lengths(self) -> Self:
@@ -79,10 +79,8 @@ class Heat(Section):
     softening: float = parameter(
         "stiffness and friction lost per kelvin", "1/K", ge=0, le=0.05, default=0.0
     )
-    capacity: float = parameter(
-        "heat that warms the muscle by a kelvin", "J/K", gt=0, default=100.0
-    )
-    cooling: float = parameter("time in which the warmth fades", "s", ge=1, default=600.0)
+    capacity: float = parameter("heat capacity of the muscle", "J/K", gt=0, default=100.0)
+    cooling: float = parameter("time constant of cooling", "s", ge=1, default=600.0)
 
 
 class Muscle(Section):
@@ -94,14 +92,16 @@ class Muscle(Section):
     braid_angle: float = parameter(
         "angle between threads and axis at rest", "degrees", ge=10, le=80
     )
-    end_cap: float = parameter("factor on contraction for the caps: 1 is a cylinder", ge=0.7, le=2)
+    end_cap: float = parameter(
+        "factor on contraction for the end caps; 1 for a cylinder", ge=0.7, le=2
+    )
     contact_pressure: float = parameter(
         "pressure at which the bladder meets the braid", "bar", ge=0, le=3
     )
     wall: float = parameter("thickness of the bladder", "mm", gt=0, le=20)
     c10: float = parameter("first Mooney-Rivlin constant of the bladder", "N/mm²", ge=0, le=20)
     c01: float = parameter("second Mooney-Rivlin constant", "N/mm²", ge=0, le=20, default=0.0)
-    push: float = parameter("force against which it stays straight", "N", ge=0, le=1e6, default=0.0)
+    push: float = parameter("buckling force", "N", ge=0, le=1e6, default=0.0)
     friction: Friction
     creep: Creep
     heat: Heat = Heat()
@@ -174,9 +174,9 @@ class Air(Section):
     critical_ratio: float = parameter(
         "pressure ratio at which flow chokes", ge=0, le=0.9, default=0.3
     )
-    valve_time: float = parameter("time in which the valve follows", "s", ge=0.001, le=1)
+    valve_time: float = parameter("time constant of the valve", "s", ge=0.001, le=1)
     gain: float = parameter("opening per bar of pressure error", "1/bar", gt=0, le=100)
-    dead_band: float = parameter("pressure error that moves nothing", "bar", ge=0, le=1)
+    dead_band: float = parameter("dead band of the pressure error", "bar", ge=0, le=1)
     line: float = parameter(
         "resistance of the line to the muscle, the inverse of its sonic conductance; pressure is "
         "measured at the regulator",
@@ -201,8 +201,8 @@ class Sensor(Section):
     """What a sensor adds to what it measures, in the unit of its channel."""
 
     noise: float = parameter("standard deviation of white noise", ge=0, default=0.0)
-    resolution: float = parameter("smallest step it shows", ge=0, default=0.0)
-    offset: float = parameter("what it always adds", default=0.0)
+    resolution: float = parameter("resolution", ge=0, default=0.0)
+    offset: float = parameter("constant offset", default=0.0)
 
 
 class Range(Section):

@@ -36,12 +36,12 @@ class Rig(DrawsItself, Section, ABC):
 
     setup: str = parameter("which physics: the name of the set-up")
     name: str = parameter("short name", min_length=1, pattern=r"^[a-z0-9][a-z0-9-]*$")
-    version: int = parameter("counts up when results change", ge=1, default=1)
-    title: str = parameter("one line about it", default="")
-    source: str = parameter("where its numbers come from", default="")
+    version: int = parameter("incremented when results change", ge=1, default=1)
+    title: str = parameter("one-line description", default="")
+    source: str = parameter("source of its parameters", default="")
     sample_time: float = parameter("time between two samples", "s", gt=0, le=1)
     integration_step: float = parameter(
-        "longest step of the physics", "s", gt=0, le=0.005, default=5e-4
+        "longest integration step", "s", gt=0, le=0.005, default=5e-4
     )
     settling_time: float = parameter(
         "time from switching on to the first sample", "s", ge=1, default=20.0
@@ -50,7 +50,7 @@ class Rig(DrawsItself, Section, ABC):
     start: dict[str, float] = parameter(
         "commands at rest, where not the lowest", default_factory=dict
     )
-    range: dict[str, Range] = parameter("what the hardware lets through, by channel")
+    range: dict[str, Range] = parameter("limits of the hardware, by channel")
     sensor: dict[str, Sensor] = parameter("sensors, by channel")
     air: Air
 

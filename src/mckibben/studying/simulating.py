@@ -170,4 +170,6 @@ def _other_start(block: Block, recording: Recording, outputs: list[str]) -> list
     own = block.initial_state(recording.matrix(c.name for c in block.inputs)[0])
     if np.array_equal(measured_start(block, recording, outputs), own):
         return []
-    return ["the run does not begin as the model does; the band is for `initial=measured`"]
+    return [
+        "the run does not begin in the model's initial state; the band is for `initial=measured`"
+    ]

@@ -317,7 +317,7 @@ class Balance(Invertible):
         for name, values in named.items():
             if any(value < 0 for value in np.ravel(values)):
                 raise ModelError(
-                    f"{name} of {self.kind!r} has a number below 0, which would make energy",
+                    f"{name} of {self.kind!r} has a number below 0, which would generate energy",
                     remedy="give none below 0",
                 )
         if self.mass and self.pushes:
@@ -593,7 +593,7 @@ NOT_NEGATIVE = (
     *("friction", "relaxation", "damping", "walls", "lines", "grip", "bladders", "pushes", "mass"),
     "grips",
 )
-"""Fields without numbers below 0."""
+"""Fields of non-negative numbers."""
 
 ONE_EACH = {
     "damping": "damping",
@@ -603,7 +603,7 @@ ONE_EACH = {
     "pushes": "force of slackening",
     "mass": "mass",
 }
-"""Fields that have one number for every muscle, in words."""
+"""Fields with one number per muscle, and their labels."""
 
 
 class Placed(NamedTuple):

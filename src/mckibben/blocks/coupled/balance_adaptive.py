@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     from mckibben.blocks.coupled.balance import Balance
 
 OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION = range(5)
-"""What is learnt of a muscle."""
+"""Adaptive parameters of a muscle."""
 
 GROUPS = {
     STIFFNESS: Group("springs", "stiffer", "softer"),
@@ -73,7 +73,7 @@ GROUPS = {
     RELAXATION: Group("relaxation", "more", "less"),
     OFFSET: Group("pull", "more", "less"),
 }
-"""Their names; a force that is added is a pull that is less."""
+"""Names of the adaptive parameters; an added force reduces the pull."""
 
 ROW = 9
 """Numbers of a parameter: its muscle, the first of the terms that it is a factor on and the first
@@ -81,19 +81,19 @@ behind, the constant force of the muscle that it adds, its ends, the same by the
 the place of that factor among parameters, or -1; then its share in the springs of every coordinate."""
 
 FACTORS = 0.5, 2.0
-"""Least and most of what was fitted."""
+"""Smallest and largest factor on fitted values."""
 
 MOST_FORCE = 0.3
-"""Constant force, relative to its scale."""
+"""Largest constant force, relative to its scale."""
 
 USUAL_TOP = 10.0
-"""Highest pressure where none is said [bar]."""
+"""Highest pressure if the model has no limit [bar]."""
 
 LEAST_LEFT = 0.05
-"""Area that friction has to leave, relative to that at rest, as where it was identified."""
+"""Smallest area left after friction, relative to the area at rest, as in identification."""
 
 GRID = 21
-"""Places along what is known of a displacement where conditions are looked at."""
+"""Grid points over the known range of a displacement at which constraints are checked."""
 
 
 @step

@@ -43,23 +43,24 @@ OWN, DYNAMIC = 4, 4
 """Coefficients of a muscle before its directions; terms before elasticity."""
 
 LEAST_AREA = 0.01
-"""Smallest area, relative to that at rest: a muscle that is as short as it gets pulls no more."""
+"""Smallest area, relative to that at rest: a fully contracted muscle has no pull."""
 
 AT_REST, FROM_REST, IN_TIME = 0, 1, 2
-"""Ways to a sample: without friction and lags; all at once, before anything relaxes or damps; in the
-sample time."""
+"""How a sample is computed: without friction and lags; as a step before relaxation and damping;
+over the sample time.
+"""
 
 NEVER = 1e30
-"""Force at which what never goes slack would."""
+"""Slack force of muscles that never go slack."""
 
 MOST_STEPS, MOST_SEARCHED = 60, 25
-"""Of Newton's method, and along each step."""
+"""Maximum number of Newton steps, and of line-search steps in each."""
 
 BALANCED, NEARLY = 2e-15, 1e-9
-"""Residual, relative to the forces, that is an equilibrium, and that is one but for rounding."""
+"""Relative residual of an equilibrium, and of one to within rounding."""
 
 SURE = 1e-11
-"""Residual from which one step more, be it not looked at, ends at an equilibrium."""
+"""Residual from which one further Newton step converges without a check."""
 
 HAIR = 1e-9
 """Relative difference of pressures that is rounding."""

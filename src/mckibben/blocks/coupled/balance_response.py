@@ -19,7 +19,7 @@ KINDS = ("reach", "width", "stiffness", "creep")
 input over how far it moves; share of a step's way that comes after the first second."""
 
 AFTER = 1.0
-"""Time after a step from which what moves is creep [s]."""
+"""Time after a step from which motion counts as creep [s]."""
 
 
 @dataclass(frozen=True)

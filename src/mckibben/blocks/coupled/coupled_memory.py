@@ -116,7 +116,7 @@ class CoupledMemory(Block):
     kernel = coupled_memory_step
     start_kernel = coupled_memory_start
     parameters = ("readout",)
-    no_inverse = "has no inverse: its lags cannot be undone within a sample"
+    no_inverse = "has no inverse: its lags cannot be inverted within a sample"
     instead = "invert balance or sdchm, or close a loop"
     notation = Notation(
         r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",

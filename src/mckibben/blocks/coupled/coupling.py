@@ -22,7 +22,7 @@ from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 WORST_CONDITION = 1e8
-"""Beyond this condition number a coupling is taken for singular."""
+"""Condition number above which a coupling counts as singular."""
 
 
 @step
@@ -103,7 +103,7 @@ class Coupling(Block):
         condition = float(np.linalg.cond(self.matrix))
         if not condition < WORST_CONDITION:
             raise ModelError(
-                "the coupling cannot be undone: its gains are singular (condition "
+                "the coupling cannot be inverted: its gains are singular (condition "
                 f"{condition:.1e})",
                 remedy="identify it from runs in which each muscle is driven alone",
             )

@@ -34,15 +34,15 @@ from mckibben.blocks.solving import eliminate, newton_cost
 from mckibben.errors import ModelError
 
 MOST_STEPS = 40
-"""Of Newton's method in a sample."""
+"""Maximum number of Newton steps per sample."""
 
 SOLVED = 1e-11
-"""Residual by the size of the outputs that is rounding."""
+"""Residual, relative to the outputs, that is rounding."""
 
 SINGLE = {"SOLVED": 1e-5}
 
 STARTS = 5
-"""Places from the lowest to the highest inputs from which the first sample is sought."""
+"""Number of initial guesses for the first sample, from the lowest to the highest inputs."""
 
 
 @kernel

@@ -132,7 +132,7 @@ class LoadEstimate(Block):
         n, n_loads = loads.shape
         if n_loads == 0:
             raise ModelError(
-                "a balance without a load estimates none",
+                "this balance has no load to estimate",
                 remedy="identify it on recordings with a measured force",
             )
         if any(channel.unit != "bar" for channel in self.forward.given):
@@ -182,7 +182,7 @@ def load_of(model: Block) -> Block:
         If the model knows no load, or its coordinates are not measured one by one.
     """
     if isinstance(model, LoadEstimate):
-        raise ModelError("this is an estimate of loads already", remedy="simulate it")
+        raise ModelError("this is already a load estimator", remedy="simulate it")
     if isinstance(model, Balance):
         return LoadEstimate(model)
     placed = balance_in(model)

@@ -33,7 +33,7 @@ from mckibben.blocks.parameters import same_as
 from mckibben.errors import ModelError
 
 LEAST_FIRING = 1e-290
-"""Sum of the firing of rules below which no rule counts."""
+"""Smallest total firing strength; below it no rule is active."""
 
 SINGLE = {"LEAST_FIRING": 1e-36}
 
@@ -153,7 +153,7 @@ class RecurrentFuzzyNetwork(Block):
         (Channel("force", "N"),),
         (Channel("displacement", "mm"),),
     )
-    no_inverse = "has no inverse: a sample of its input moves its output by next to nothing"
+    no_inverse = "has no inverse: within one sample its input hardly changes its output"
     instead = "invert balance, or close a loop"
     parameters = ("centres", "widths", "feedbacks", "consequents")
     notation = Notation(
@@ -196,7 +196,7 @@ class RecurrentFuzzyNetwork(Block):
         rows = {len(self.centres), len(self.widths), len(self.feedbacks)}
         if rows != {self.n_regressors} or len(sets) != 1 or sets == {0}:
             raise ModelError(
-                f"{self.kind!r} wants centres, widths and feedbacks of {self.n_regressors} "
+                f"{self.kind!r} needs centres, widths and feedbacks of {self.n_regressors} "
                 "inputs, as many sets for each",
                 remedy="give them",
             )

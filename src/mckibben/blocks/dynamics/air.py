@@ -35,13 +35,15 @@ from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError, ModelWarning
 
 LONGEST_LAG = 1e6
-"""Seconds."""
+"""Largest time constant [s]."""
 
 APPROACHED = 0.05
-"""Share of the range at both ends that lags only creep through, which is not counted as reachable."""
+"""Share of the range at either end that is approached only asymptotically and not counted as
+reachable.
+"""
 
 WHOLE = 1e-6
-"""Share of a sample by which a dead time may be off a whole number of them."""
+"""Share of a sample by which a dead time may differ from a whole number of samples."""
 
 
 @kernel

@@ -31,11 +31,12 @@ from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 HEAD = 7
-"""Coefficients before the thresholds: lags of the output, of the input, operators, and the scales."""
+"""Number of coefficients before the thresholds: lags of output and input, operators, and scales."""
 
 FARTHEST, SPACING, PLACES = 1.5, 0.0025, 1201
-"""Where rest is looked for, in scaled output: from one end of the data's range, and half of it more, to
-the other."""
+"""Grid of scaled outputs on which an equilibrium is searched: the data's range and half of it
+beyond either end.
+"""
 
 HIGHEST_DEGREE, MOST_TERMS = 20, 10_000
 
@@ -190,7 +191,7 @@ class Narx(Block):
     """
 
     rate_dependent = True
-    no_inverse = "has no exact inverse: nothing keeps its output rising with its input"
+    no_inverse = "has no exact inverse: its output need not increase with its input"
 
     output_lags: Lags
     input_lags: Lags

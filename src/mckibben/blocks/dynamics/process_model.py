@@ -235,7 +235,7 @@ class ProcessModel(Block):
         if self.delay > 0:
             raise ModelError(
                 f"{self.kind!r} has a dead time of {self.delay:g} s, which a continuous "
-                "transfer function has no place for",
+                "transfer function cannot represent",
                 remedy="give a sample time",
             )
         zero = [] if self.zero_time is None else [self.gain * self.zero_time]

@@ -17,10 +17,10 @@ Substeps = Annotated[int, Interval(ge=1, le=10_000)]
 Hold = Literal["first", "zero"]
 
 PERIODS, REPEATS = 100, 1e-9
-"""Periods run until two are the same, at most; and the difference that is none, by the range."""
+"""Maximum number of periods simulated, and the relative difference at which two are equal."""
 
 BETWEEN = 2
-"""Samples put into a substep where the input is band-limited: straight lines join them."""
+"""Interpolated samples per substep of a band-limited input."""
 
 
 def steady_state(block: Any, recording: Recording) -> Recording:

@@ -22,7 +22,9 @@ from mckibben.recording import Recording
 Mask = NDArray[np.bool_]
 
 KNOWN = 0.5
-"""Least norm, where outputs are known, of a start's response whose norm is 1, to solve for it."""
+"""Smallest norm, over known outputs, of the unit-norm start response for which a start state is
+estimated.
+"""
 
 
 def fitted_places(block: Block, rule: Initial | None = None) -> list[int]:

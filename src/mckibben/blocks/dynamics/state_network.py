@@ -29,13 +29,15 @@ from mckibben.blocks.notation import Notation
 from mckibben.errors import ModelError
 
 HEAD = 9
-"""Numbers before the weights."""
+"""Number of coefficients before the weights."""
 
 SETTLING, SETTLING_STEP = 1000, 0.1
-"""Steps in which a start at rest is reached, and their length in units of 1 / rate."""
+"""Number of steps in which an initial equilibrium is reached, and their length in units of 1 /
+rate.
+"""
 
 FASTEST = 2.5
-"""Units of 1 / rate in a substep, at most."""
+"""Largest substep, in units of 1 / rate."""
 
 
 @kernel

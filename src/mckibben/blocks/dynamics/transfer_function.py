@@ -213,7 +213,7 @@ class TransferFunction(Block):
         lead = self.numerator[0]
         if lead == 0:
             raise ModelError(
-                f"{self.kind!r} has no inverse: its output answers a sample late",
+                f"{self.kind!r} has no inverse: its output is delayed by a sample",
                 remedy="identify it with `settings[delay]=0`",
             )
         zeros = np.roots(self.numerator)

@@ -26,7 +26,7 @@ from mckibben.errors import ModelError
 
 PORTS: Ports = ("input",), ("force",), ("output",)
 
-UNDOES_A_MUSCLE = "has no inverse here: it already gives the pressure for a contraction"
+UNDOES_A_MUSCLE = "has no inverse here: it already computes the pressure for a contraction"
 INSTEAD = "use it as the compensator, or fit pressure to contraction by another model"
 
 

@@ -27,13 +27,14 @@ from mckibben.blocks.notation import Notation
 from mckibben.blocks.solving import newton
 
 SHARE = 0.995
-"""Of the contraction at which the braid pulls no more: the furthest that the muscle goes."""
+"""Largest contraction of the muscle, relative to the contraction at which the braid's pull is zero.
+"""
 
 LEAST = -0.1
-"""Contraction below which no muscle is modelled."""
+"""Smallest contraction modelled."""
 
 STILL = 1e-16
-"""Change of the contraction below which it has been found."""
+"""Change of the contraction at which the iteration has converged."""
 
 SINGLE = {"STILL": 1e-8}
 

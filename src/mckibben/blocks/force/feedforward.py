@@ -31,7 +31,7 @@ from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 
 LEAST_PULL = 1e-9
-"""Force per bar below which no pressure gives a force [N/bar]."""
+"""Smallest force per bar for which a pressure is computed [N/bar]."""
 
 SINGLE = {"LEAST_PULL": 1e-9}
 

@@ -38,7 +38,7 @@ class ForceLaw(Block):
     """A static force law: driven by length [mm], scheduled by pressure [bar], giving force [N]."""
 
     ports = ("input",), ("pressure",), ("output",)
-    no_inverse = "has no inverse by length, since more than one may give a force"
+    no_inverse = "has no inverse by length, since several lengths may have the same force"
     instead = "for the pressure that gives a force at a length, use ForceFeedforward(law)"
 
     input: fields.Channel
@@ -46,7 +46,9 @@ class ForceLaw(Block):
     output: fields.Channel
 
     terms_kernel: ClassVar[Callable[[float, Array], tuple[float, float]]]
-    """Force per pressure [N/bar], and force without any [N], from a length and `coefficients`."""
+    """Computes force per pressure [N/bar] and force at zero pressure [N] from a length and
+    `coefficients`.
+    """
 
     def terms(self, length: Array) -> tuple[Array, Array]:
         """Return force per pressure [N/bar], and force without any [N], each of the shape given.
@@ -204,7 +206,7 @@ class ChouHannaford(ForceLaw):
 # -- a braided cylinder with corrections -----------------------------------------------------
 
 MU_DECAY = 40.0
-"""Per contraction."""
+"""Decay of mu per unit of contraction."""
 
 
 @step

@@ -39,7 +39,7 @@ from mckibben.errors import ModelError
 Direction = Literal["shared", "both", "lengthening", "shortening"]
 WAYS = ("lengthening", "shortening")
 QUANTITIES = ("k [N/mm]", "sigma [N s/mm]", "F_c [N]")
-"""Numbers of an element in one direction; first come those of lengthening, then those of shortening."""
+"""Parameters of an element in one direction; lengthening first, then shortening."""
 
 PLACES: dict[Direction, tuple[int, ...]] = {
     "shared": (0, 1, 2, 4, 5),
@@ -47,8 +47,9 @@ PLACES: dict[Direction, tuple[int, ...]] = {
     "lengthening": (0, 1, 2),
     "shortening": (3, 4, 5),
 }
-"""Which of these six the values of an element are. Without its own, a direction has the k and sigma of
-the other, and no F_c."""
+"""Which of these six parameters an element has. A direction without its own takes k and sigma of
+the other direction, and no F_c.
+"""
 
 SIZES = {element: len(places) for element, places in PLACES.items()}
 ELEVEN: tuple[Direction, ...] = ("shared", "shortening", "shortening")

@@ -53,7 +53,7 @@ class Envelope(Parametrised):
     """A strictly increasing function of the input, with its inverse."""
 
     increasing: ClassVar[tuple[str, ...]] = ()
-    """Fields of numbers in increasing order, which single precision must not make one."""
+    """Fields that must be strictly increasing, also after rounding to single precision."""
 
     value: ClassVar[EnvelopeKernel]
     inverse: ClassVar[EnvelopeKernel]

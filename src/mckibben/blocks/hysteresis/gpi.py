@@ -229,7 +229,7 @@ class GPI(Invertible):
             raise ModelError(
                 f"'gpi' has no inverse: at {where:.4g} {self.input.unit} its falling "
                 f"envelope is {-gap:.3g} below the rising one",
-                remedy="identify it with `fit()`, which keeps them in order",
+                remedy="identify it with `fit()`, which constrains their order",
             )
 
     def inverse_numbers(self, own: Array) -> Array:

@@ -43,13 +43,14 @@ from mckibben.blocks.parameters import gathered
 from mckibben.errors import ModelError
 
 HEAD = 7
-"""Numbers before those of the element."""
+"""Number of coefficients before those of the hysteretic element."""
 
 SETTLING = 64
-"""Steps in which a start at rest is reached."""
+"""Number of steps in which an initial equilibrium is reached."""
 
 STABLE = 2.5
-"""Radians of the fastest oscillation in a substep beyond which Runge-Kutta steps may grow."""
+"""Angle of the fastest oscillation per substep [rad] above which Runge-Kutta steps may be unstable.
+"""
 
 
 def oscillator_kernels(slope: Callable[[float, float, Array], float]) -> tuple[Step, Start]:
@@ -143,10 +144,10 @@ class Oscillator(Block):
     steady_state = steady_state
     n_states = 4  # displacement, velocity, force of the element, last input
     slope_by: ClassVar[Any]
-    """Slope of the element's force by y, from [force, velocity, `element`]; compiled."""
+    """Slope of the element's force over y, from [force, velocity, `element`]; compiled."""
 
     elements: ClassVar[tuple[str, ...]]
-    """Fields of the element."""
+    """Fields of the hysteretic element."""
 
     mass: float
     damping: float

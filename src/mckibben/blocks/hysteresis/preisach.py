@@ -103,8 +103,9 @@ def on_diagonal(weights: Sequence[float]) -> Array:
 
 
 DEPTH = 64
-"""Turning points remembered. More are nested only in loops within loops 32 deep; the smallest two
-are then forgotten."""
+"""Number of turning points stored. Only loops nested 32 deep need more; the smallest two are then
+forgotten.
+"""
 
 
 @kernel
@@ -160,10 +161,10 @@ def _solve(target: float, other: float, rising: bool, levels: Array, table: Arra
 CORNERS, OUTPUTS = 2, 2 + DEPTH
 LAST, LAST_OUTPUT = 2 + 2 * DEPTH, 3 + 2 * DEPTH
 CLIPPED = 4 + 2 * DEPTH
-"""Places in the state, and behind it in that of the inverse."""
+"""Index of the clip counter in the inverse's state, after the block's own state."""
 
 SWINGS = DEPTH // 2 - 2
-"""From end to end, before a virgin start."""
+"""Number of shrinking swings that lead to a virgin start."""
 
 
 @kernel

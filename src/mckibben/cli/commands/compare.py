@@ -17,7 +17,7 @@ from mckibben.cli.stopping import stop_short, stoppable
 from mckibben.options import CompareOptions, Option, ReadOptions
 
 NO_MODEL = 1
-"""Exit code where none of the models could be fitted."""
+"""Exit code if no model could be fitted."""
 
 
 @command

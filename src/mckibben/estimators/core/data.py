@@ -18,10 +18,10 @@ Mask = NDArray[np.bool_]
 Made = TypeVar("Made")
 
 MOVES_AT_ALL = 0.02
-"""Share of its known range below which an output does not move."""
+"""Share of its known range below which an output counts as constant."""
 
 FEWEST_SAMPLES = 10
-"""Fewer samples than this identify nothing."""
+"""Smallest number of samples for identification."""
 
 
 def stretches(mask: Mask) -> list[tuple[int, int]]:
@@ -40,16 +40,19 @@ class Run:
     counts: Mask
     sample_time: float | None
     peak: float | None = None
-    """Input from which the run came before its first sample, where that is not below: its memory."""
+    """Input from which the run started before its first sample, where it is not lower: its initial
+    memory.
+    """
 
     place: int = 0
-    """Among all runs."""
+    """Index among all runs."""
 
     recording: int = 0
-    """Place of its recording among all."""
+    """Index of its recording."""
 
     unmeasured: tuple[str, ...] = ()
-    """Channels that schedule and that it lacks, which are as in others on average."""
+    """Scheduling channels that the recording lacks; their mean over the other recordings is used.
+    """
 
     @property
     def u(self) -> Array:
@@ -414,7 +417,7 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
         raise DataError(
             "some recordings have time and others have none",
             file=recording.source,
-            remedy="give `rate` for those without, or fit them apart",
+            remedy="give `rate` for those without, or fit them separately",
         )
     if one_rate and ours is not None and theirs is not None and abs(ours - theirs) > 1e-3 * theirs:
         raise DataError(

@@ -38,24 +38,26 @@ Operators = Annotated[int, Interval(ge=1, le=1000)]
 """Number of operators."""
 
 Purpose = Literal["memory", "rate", "several", "force"]
-"""What models are for: loops of one muscle, lags and dynamics, several muscles or loads, forces."""
+"""Purpose of a model: hysteresis of one muscle, dynamics, several muscles or loads, force."""
 
 InverseKind = Literal["exact", "exact where stable", "solved", "none"]
-"""How models are inverted: by a formula, by one whose stability depends on the fit, by solving in
-every sample, or not at all."""
+"""Kind of inverse: closed form, closed form whose stability depends on the fit, solved in every
+sample, or none.
+"""
 
 Grid = Mapping[str, tuple[Any, ...]]
-"""Setting -> values to try."""
+"""Setting -> candidate values."""
 
 DefaultFor = Literal["load", "plan of displacement", "plan of force"]
-"""Where one model is used without being named: fitted to each load, beside models that are given the
-load; or fitted before a plan of recordings."""
+"""Where a model is the default: fitted to each load separately, in a comparison of models with a
+load input; or fitted for a plan of recordings.
+"""
 
 Start = Literal["first_sample", "virgin"]
-"""Memory before the first sample of every recording where it is not fitted."""
+"""State before the first sample of every recording, if it is not estimated."""
 
 Initial = Literal[Start, "fitted"]
-"""The same, or fitted with the rest."""
+"""The same, or "fitted": estimated with the parameters."""
 
 
 @dataclass(frozen=True)
@@ -69,30 +71,32 @@ class Diagnostics:
     rmse: float
     rmse_by_output: tuple[float, ...]
     rmse_from_rest: float
-    """Each run started as a stream or generated code starts: without knowing an output."""
+    """RMSE with every run started from rest, without known outputs, as in a stream or generated
+    code.
+    """
 
     n_samples: int
     n_free: int
-    """Numbers of the model that the fit was free to choose: its parameters, as tables count them."""
+    """Number of free parameters of the fit; tables count them as parameters."""
 
     n_evaluations: int
-    """Times the model was evaluated in the search."""
+    """Number of evaluations of the model in the search."""
 
     seconds: float
     interrupted: bool
-    """Whether the user stopped the search; the model is then the best found until there."""
+    """Whether the user stopped the search; the model is then the best one found."""
 
     at_bounds: tuple[int, ...]
-    """Parameters, by their place in ``model_.pack()``, that ended at a bound."""
+    """Indices, in ``model_.pack()``, of the parameters at a bound."""
 
     peaks: tuple[float | None, ...]
-    """For every recording, the input from which it was taken to have come before its first sample."""
+    """For every recording, the assumed input from which it started before its first sample."""
 
     notes: tuple[str, ...]
-    """What the user should know."""
+    """Notes for the user."""
 
     uncertainty: Callable[[], tuple[float, Array]] = field(repr=False)
-    """Gives `condition` and `covariance`, which are computed when first asked for."""
+    """Has `condition` and `covariance`, computed on first access."""
 
     @cached_property
     def _uncertainty(self) -> tuple[float, Array]:
@@ -140,53 +144,56 @@ class Estimator(ABC):
     output: str | tuple[str, ...] | None = "displacement"
 
     title: ClassVar[str] = ""
-    """Full name of the model; its short name if empty."""
+    """Full name of the model; by default its short name."""
 
     purpose: ClassVar[Purpose | None] = None
-    """What it is for, by which models are listed; None lists it under others."""
+    """Purpose by which models are grouped; None groups it under others."""
 
     can: ClassVar[str] = ""
-    """What it represents, in a sentence; the first line of the docstring if empty."""
+    """What it represents, in one sentence; by default the first line of the docstring."""
 
     cannot: ClassVar[str] = ""
-    """What it does not represent, in a sentence."""
+    """What it does not represent, in one sentence."""
 
     caution: ClassVar[str | None] = None
-    """Why it is good only near the motions that it was trained on; None where it is not."""
+    """Why it is reliable only near its training motions; None if it extrapolates."""
 
     inverse_kind: ClassVar[InverseKind] = "none"
-    """How its models are inverted as a rule; a fitted one may lack its inverse."""
+    """Usual kind of inverse of its models; a fitted model may have none."""
 
     quick: ClassVar[bool] = False
-    """Whether it is tried first: well known, or good, and fitted in seconds."""
+    """Whether it is in the quick selection: established or accurate, and fitted in seconds."""
 
     targets: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
-    """Settings with which a model can be exported to a format that carries less."""
+    """Export format -> settings with which a model can be exported to it."""
 
     param_grid: ClassVar[Grid] = {}
-    """Setting -> values tried where orders are chosen by cross-validation."""
+    """Setting -> values for choosing orders by cross-validation."""
 
     makes: ClassVar[tuple[str, ...]] = ()
-    """Models that it can fit again with as many operators, each by the kinds of its parts in order."""
+    """Models that it can refit with as many operators, each by the kinds of its parts in order."""
 
     default_for: ClassVar[DefaultFor | None] = None
-    """Where it is used without being named."""
+    """Where it is the default model."""
 
     effort: ClassVar[float] = 0.5
-    """About how long a fit to 10 000 samples takes [s]: models are compared cheapest first."""
+    """Approximate time of a fit to 10 000 samples [s]; comparisons start with the fastest models.
+    """
 
     needs_time: ClassVar[bool] = False
-    """Whether it cannot learn from recordings without time."""
+    """Whether recordings must have time."""
 
     made_for: ClassVar[tuple[str, str] | None] = None
-    """Kinds of channel, input and output, that the model is about; None for any."""
+    """Kinds of input and output channels that it models; None for any."""
 
     told: ClassVar[tuple[str, ...]] = ()
-    """Settings that name channels which the model is given beside the input; of the block, too."""
+    """Settings that name further input channels, of the block as well."""
 
     solves_starts: ClassVar[bool] = False
-    """Whether a fitted `initial` is a state solved for. Where such states alone explain the recordings,
-    the model from rest being further off than the output ever moves, it is found from rest instead."""
+    """Whether `initial="fitted"` estimates start states. If these states alone explain the
+    recordings, and the error from rest exceeds the range of the output, it is fitted from rest
+    instead.
+    """
 
     errors_known: ClassVar[bool] = True
     """Whether standard errors of the parameters are computed."""
@@ -239,7 +246,7 @@ class Estimator(ABC):
         if len(inputs) != 1 or len(outputs) != 1:
             return "it is of one input and one output"
         if scheduling is not None:
-            return "it is not told the load"
+            return "the load is not one of its inputs"
         (given,), (wanted,) = inputs, outputs
         kinds = (given.partition("_")[0], wanted.partition("_")[0])
         if cls.made_for is not None and kinds != cls.made_for:

@@ -22,13 +22,13 @@ from mckibben.recording import Recording
 from mckibben.system.threads import one_blas_thread
 
 FARTHEST = np.log(1000.0)
-"""Logarithm of the factor beyond which a parameter has no bound."""
+"""Logarithm of the factor beyond which a parameter counts as unbounded."""
 
 FIRST_STEP, LEAST_STEP = 0.05, 0.003
-"""Of a logarithm, outward, and where the end is known well enough."""
+"""First outward step of a parameter's logarithm, and tolerance of the bound."""
 
 DIFFERENCE = 1e-5
-"""Of a logarithm, for sensitivities."""
+"""Step of a parameter's logarithm, for sensitivities."""
 
 
 def parameter_ranges(

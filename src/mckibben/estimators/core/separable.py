@@ -26,19 +26,21 @@ from mckibben.estimators.optimisers.multi_start import Choice, multi_start
 from mckibben.estimators.optimisers.tracker import Tracker
 
 SEARCH_SAMPLES = 1500
-"""Samples that count while many starts are compared."""
+"""Largest number of samples used to compare starts."""
 
 POLISH_SAMPLES = 20_000
-"""Samples that count while the best is polished; the linear parameters are then solved on all."""
+"""Largest number of samples used to refine the best start; linear parameters are then solved on all
+samples.
+"""
 
 LEAST_REVERSIBLE = 1e-3
-"""Least share of the output's range that the operator without dead zone gives."""
+"""Smallest share of the output's range for the operator without dead zone."""
 
 DIFFERENCE = 1e-7
 """Step of finite differences, relative to the range that a parameter is searched in."""
 
 WORST = 1e150
-"""Cost of parameters whose output overflows; its square is still a number."""
+"""Cost of parameters whose output overflows; its square is finite."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -70,16 +72,16 @@ class SeparableEstimator(Estimator):
 
     search_evaluations: ClassVar[int] = 15
     polish_evaluations: ClassVar[int] = 10
-    """Most evaluations of a refinement, and of the final one on more samples."""
+    """Maximum number of evaluations of a refinement, and of the final one on more samples."""
 
     searches_condensed: ClassVar[bool] = True
-    """Whether the search may skip what lies between turning points of the input."""
+    """Whether the search may use turning points of the input only."""
 
     fits_peaks: ClassVar[bool] = True
-    """Whether a fitted start is the input from which every run came down."""
+    """Whether a fitted start is the input from which every run descended."""
 
     rises: ClassVar[bool] = True
-    """Whether the block's output rises with its input, so that falling data are turned over."""
+    """Whether the block's output increases with its input; decreasing data are then mirrored."""
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return lowest and highest non-linear parameters, each of shape (m,); by default none."""

@@ -20,7 +20,7 @@ STRICT_SETTINGS = ConfigDict(strict=True, allow_inf_nan=False)
 Kind = Literal["choice", "flag", "whole", "number", "text"]
 
 LARGE = 2**31
-"""Limits beyond which are no help to anyone."""
+"""Limits with a larger magnitude are not shown in messages."""
 
 
 @dataclass(frozen=True)

@@ -24,20 +24,21 @@ from mckibben.estimators.core.data import Run, TrainingData, stretches
 from mckibben.statistics import Autoregression, autoregression
 
 Simulated = Callable[[Sequence[Block], TrainingData], Array]
-"""Gives the free-running outputs of blocks where samples count, shape (blocks, n)."""
+"""Returns the free-running outputs of blocks at the samples used, shape (blocks, n)."""
 
 LARGEST = 1e150
-"""Sensitivity that still is one: its square is a number."""
+"""Largest sensitivity; its square is finite."""
 
 DIFFERENCE = 1e-6
 """Step of finite differences, relative to the size of a parameter."""
 
 LEAST, DETERMINED = 1e-6, 0.99
-"""Share of the largest singular value of sensitivities that tells anything; share of a parameter's own
-direction that must be told."""
+"""Smallest singular value of the sensitivities, relative to the largest, that is used; share of a
+parameter's direction that must be determined.
+"""
 
 NOTHING = 1e-9
-"""Share of its size below which a parameter is 0."""
+"""Relative size below which a parameter counts as 0."""
 
 
 def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:

@@ -49,43 +49,46 @@ from mckibben.muscles.traits import TRAVELS
 from mckibben.recording import Recording, listed
 
 PRESSURES = ("bar", "V", "")
-"""Units of what drives a muscle; where none is said, whoever names it is believed."""
+"""Units of driving channels; a channel without unit is accepted if the user names it."""
 
 LIMITED = ("bar", "V")
-"""Units of what the hardware limits."""
+"""Units of channels with hardware limits."""
 
 FEW, MOST, MOST_SAMPLES = 6_000, 12_000, 60_000
-"""Errors that are looked at to find terms, and in the end; samples that are run through then."""
+"""Number of errors used to select terms, and for the final fit; number of samples simulated there.
+"""
 
 GRIPS = (0.05, 0.3, 1.0, 4.0)
-"""Pressures below zero at which friction holds nothing, relative to the highest, to begin from."""
+"""Initial friction offsets: pressures below zero, relative to the highest, at which friction
+vanishes.
+"""
 
 CONSTANT = 1e6
-"""The same, so far below that friction does not depend on pressure."""
+"""Friction offset so large that friction does not depend on pressure."""
 
 ROUNDS, STEPS_BETWEEN, LAST_STEPS = 6, 8, 8
-"""Times that terms are added, and steps before each; those on all samples in the end."""
+"""Number of rounds of term selection, steps before each, and final steps on all samples."""
 
 LAST = ("asymmetry",)
-"""Terms that are added after all others: friction by direction resembles much that is not friction."""
+"""Terms that are tried last: friction by direction resembles other effects."""
 
 FIRM = 0.7
-"""Of the most that muscles resist with, share at which they go slack at first."""
+"""Initial force of slackening, relative to the largest resistance of the muscles."""
 
 FINEST, LONGEST = 0.003, 0.5
-"""Shortest and longest travels at which stops break away, relative to the stroke."""
+"""Shortest and longest break-away distances of stops, relative to the stroke."""
 
 PLACES = (0.6, 0.8, 0.9, 0.97)
-"""Of obstacles on the way up, along the range of what is moved; on the way down, from its end."""
+"""Candidate positions of obstacles, as shares of the range; for lowering, from its end."""
 
 TERMS = (
     *("elasticity", "areas", "relaxation", "line", "mass", "obstacle", "springs"),
     *("grips", "asymmetry", "walls", "filling", "venting", "dead", "contact", "muscles", "slack"),
 )
-"""Kinds of terms that may be added."""
+"""Kinds of candidate terms."""
 
 PARTS = {"lags": "relaxation", "places": "obstacle", "pushes": "slack"}
-"""Terms that are parts of others."""
+"""Terms that are part of other terms."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -143,12 +146,10 @@ class BalanceEstimator(CoupledEstimator):
 
     title = "Balance of forces"
     can = (
-        "Springs, areas, friction and relaxation of one muscle or several, on coordinates of their own "
+        "Springs, areas, friction and relaxation of one muscle or several, on separate coordinates "
         "or a joint, under loads and torques; terms chosen by cross-validation."
     )
-    cannot = (
-        "One set of lags serves all muscles; areas and springs follow shortening, not temperature."
-    )
+    cannot = "All muscles share one set of lags; areas and springs depend on shortening only."
     inverse_kind = "exact"
     quick = True
     default_for = "plan of displacement"
@@ -262,7 +263,7 @@ class BalanceEstimator(CoupledEstimator):
         still = self.prior is None and one_speed(data)
         if still and self.n_lags and self.lags is None:
             tracker.notes.append(
-                "all moves at about one speed: relaxation and friction cannot be distinguished, and "
+                "all motion is at about one speed: relaxation and friction cannot be distinguished, and "
                 "relaxation is left out: record at other speeds too, or give lags"
             )
         structure = self.widest(bench, timed=not still or self.lags is not None)
@@ -513,17 +514,20 @@ class BalanceEstimator(CoupledEstimator):
 
 
 FIRST_GRIP, TOWARDS, REFINED = 0.1, 60, 3
-"""Where what is likely begins, relative to the highest pressure; most steps from there to it; times
-that a belief is weighed anew."""
+"""First friction offset of the prior, relative to the highest pressure; maximum number of steps
+from there; number of reweightings of the prior.
+"""
 
 OF_TRAITS = ("elasticity", "areas", "friction", "relaxation")
-"""Kinds of terms of which a prior is."""
+"""Kinds of terms that a prior covers."""
 
 OWN_HELPS = 0.1
-"""By how much what recordings have of their own, or how they begin, has to lessen errors."""
+"""Smallest relative reduction of errors by per-run nuisance parameters, or by start states."""
 
 EXPLAINED = 1.5
-"""Times the error of all but first parts up to which that of all explains how runs begin."""
+"""Largest ratio of the error of whole runs to that without their first parts, for start states to
+explain the runs.
+"""
 
 
 def _within(given_range: tuple[float, float] | None, block: Block) -> Block:

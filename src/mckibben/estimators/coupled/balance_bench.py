@@ -19,28 +19,32 @@ from mckibben.estimators.coupled.base import LOADS
 from mckibben.recording import Recording
 
 ALIKE = 0.02
-"""Share of its largest value by which what schedules or loads has to change to be seen."""
+"""Smallest variation of a scheduling or load channel, relative to its largest value."""
 
 BLOCK, NOISE = 25, 0.4
-"""Samples whose means are compared, and the share of the range over which noise has no means."""
+"""Samples per averaged block, and noise, as a share of the range, above which means are not
+compared.
+"""
 
 LEAST_MOVED = 0.02
-"""Share of the most that any pressure moves below which one moves nothing, of a coordinate too."""
+"""Motion due to a pressure, relative to the largest, below which the pressure has no effect."""
 
 STILL = 0.005
-"""Share of the most that any output moves, below which one does not."""
+"""Motion of an output, relative to the largest, below which it counts as constant."""
 
 LARGEST = 1e12
-"""Number that no muscle has."""
+"""Bound of plausible numbers."""
 
 FAR = 0.5
-"""Outputs that all are further from zero than this share of their range count from elsewhere."""
+"""Distance of outputs from zero, relative to their range, above which they have another origin."""
 
 AT_START = 0.02
-"""Displacement at the start of a run that is none, relative to the range."""
+"""Displacement at the start of a run, relative to the range, that counts as zero."""
 
 ONE_SPEED, SLOW = 2.0, 0.05
-"""Ratio of fast to slow speeds up to which there is one; share of the fastest below which they rest."""
+"""Largest ratio of fast to slow speeds that counts as one speed; share of the fastest below which a
+channel is at rest.
+"""
 
 
 def with_loads(
@@ -171,7 +175,7 @@ def directions(data: TrainingData) -> Array:
     if np.linalg.svd(ways, compute_uv=False)[-1] < LEAST_MOVED:
         raise DataError(
             "all outputs move together, whatever the pressures",
-            remedy="leave out all but one, or record runs in which pressures move apart",
+            remedy="leave out all but one, or record runs in which pressures move independently",
         )
     return ways
 

@@ -51,12 +51,12 @@ class BalanceForceEstimator(SearchEstimator):
     title = "Force from a balance of forces"
     purpose = "force"
     can = (
-        "Force by length, or displacement, and pressure: a balance of forces asked for its "
+        "Force by length, or displacement, and pressure: a force balance solved for its "
         "load, with friction and relaxation."
     )
     cannot = (
-        "Loops at held length come from friction alone; beyond the lengths recorded its area "
-        "goes on straight."
+        "At constant length only friction makes loops; beyond the recorded lengths its area is "
+        "extrapolated linearly."
     )
     quick = True
 

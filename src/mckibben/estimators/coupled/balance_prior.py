@@ -21,19 +21,19 @@ from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import TIMES, traits
 
 STEP = 1e-5
-"""Change of a number, relative to what is much of it, by which traits' slopes are found."""
+"""Relative step of a number for finite differences of traits."""
 
 LEAST_NOISE = 0.01
-"""Error relative to the range, of independent samples, by which any model of a muscle is off."""
+"""Smallest model error of a muscle, relative to the range, for independent samples."""
 
 ZERO_STEPS = 6
-"""To where displacements are likely to count from."""
+"""Steps towards the probable origin of displacements."""
 
 SHORTEST_LAG = 1.0
-"""First time constant that may be [s], whatever the recordings."""
+"""Smallest first time constant [s]."""
 
 Told = str | Path | Sheet | InstanceOf[Prior] | None
-"""What a prior may be given as: a muscle's name, a file, a data sheet (as a mapping, too), or itself."""
+"""Forms of a prior: a muscle's name, a file, a data sheet (also as a mapping), or a prior."""
 
 
 @dataclass(frozen=True)

@@ -39,37 +39,39 @@ EXACT, OF_AIR = (
     ("grip", "grips", "asymmetry", "lags", "places"),
     ("filling", "venting", "dead", "contact"),
 )
-"""Shape of which slopes are exact, in the order that `balance_slopes` has them; and that in front."""
+"""Nonlinear parameters with exact derivatives, in the order of `balance_slopes`; and those of the
+air.
+"""
 
 WARMING = 0.2
-"""Share of a run that does not begin at rest before which its errors do not count."""
+"""Initial share of a run that starts away from rest in which errors are ignored."""
 
 UNLIKELY = 0.03
-"""Error, relative to the range, as bad as a start with all friction loaded, or a range behind."""
+"""Error, relative to the range, that costs as much as start states with all friction loaded."""
 
 STEP, FIRST_STEP = 1e-4, 0.5
-"""Change of shape, relative to what is much of it, by which slopes are found; of shape that is new."""
+"""Relative step for finite differences of nonlinear parameters, and of new ones."""
 
 RESTING = 0.1
-"""Share of the range of pressure up to which a run begins at rest."""
+"""Share of the pressure range up to which a run starts at rest."""
 
 FILLS = 0.02
-"""Share of a pressure that acts within the dead zone: an inverse needs some."""
+"""Share of a pressure that acts inside the dead zone, so that an inverse exists."""
 
 STRAIGHT = 0.01
-"""What inputs may be off a straight line, relative to their ranges."""
+"""Deviation of inputs from straight lines, relative to their ranges, that is ignored."""
 
 RIDGE = 1e-7
-"""Damping of least squares, relative to every coefficient's own effect."""
+"""Ridge of least squares, relative to each coefficient's own effect."""
 
 LEAST_AT_REST, PASSES = 0.1, 3
-"""Least area at rest, relative to that of all samples on average; times that forces are weighed anew."""
+"""Smallest area at rest, relative to the mean over samples; number of reweightings of forces."""
 
 MOST_CUTS = 8
-"""Times that springs are made stiff where they were found soft."""
+"""Maximum number of added stiffness constraints."""
 
 HELD = 0.02
-"""A muscle is held where it moves less than this share of what it moves in all runs."""
+"""Share of its motion in all runs below which a muscle counts as held."""
 
 
 def held(data: TrainingData, run: Run) -> bool:

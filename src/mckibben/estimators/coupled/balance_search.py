@@ -27,40 +27,40 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.statistics import autoregression
 
 BLOCKS, FOLDS = 20, 5
-"""About how many blocks all runs are cut into, and in how many parts they are left out in turn."""
+"""Approximate number of blocks of all runs, and of cross-validation folds."""
 
 DAMPED = 1e-2
-"""Damping of least squares of which errors are compared, towards what was found, by own effects."""
+"""Damping of the least squares whose errors are compared, relative to own effects."""
 
 AHEAD = 4
-"""Groups of terms that are added in a row before they, together, have to lessen errors."""
+"""Number of term groups that may be added before they, together, must reduce errors."""
 
 MOST_TRIES = 7
-"""Dampings tried for a step, each ten times the last."""
+"""Number of dampings tried per step, each ten times the last."""
 
 FIRST_DAMPING, LIGHTEST = 1e-3, 1e-7
-"""Damping of a first step; its root of one that is hardly damped."""
+"""Damping of the first step, and the smallest."""
 
 UNKNOWN = 1e-10
-"""Effect of a number's size, relative to the largest of any, that is none."""
+"""Effect of a parameter, relative to the largest, that counts as none."""
 
 FAR, APART = 0.5, 0.7
-"""Change of shape in one step, relative to what is much; least difference of the logarithms of lags."""
+"""Largest relative change per step; smallest difference of the logarithms of lags."""
 
 NO_GAIN = 1e-6
-"""Gain by a term, relative to the squared errors, that is rounding."""
+"""Gain of a term, relative to the squared errors, that is rounding."""
 
 SLOW, SLOWEST = 1e-3, 2
-"""Relative gain of a step that is slow, and how many of them end a descent."""
+"""Relative gain of a slow step, and number of slow steps that end a descent."""
 
 DEVIATIONS = (("areas",), ("elasticity", "bladder"), ("friction",), ("relaxation", "damping"))
-"""Kinds by which muscles may differ, together."""
+"""Kinds in which muscles may differ together."""
 
 NEW_SHAPE = ("asymmetry", "grips", "walls", "filling", "dead", "contact", "venting")
-"""Shape that is added by itself."""
+"""Nonlinear parameters that are added alone."""
 
 POSITIVE_SHAPE = ("grip", "grips", "walls", "filling", "dead", "contact")
-"""Shape that is not negative."""
+"""Non-negative nonlinear parameters."""
 
 
 @dataclass

@@ -28,17 +28,18 @@ Places = NDArray[np.intp]
 Item = TypeVar("Item")
 
 LEAST_AREA = 1e-9
-"""Area at rest that is next to none, relative to what is about that of a muscle."""
+"""Smallest area at rest, relative to a muscle's typical area."""
 
 LEAST_STIFF = 1e-3
-"""Stiffness that has to be left, relative to the force of the highest pressure over the stroke."""
+"""Smallest stiffness, relative to the force at the highest pressure over the stroke."""
 
 MOST_ASYMMETRIC, MOST_GRIP, MOST_WALL = 5.0, 4.0, 0.1
-"""Bounds of the ratio of limits; of the grip, over the highest pressure; of the wall's stretch by that
-pressure, over the stroke."""
+"""Bounds of the ratio of friction limits; of the friction offset, over the highest pressure; of the
+wall's stretch at that pressure, over the stroke.
+"""
 
 LONGEST_AIR = 2.0
-"""Time constant of air in front [s]."""
+"""Largest time constant of the air in front [s]."""
 
 
 @dataclass(frozen=True)
@@ -547,13 +548,13 @@ class Structure:
 
 
 LOGARITHMIC = ("lags", "asymmetry", "venting")
-"""Shape that is found by its logarithm."""
+"""Nonlinear parameters searched by their logarithm."""
 
 OF_MUSCLES = ("damping", "line", "mass", "bladder", "elasticity", "areas", "friction", "relaxation")
-"""Kinds of linear numbers of muscles."""
+"""Kinds of linear parameters of muscles."""
 
 NOT_NEGATIVE = ("damping", "line", "mass", "bladder", "friction", "relaxation")
-"""Those that are not negative."""
+"""Those that are non-negative."""
 
 
 def _slices(widths: dict[str, int], first: int = 0) -> dict[str, slice]:

@@ -24,16 +24,16 @@ from mckibben.numerals import numeral
 from mckibben.statistics import NORMAL_95
 
 POOR = 0.1
-"""Error relative to the range from which a model is said not to explain the recordings."""
+"""Relative error above which a note states that the model does not explain the recordings."""
 
 WORSE = 3.0
-"""Times the error of the others from which a recording's is said."""
+"""Error of a recording, relative to the others, above which a note states it."""
 
 AMPLITUDE, QUARTER = 0.25, 100
-"""Of loops, relative to the range of a pressure; samples of a quarter of one."""
+"""Amplitude of test loops, relative to the pressure range; samples in a quarter of one."""
 
 DETERMINED = 0.25
-"""Standard error, relative to a number, up to which it is said: twice that is a factor of two."""
+"""Largest relative standard error of a number that is stated: a factor of two at 95 %."""
 
 
 class Measured(NamedTuple):
@@ -151,7 +151,7 @@ def _of_runs(search: Search, z: Array) -> list[str]:
     parts = problem.errors(structure, z)[0][: len(problem.runs)]
     sizes = np.array([float(np.sqrt(np.mean(part**2))) for part in parts])
     found = [
-        f"{run.name} is followed {size / np.median(np.delete(sizes, place)):.2g} times worse than others"
+        f"the error of {run.name} is {size / np.median(np.delete(sizes, place)):.2g} times the median"
         for place, (run, size) in enumerate(zip(problem.runs, sizes.tolist(), strict=True))
         if len(sizes) > 1 and size > WORSE * np.median(np.delete(sizes, place))
     ]
@@ -177,7 +177,7 @@ def _of_loads(search: Search, z: Array, others: list[Array], balance: Balance) -
         share = np.array(balance.loads)[:, j]
         if (share < 0.0).all():
             found.append(
-                f"{channel.name} acts as if it helped the muscles: the more it is, the further they "
+                f"{channel.name} acts as if it helped the muscles: the larger it is, the further they "
                 "move at equal pressures. If it pulls against them, its sign is wrong: give "
                 "loads that pull muscles longer as positive"
             )

@@ -19,19 +19,19 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording, listed
 
 SCHEDULES = ("pressure_extensor", "force", "torque")
-"""Channels that schedule a model by default, where there are any."""
+"""Default scheduling channels."""
 
 LOADS = ("N", "N*m")
-"""Units of what loads muscles, or a joint that they move, instead of scheduling springs."""
+"""Units of loads on muscles or a joint, which are not scheduling inputs."""
 
 MOVES = 0.1
-"""An input moves in a run where it covers this share of the range it has over all runs."""
+"""Share of its range over all runs that an input must cover to move in a run."""
 
 RESTS = 0.03
-"""An input rests where it stays below this share of that range above its lowest value."""
+"""Share of that range above the lowest value below which an input is at rest."""
 
 FEWEST_SAMPLES = 50
-"""Fewer samples than this in a row identify nothing of several muscles."""
+"""Smallest number of successive samples for several muscles."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -56,27 +56,28 @@ class CoupledEstimator(Estimator):
     scheduling: tuple[str, ...] | None = None
 
     paired: ClassVar[bool] = True
-    """Whether there must be an output to every input."""
+    """Whether every input must have an output."""
 
     fewer_outputs: ClassVar[bool] = False
-    """Whether there may be fewer of them, nevertheless."""
+    """Whether there may still be fewer outputs than inputs."""
 
     alone: ClassVar[bool] = False
-    """Whether it is a model of one muscle under no measured load, too."""
+    """Whether it also models one muscle without a measured load."""
 
     unmeasured: ClassVar[bool] = False
-    """Whether recordings may lack a channel that schedules and that others have."""
+    """Whether recordings may lack a scheduling channel that others have."""
 
     through: ClassVar[bool] = False
-    """Whether it runs through what does not count, so that memory there is right; else stretches of
-    what counts each begin with a memory of their own."""
+    """Whether ignored samples are simulated too, so that the memory after them is right; otherwise
+    each segment starts with its own memory.
+    """
 
     each_alone: ClassVar[bool] = False
     """Whether every muscle must move alone in some run."""
 
     fewest_inputs: ClassVar[int] = 1
     most_inputs: ClassVar[float] = np.inf
-    """How many muscles there may be."""
+    """Maximum number of muscles."""
 
     @classmethod
     def objection(
@@ -96,9 +97,7 @@ class CoupledEstimator(Estimator):
         for name in scheduled:
             lacking = [recording.name for recording in recordings if name not in recording]
             if lacking and not cls.unmeasured:
-                return (
-                    f"it is told {name}, which {lacking[0]} lacks: give it there, or leave it out"
-                )
+                return f"it takes {name} as an input, which {lacking[0]} lacks: add it, or leave it out"
         if (
             not cls.alone
             and len(inputs) == len(outputs) == 1
@@ -267,8 +266,8 @@ def _never_alone(recordings: Sequence[Recording], inputs: Sequence[str]) -> str 
     for place, name in enumerate(inputs):
         if not any(moves_alone(run, place, lowest, highest) for run in driven):
             return (
-                f"{name} moves alone in no run, so hysteresis cannot be told from coupling: add a run "
-                "in which the other inputs rest"
+                f"{name} moves alone in no run, so hysteresis and coupling cannot be distinguished: add "
+                "a run in which the other inputs rest"
             )
     return None
 

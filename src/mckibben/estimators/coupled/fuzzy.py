@@ -21,28 +21,28 @@ from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 LIGHTEST = 1e-11
-"""Damping of every consequent, relative to the size of what it multiplies."""
+"""Smallest ridge of a consequent, relative to its regressor."""
 
 NARROWEST, WIDEST = 0.15, 1.5
 """Widths of sets, relative to the range of their input."""
 
 STAYING = 1e-3
-"""How strongly sets stay where they start, relative to the error there, if errors hardly change."""
+"""Weight that holds sets near their start, relative to the error there."""
 
 MOST_STEPS = 15
-"""Of variable projection."""
+"""Maximum number of steps of variable projection."""
 
 LEAST_GAIN = 2e-4
-"""Share of the squared error that a step has to gain for another to follow."""
+"""Smallest relative reduction of the squared error for another step."""
 
 ATTRACTION, INERTIA = 0.5, 0.7
-"""Of the swarm: c_1 and c_2 as printed, and the inertia."""
+"""Particle swarm: c_1 and c_2 as printed, and the inertia."""
 
 LEAST_WIDTH = 1e-3
-"""Of a set in the swarm; the sign of a width means nothing, since only its square is used."""
+"""Smallest width of a set in the swarm; its sign has no meaning, as only its square is used."""
 
 PART = 8192
-"""Samples whose regressors are in memory at once."""
+"""Number of samples whose regressors are in memory at once."""
 
 Method = Literal["ls", "pso"]
 
@@ -168,7 +168,7 @@ class Search:
 
     method: Method
     samples: int
-    """On how many samples, spread evenly."""
+    """Number of samples, evenly spaced, that are used."""
 
     swarm: Swarm
     seed: int

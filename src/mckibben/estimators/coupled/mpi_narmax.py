@@ -36,19 +36,19 @@ from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
 from mckibben.recording import Recording
 
 UNLOADED = 0.05
-"""A run is without load where its largest stays below this share of the largest of all runs."""
+"""Largest force of a run without load, relative to the largest of all runs."""
 
 SWARM = Swarm(20, 30, (0.9, 0.4), 2.0, 2.0, fastest=0.5)
-"""Both attractions and the inertia are the paper's, which does not print the size."""
+"""Attractions and inertia of the paper, which does not print the size."""
 
 ROUNDS = 8
-"""Times that consequents are solved for with the network's own free-running past."""
+"""Number of times that consequents are solved for on the network's free-running outputs."""
 
 SETTLING = 3000
-"""Samples for which inputs are held to see whether the network settles."""
+"""Number of samples with constant inputs in the stability check."""
 
 SEARCH_SAMPLES = 6000
-"""Samples of all runs on which the swarm compares free runs, from the start of each."""
+"""Number of samples per run, from its start, on which the swarm compares free runs."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -78,7 +78,7 @@ class MPINarmaxEstimator(CoupledEstimator):
 
     title = "MPI in a recurrent fuzzy network (MPI–NARMAX)"
     can = "Hysteresis under a load that varies, by a recurrent fuzzy network behind a modified PI."
-    cannot = "No inverse; nothing keeps the network sensible under other pulls."
+    cannot = "No inverse; the network is arbitrary under other loads."
     caution = "its network is arbitrary under loads and motions of another kind"
     effort: ClassVar[float] = 6.0
 
@@ -284,7 +284,7 @@ class RecurrentProblem:
             )
         if not self.settles(found):
             warnings.warn(
-                "the network does not settle while its inputs are held: do not run it free for long",
+                "the network does not settle while its inputs are constant: do not simulate it for long",
                 ModelWarning,
                 stacklevel=4,
             )

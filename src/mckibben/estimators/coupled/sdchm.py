@@ -44,15 +44,15 @@ from mckibben.presets import preset
 from mckibben.recording import Recording
 
 BEYOND = 0.1
-"""How far beyond the data the inverse may go, relative to their range."""
+"""Range of the inverse beyond the data, relative to their range."""
 
 FRICTION = (0.002, 0.1)
-"""Smallest and largest threshold of a muscle's own friction, relative to its travel."""
+"""Smallest and largest threshold of a muscle's friction, relative to its travel."""
 
 ARBITRARY = "its network is arbitrary where muscles move in other combinations"
 
 LEAST_SLOPE = 0.05
-"""Smallest slope of a displacement by itself, right after a reversal."""
+"""Smallest slope of a displacement alone, just after a reversal."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -99,11 +99,11 @@ class SDCHMEstimator(CoupledEstimator):
     title = "Stiffness-dependent coupled hysteresis model (SDCHM)"
     can = (
         "Hysteresis, coupling and stiffness of muscles round a backbone; its damped network "
-        "holds where pressures move in other combinations."
+        "extrapolates to other combinations of pressures."
     )
     cannot = (
-        "Strong rate dependence; with next to no damping (ridge) its network is arbitrary off"
-        " the runs recorded."
+        "Strong rate dependence; with little damping (ridge) its network is arbitrary away from"
+        " the recorded runs."
     )
     inverse_kind = "solved"
     effort: ClassVar[float] = 20.0
@@ -317,7 +317,7 @@ def softest(data: TrainingData, muscle: int) -> Run:
     runs = alone(data, muscle)
     if not runs:
         raise DataError(
-            "no run moves this muscle alone, so its hysteresis cannot be told from the coupling",
+            "no run moves this muscle alone, so its hysteresis and the coupling cannot be distinguished",
             channel=data.inputs[muscle].name,
             remedy="add a run in which the other pressures rest, or fit balance",
         )
@@ -441,9 +441,9 @@ COUPLED_PI = preset(
 
 SDCHM_PUBLISHED = preset(
     SDCHMEstimator,
-    "SDCHM as its paper identifies it: GPI, coupling, and a network trained by particle swarm.",
-    title="SDCHM as its paper identifies it",
-    can="As sdchm, identified as its paper has it.",
+    "SDCHM identified as in its paper: GPI, coupling, and a network trained by particle swarm.",
+    title="SDCHM identified as in its paper",
+    can="As sdchm, identified as in its paper.",
     cannot="Combinations of pressures unlike those recorded: its network is arbitrary there.",
     caution=ARBITRARY,
     effort=25.0,

@@ -23,22 +23,22 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
 MOVED = ("contraction", "displacement", "force", "length")
-"""Channels of muscles, which are no commands."""
+"""Channels of muscles, which are not commands."""
 
 WIDEST = 0.2
-"""Most hysteresis, relative to the range of the command."""
+"""Largest hysteresis, relative to the range of the command."""
 
 GUESSES = 8
-"""Lags with which a first dead time is looked for."""
+"""Lags for the initial search of the dead time."""
 
 LIMIT_GAIN = 0.02
-"""Least fall of the error, relative, for which a limit of the pressure is taken to be one."""
+"""Smallest relative reduction of the error for a pressure limit to be added."""
 
 NO_WORSE = 1e-6
-"""Relative rise of the error at which no hysteresis is as good as some."""
+"""Relative increase of the error up to which hysteresis is left out."""
 
 POLISHED = 40
-"""Evaluations of all parameters together, at most."""
+"""Maximum number of evaluations of the joint refinement."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -62,12 +62,12 @@ class AirEstimator(SeparableEstimator):
     title = "Valve and air"
     purpose = "rate"
     can = (
-        "What lies between a valve's command and the pressure: gain, hysteresis, lags that "
+        "From a valve's command to the pressure: gain, hysteresis, lags that "
         "differ in filling and venting, dead time."
     )
     cannot = (
-        "Knows nothing of how the flow depends on pressure and room: a muscle that moves, or "
-        "a large step, fills at another speed."
+        "Flow does not depend on pressure or volume: a muscle that moves, or "
+        "a large step, fills at a different speed."
     )
     inverse_kind = "exact"
     needs_time: ClassVar[bool] = True

@@ -274,7 +274,7 @@ class PredictionErrorEstimator(Estimator):
                 radius = float(np.abs(block.poles).max())
                 raise ModelError(
                     f"the model found is unstable (a pole at |z| = {radius:.4g})",
-                    remedy="use other orders, or output-error (oe), which is kept stable",
+                    remedy="use other orders, or output-error (oe), which is constrained to be stable",
                 )
             found.append(block)
         return tuple(found)
@@ -341,8 +341,8 @@ ARX = preset(
     title="ARX model, linear",
     can="Linear dynamics, in closed form.",
     cannot=(
-        "No hysteresis; biased by noise in the output, so its free run drifts from what one "
-        "step ahead promises."
+        "No hysteresis; biased by noise in the output, so its free run is worse than its one-"
+        "step prediction."
     ),
     quick=True,
     param_grid={"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
@@ -352,7 +352,7 @@ BJ = preset(
     PredictionErrorEstimator,
     "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
     title="Box–Jenkins model (BJ), linear",
-    can="Linear dynamics with noise described apart from them.",
+    can="Linear dynamics with a separate noise model.",
     cannot="No hysteresis.",
     shared_poles=False,
     n_noise=2,

@@ -17,15 +17,14 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.signals.periodic import band_limited
 
 FORGOTTEN = 3 * np.log(1e8)
-"""Times the decay after which a start counts as forgotten.
-
-Thrice what a hundred-millionth takes, for with hysteresis smaller motion decays slower.
+"""Number of decay times after which a start is forgotten: three times those of a decay to 1e-8, as
+small motions decay more slowly with hysteresis.
 """
 
 MOST_SUBSTEPS = 1000
 
 MOST_PERIODS = 20
-"""Of the longest run, after which it does in any case."""
+"""Limit of that number, in periods of the longest run."""
 
 
 @dataclass(frozen=True)

@@ -44,34 +44,35 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 
 BOUND = 1.0
-"""How far beyond the data's range a stable model's output may go, relative to the range."""
+"""Largest distance of a stable model's output from the data's range, relative to the range."""
 
 HORIZONS = (20, 200)
-"""Samples over which errors are minimised before whole runs are."""
+"""Prediction horizons whose errors are minimised before free runs [samples]."""
 
 MOST_REFINED = 2
-"""Models refined over whole runs."""
+"""Number of models refined on free runs."""
 
 LEAST_GAIN = 1e-6
-"""Share of the squared error that a step of a descent has to gain."""
+"""Smallest relative reduction of the squared error for another step."""
 
 HORIZON_SAMPLES, SELECTION_SAMPLES, LAYER_SAMPLES = 4000, 5000, 3000
-"""Samples looked at, at most: over short horizons, to choose terms, and to find a hidden layer."""
+"""Largest number of samples used over short horizons, to select terms, and to fit a hidden layer.
+"""
 
 LAYER_EVALUATIONS, DAMPING = 15, 1e-4
-"""Most evaluations of a search for a hidden layer, and damping of the weights behind it."""
+"""Maximum number of evaluations for a hidden layer, and ridge of its output weights."""
 
 FAR, STEEPEST = 10.0, 1e6
-"""Errors, and their derivatives, are not counted as larger, relative to half the output's range."""
+"""Bounds to which errors and their derivatives are clipped, relative to half the output's range."""
 
 HOLD = 1000
-"""Samples for which inputs are held in the check of stability."""
+"""Number of samples with constant inputs in the stability check."""
 
 MOST_CANDIDATES = 2000
-"""Products of regressors that terms are chosen from."""
+"""Maximum number of candidate products of regressors."""
 
 DEPENDENT = 1e-10
-"""Share of a term left after taking the chosen ones out of it, below which it explains nothing new."""
+"""Share of a term that must remain after projection on the chosen ones."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -112,8 +113,8 @@ class NarxEstimator(SearchEstimator):
         "Nonlinear dynamics by a polynomial of past inputs and outputs; terms chosen by "
         "orthogonal least squares."
     )
-    cannot = "Remembers only as far as its lags; no inverse."
-    caution = "a polynomial of past values leaves all bounds beyond them"
+    cannot = "Memory limited to its lags; no inverse."
+    caution = "a polynomial of past values is unbounded beyond them"
     param_grid: ClassVar[Grid] = {
         "output_lags": (1, 2),
         "input_lags": (1, 2),
@@ -171,7 +172,7 @@ class NarxEstimator(SearchEstimator):
             raise ModelError(
                 "every NARX model found diverges in a free run",
                 remedy="use fewer terms or units, `settings[n_play]=3`, or "
-                "`settings[allow_unstable]=true` to get it all the same",
+                "`settings[allow_unstable]=true` to return it anyway",
             )
         tracker.best_cost, chosen = min(tried, key=lambda item: item[0])
         if not stable(chosen, data):
@@ -274,7 +275,7 @@ NARX_NETWORK = preset(
     "NARX model with one hidden layer: linear part first, units on top, then free-run refinement.",
     title="NARX network",
     can="Nonlinear dynamics by one hidden layer.",
-    cannot="Slow to fit; no inverse; nothing keeps it sensible beyond the data.",
+    cannot="Slow to fit; no inverse; arbitrary beyond the data.",
     caution="a network without physics is arbitrary beyond them",
     param_grid={"output_lags": (1, 2), "n_units": (3, 5)},
     mapping="network",
@@ -283,10 +284,7 @@ NARX_NETWORK = preset(
 
 NARX_PLAY = preset(
     NarxEstimator,
-    (
-        "Polynomial NARX model with play operators among its regressors, so that it keeps its"
-        " branch."
-    ),
+    ("Polynomial NARX model with play operators among its regressors."),
     title="Polynomial NARX model with play operators",
     can=(
         "Polynomial dynamics with play operators among the regressors: hysteresis and rate in one."
@@ -364,7 +362,7 @@ class HiddenLayers:
 
     x: Array
     y: Array
-    """Regressors, shape (n, k), and the outputs to give, shape (n,)."""
+    """Regressors, shape (n, k), and target outputs, shape (n,)."""
 
     fields: Mapping[str, Any]
     units: int

@@ -33,35 +33,35 @@ from mckibben.estimators.optimisers.multi_start import follow_best, trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 STABLE = 1.0 - 1e-7
-"""Largest pole."""
+"""Largest magnitude of a pole."""
 
 INVERTIBLE = 1.0 - 1e-7
-"""Largest root of C."""
+"""Largest magnitude of a root of C."""
 
 FIRST_STEPS, FOLLOWED, STEPS = 8, 3, 60
-"""Steps taken from every start; how many of the best, at different places, are followed; how far."""
+"""Steps from every start; number of distinct best starts that are continued; their steps."""
 
 ALTERNATIONS = 2
-"""Times that noise model and B are solved for in turn, for a start."""
+"""Number of alternations between the noise model and B, for a start."""
 
 NOISE_SAMPLES = 2000
-"""Of every run, of which the noise model of a start is made."""
+"""Samples of every run used for the noise model of a start."""
 
 REPLANTED = 4
-"""Starts, the best, whose noise model is used to find the plant anew."""
+"""Number of best starts whose noise model is used to re-estimate the plant."""
 
 SAME = 1e-6
-"""Relative difference of errors that is none."""
+"""Relative difference of equal errors."""
 
 FELT = 1e-13
-"""Share of a start's response that is left where samples count, for it to be solved for."""
+"""Smallest share of a start's response at the samples used for which it is estimated."""
 
 LEAST_GAIN = 2e-9
-"""Share of the squared error that a step gains, or the descent has arrived."""
+"""Smallest relative reduction of the squared error for another step."""
 
 
 LARGEST = 1.0 - 1e-7
-"""Reflection coefficient."""
+"""Largest magnitude of a reflection coefficient."""
 
 Start = Literal["fitted", "first_sample", "virgin"]
 """State before the first sample: estimated; at rest at the first input; at rest at an input of zero.
@@ -81,13 +81,13 @@ class Orders:
     c: int = 0
     d: int = 0
     delay: int = 0
-    """Samples before B's first coefficient."""
+    """Delay of the first coefficient of B [samples]."""
 
     lags: tuple[int, ...] | None = None
-    """Of B's coefficients, in samples, instead of the next ones after the delay."""
+    """Lags of B's coefficients [samples], instead of successive ones after the delay."""
 
     inputs: int = 1
-    """Of which each has a B and, where there is one, an F."""
+    """Number of inputs, each with its own B and, in some models, F."""
 
     @property
     def input_lags(self) -> tuple[int, ...]:

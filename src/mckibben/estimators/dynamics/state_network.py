@@ -34,23 +34,24 @@ from mckibben.estimators.optimisers.multi_start import trust_region
 from mckibben.estimators.optimisers.tracker import Tracker
 
 ANGLE = 1 / 3
-"""Of the linear oscillator in a substep, at most [rad]."""
+"""Largest angle of the linear oscillator per substep [rad]."""
 
 SPRING, DAMPING, LAG = 0.5, 0.1, 0.3
-"""Of a start, in units of the linear oscillator: what pulls the displacement back beside lags of the
-velocity, what damps, and how fast the first lag dies away."""
+"""Initial values in units of the linear oscillator: stiffness beside lags of the velocity, damping,
+and decay rate of the first lag.
+"""
 
 UNIT, FORCED, READ = 0.7, 0.05, 0.01
-"""Sizes of random weights: of units by states, by the input, and of what is read of them."""
+"""Scales of random initial weights: of units by states, by the input, and of the output layer."""
 
 LEAST_GAIN = 1e-7
-"""Share of the squared error that a step gains, or the descent has arrived."""
+"""Smallest relative reduction of the squared error for another step."""
 
 RUNGE_KUTTA = ((0.0, 1.0, 0.5), (0.5, 2.0, 0.5), (0.5, 2.0, 1.0), (1.0, 1.0, 0.0))
-"""Of every stage how far into the step it is, the weight of its rates, and how far these then lead."""
+"""Runge-Kutta stages: position in the step, weight, and length of the following stage."""
 
 LARGEST = 1e6
-"""State, in units of the output's scale, that is out of all bounds."""
+"""State, in units of the output's scale, that counts as diverged."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -74,10 +75,10 @@ class StateNetworkEstimator(SearchEstimator):
     title = "State-space network"
     purpose = "rate"
     can = (
-        "Nonlinear dynamics with memory of any kind, from force to displacement, told nothing"
-        " but the number of states."
+        "Nonlinear dynamics with memory of any kind, from force to displacement; only the number"
+        " of states is set."
     )
-    cannot = "Slow to fit; no inverse; nothing keeps it sensible beyond the data."
+    cannot = "Slow to fit; no inverse; arbitrary beyond the data."
     caution = "a network without physics is arbitrary beyond them"
     needs_time: ClassVar[bool] = True
 

@@ -27,7 +27,7 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.signals.reversals import reversals
 
 SMOOTHED = 3.0
-"""Samples that the filter of the rate lasts where it is not set."""
+"""Default length of the rate filter [samples]."""
 
 # -- with memory -----------------------------------------------------------------------------
 
@@ -60,7 +60,7 @@ class ActivationMemoryEstimator(SeparableEstimator):
     )
     cannot = (
         "Is itself a compensator, so it has no inverse here; extrapolates as polynomials do "
-        "beyond the forces and contractions seen."
+        "beyond the recorded forces and contractions."
     )
     quick = True
     effort: ClassVar[float] = 1.0
@@ -135,11 +135,14 @@ class ActivationMemoryEstimator(SeparableEstimator):
 # -- as published ----------------------------------------------------------------------------
 
 HELD = 0.05
-"""Share of the largest range of any run's input, below which that of a run is noise: it is held."""
+"""Range of an input, relative to the largest of any run, below which it is noise and the input
+constant.
+"""
 
 STATIC_SHARE = 0.1
-"""A run below this share of the fastest run's frequency is static: it bounds low and high pressure,
-and nothing of the rate is found from it."""
+"""Share of the fastest run's frequency below which a run is static: it determines low and high
+pressure, and no rate terms.
+"""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -159,10 +162,8 @@ class ActivationPressureEstimator(SearchEstimator):
 
     title = "Activation pressure by characteristic points"
     purpose = "force"
-    can = (
-        "Pressure for a contraction under a force, at one frequency of a sine; as its paper has it."
-    )
-    cannot = "Knows no minor loops and no other frequency: its hysteresis is a term in the rate."
+    can = "Pressure for a contraction under a force, at one frequency of a sine; as in its paper."
+    cannot = "No minor loops, one frequency: its hysteresis is a term in the rate."
     needs_time: ClassVar[bool] = True
     made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
     told: ClassVar[tuple[str, ...]] = ("force",)
@@ -252,7 +253,7 @@ def dominant_frequency(run: Run) -> float:
 # -- characteristic points -------------------------------------------------------------------
 
 SAME_FORCE = 0.02
-"""Share of the largest mean force by which runs of one force differ at most."""
+"""Largest difference of runs of one force, relative to the largest mean force."""
 
 LOW, HIGH = 0.07, 0.975
 """Boundaries of low and high pressure as shares of the range: Table 1 has y_3 at .028 and y_4 at

@@ -33,11 +33,11 @@ from mckibben.recording import Recording, listed
 Structure = Literal["eleven", "each-way", "eighteen"]
 STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
 LEAST_SHARE = 1e-5
-"""Least force of an element, relative to the range of the output."""
+"""Smallest force of an element, relative to the range of the output."""
 
 LENGTHS = np.geomspace(0.02, 1.0, 8)
 TIMES = (0.1, 10.0)
-"""Break-away lengths that elements are tried with, relative to the range, and times, in samples."""
+"""Initial break-away lengths of elements, relative to the range, and times [samples]."""
 
 
 GAINS = (-0.5, 1.0)
@@ -294,7 +294,7 @@ MULTISTATE = preset(
         "Friction force with elements for each direction of motion, rate included, integrated"
         " exactly."
     ),
-    cannot="Needs a static law beside it; compensated by feedforward only.",
+    cannot="Needs a static force law; compensated by feedforward only.",
     default_for="plan of force",
     elements="each-way",
     effort=3.0,
@@ -305,7 +305,7 @@ MULTISTATE_11 = preset(
     "Multistate friction by bounded least squares from many starts, and exchange of elements.",
     title="Multistate friction with eleven parameters",
     can="The paper's friction model of eleven parameters.",
-    cannot="Structure of one muscle; see multistate for yours.",
+    cannot="Structure of the paper's muscle; multistate selects one for yours.",
     elements="eleven",
 )
 
@@ -314,6 +314,6 @@ MULTISTATE_18 = preset(
     "Multistate friction with three elements in both directions: eighteen parameters.",
     title="Multistate friction with eighteen parameters",
     can="The paper's friction model of eighteen parameters.",
-    cannot="Structure of one muscle; many parameters are hardly determined.",
+    cannot="Structure of the paper's muscle; many parameters are hardly determined.",
     elements="eighteen",
 )

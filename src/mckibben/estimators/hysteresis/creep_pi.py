@@ -34,19 +34,19 @@ from mckibben.estimators.hysteresis.pi import play_operators, spread
 from mckibben.estimators.optimisers.tracker import Tracker
 
 RAISED = 1e-5
-"""Step either way, of the logarithm of what is added to the input, for its derivative."""
+"""Step of the logarithm of the input offset, for its derivative."""
 
 MOST_ADDED = 20.0
-"""Largest addition to the input, relative to its range."""
+"""Largest input offset, relative to the input range."""
 
 FASTEST, SLOWEST = 3.0, 3.0
-"""Of the time constants: samples, and durations of the longest run."""
+"""Bounds of the time constants: in samples, and in durations of the longest run."""
 
 HELPS = 0.9
-"""Share of the error up to which it may help that creep was under way when runs began."""
+"""Ratio of errors below which an initial creep state is estimated."""
 
 FEWEST = 20
-"""Samples that tell whether later parts of runs are foreseen."""
+"""Smallest number of samples for testing that choice on later parts of runs."""
 
 UNDER_WAY = (
     "creep was under way when the recordings began, and what was left of it was found: it goes on where "

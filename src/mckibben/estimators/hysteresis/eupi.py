@@ -37,7 +37,7 @@ class EUPIEstimator(SeparableEstimator):
     title = "Extended unparallel Prandtl–Ishlinskii model (EUPI)"
     purpose = "memory"
     can = "Asymmetric loops by edges of different slope and threshold."
-    cannot = "One asymmetry for all operators; the inverse wants weights that are not negative."
+    cannot = "One asymmetry for all operators; the inverse needs non-negative weights."
     inverse_kind = "solved"
     makes = ("eupi",)
     effort: ClassVar[float] = 0.3

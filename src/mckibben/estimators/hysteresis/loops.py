@@ -28,18 +28,18 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 
 LEAST_SLOPE = 1e-4
-"""Least share of the output's range that each piece of the polynomial gives."""
+"""Smallest share of the output's range for each piece of the polynomial."""
 
 SLOWEST, FASTEST = 0.3, 300.0
 """Rates of Bouc-Wen models, relative to one over the range of the input."""
 
 MOST_ASYMMETRIC = 0.19
-"""Largest size of each of their five shape numbers: together they stay below 1."""
+"""Bound of each of the five shape parameters, whose magnitudes must sum to less than 1."""
 
 Degree = Annotated[int, Interval(ge=1, le=9)]
 
 MOST_UNEQUAL = np.log(4.0)
-"""Largest logarithm of the ratio of stiffnesses, or limits, of springs in both directions."""
+"""Largest logarithm of the ratio of stiffnesses, or limits, between directions."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class BoucWenEstimator(SeparableEstimator):
     title = "Bouc–Wen model"
     purpose = "memory"
     inverse_kind = "solved"
-    can = "A loop that saturates, with five numbers or so, and a reversible polynomial."
+    can = "A loop that saturates, with about five parameters, and a reversible polynomial."
     cannot = "Minor loops need not close; loops are symmetric but for the polynomial."
     quick = True
     makes = ("bouc-wen",)
@@ -186,7 +186,7 @@ GBW = preset(
     BoucWenEstimator,
     "Generalised Bouc-Wen model: rate and shape are searched, the rest is solved for.",
     title="Generalised Bouc–Wen model (GBW)",
-    can="Asymmetric saturating loops, by five shape numbers.",
+    can="Asymmetric saturating loops, with five shape parameters.",
     cannot="Minor loops need not close; many starts are needed to identify it.",
     quick=False,
     makes=("generalized-bouc-wen",),
@@ -280,7 +280,7 @@ MAXWELL_SLIP = preset(
     MaxwellSlipEstimator,
     "Maxwell-slip model by least squares.",
     title="Maxwell-slip model",
-    can="Springs that slip beside a reversible curve; symmetric loops.",
+    can="Slipping springs in parallel with a reversible curve; symmetric loops.",
     cannot="Asymmetry only by the curve.",
     quick=True,
     asymmetric=False,
@@ -290,7 +290,7 @@ MMS = preset(
     MaxwellSlipEstimator,
     "Modified Maxwell-slip model: the two ratios of its directions are searched.",
     title="Modified Maxwell-slip model (MMS)",
-    can="Springs that slip, of different stiffness and limit up and down.",
+    can="Springs that slip, with different stiffness and limit for rising and falling input.",
     cannot="One asymmetry for all springs.",
     asymmetric=True,
     effort=0.5,

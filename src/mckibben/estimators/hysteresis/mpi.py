@@ -23,22 +23,26 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.presets import preset
 
 LEAST_PIECE = 1e-6
-"""Least share of the output's range that a piece of an increasing map gives."""
+"""Smallest share of the output's range for a piece of an increasing map."""
 
 CROWDED = (1, 2, 4)
-"""Powers of their shares of half the input's range by which thresholds begin that are identified."""
+"""Exponents of the initial thresholds, as powers of their share of half the input range, if
+thresholds are identified.
+"""
 
 MOST_BY_RATE = 5.0
 """The same where thresholds are identified, as is printed."""
 
 MOST_STEPS = 150
-"""Evaluations of a refinement where thresholds are identified."""
+"""Maximum number of evaluations of a refinement with identified thresholds."""
 
 RAISED, APART = 1e-7, 1e-9
-"""By how much thresholds are raised for derivatives, and their least distance, of the input's range."""
+"""Step of thresholds for derivatives, and their smallest distance, relative to the input range."""
 
 RATE_SHARE = 0.5
-"""Largest change of a weight by rate, relative to the largest weight, at the fastest input seen."""
+"""Largest change of a weight by rate, relative to the largest weight, at the fastest recorded
+input.
+"""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -313,7 +317,7 @@ RDPI = preset(
     purpose="rate",
     can="Prandtl-Ishlinskii memory with weights that follow the rate.",
     cannot=(
-        "Extrapolates badly beyond the rates seen; its inverse swings where weights by rate "
+        "Extrapolates badly beyond the recorded rates; its inverse oscillates where weights by rate "
         "are strongly negative."
     ),
     caution="weights that follow the rate are arbitrary at other rates",

@@ -44,37 +44,38 @@ from mckibben.presets import preset
 from mckibben.system.compiling import deferred
 
 ANGLE, COARSE_ANGLE = 1 / 30, 1 / 3
-"""Of the linear oscillator in a substep, and in one of the search's coarse ones, at most [rad]."""
+"""Largest angle of the linear oscillator per substep [rad], in the fit and in the coarse search."""
 
 FEWEST_COARSE = 2
 
 FIRST_STEPS, STEPS = 12, 60
-"""Steps from every start, and of the best."""
+"""Steps from every start, and from the best ones."""
 
 SHARES, BENDS = (0.1, 0.3, 0.6), (0.5, 3.0, 10.0)
-"""Of elements to start from: shares of the linear stiffness; and how far loops are bent, as what the
-slope about no force loses over the largest displacement, relative."""
+"""Initial hysteretic elements: shares of the linear stiffness; and relative loss of slope over the
+largest displacement.
+"""
 
 ROUNDS = 8
-"""Times that a start is searched, in ever finer structures."""
+"""Number of refinements of the structure per start."""
 
 FIRST_GAIN, LEAST_GAIN = 1e-3, 1e-9
-"""Share of the squared error that a step gains, or the descent has arrived."""
+"""Smallest relative reductions of the squared error for another step."""
 
 LARGEST = 1e50
-"""Error, or derivative of one, that still is one: sums of its squares are numbers."""
+"""Largest error or derivative; sums of squares stay finite."""
 
 DIFFERENCE = 1e-6
-"""Of a parameter, relative, by which starts at rest are moved."""
+"""Relative step of a parameter for derivatives of starts at rest."""
 
 OWN = 3
-"""Parameters before those of the element: inertia, damping, stiffness."""
+"""Number of parameters before those of the element: inertia, damping, stiffness."""
 
 BEYOND = 1.1
-"""The outermost knots, by the largest force of the element."""
+"""Position of the outermost knots, relative to the largest force of the element."""
 
 TIGHT = 0.8
-"""Share of the range of knots that the forces have to fill."""
+"""Smallest share of the knots' range that the forces must cover."""
 
 
 def following(element: Any) -> Callable[..., None]:
@@ -203,15 +204,16 @@ class Element:
     """How oscillators with one kind of element are searched."""
 
     n_positive: int
-    """Parameters of the block, the first ones, that are searched by their logarithms."""
+    """Number of leading parameters that are searched by their logarithms."""
 
     order: int
-    """The others have the unit of this power of a force, over displacement."""
+    """The other parameters have the unit of force to this power, over displacement."""
 
     follows: Callable[..., None]
     starts: Callable[[float, float, dict[str, Any]], list[Oscillator]]
-    """Models to start from, by the element's slope about no force, the share of it that 1 mm takes
-    away, and all other fields."""
+    """Initial models: from the element's slope at zero force, its relative loss per mm, and all
+    other fields.
+    """
 
 
 ELEMENTS = {
@@ -521,8 +523,8 @@ DUHEM_OSCILLATOR = preset(
         "slopes of one element, free in either direction."
     ),
     cannot=(
-        "The element remembers one number, so nothing of minor loops once they are left; "
-        "slopes beyond the forces seen are held; no inverse."
+        "One hysteretic state, so minor loops are forgotten once they are left; "
+        "slopes are constant beyond the recorded forces; no inverse."
     ),
     element="duhem",
 )

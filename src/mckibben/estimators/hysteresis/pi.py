@@ -51,7 +51,7 @@ def play_operators(u: Array, radii: Array, rule: str) -> Array:
 
 
 SHORTEST = 0.02
-"""Segment whose slope is more than noise, relative to the longest branch."""
+"""Shortest segment with a significant slope, relative to the longest branch."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)

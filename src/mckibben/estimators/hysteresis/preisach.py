@@ -18,7 +18,7 @@ from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.presets import preset
 
 LEAST_REVERSIBLE = 1e-4
-"""Least share of the output's range that each operator on the diagonal gives."""
+"""Smallest share of the output's range for each operator on the diagonal."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -37,8 +37,8 @@ class GridEstimator(SeparableEstimator):
     purpose = "memory"
     param_grid: ClassVar[Grid] = {"n_levels": (6, 10, 15)}
     cannot = (
-        "Weights that no reversal has excited are not determined; nothing beyond the largest "
-        "input seen."
+        "Weights that no reversal has excited are not determined; constant beyond the largest "
+        "recorded input."
     )
     effort: ClassVar[float] = 0.15
 

@@ -13,13 +13,13 @@ from mckibben.arrays import Array
 from mckibben.estimators.optimisers.tracker import Tracker
 
 MARGIN = 1e-9
-"""Least distance from the bounds at which a refinement begins, relative to theirs."""
+"""Smallest distance of a start from the bounds, relative to their width."""
 
 SHORTEST = 1e-9
-"""Step, relative to the parameters, that is none."""
+"""Step, relative to the parameters, that counts as zero."""
 
 EXCHANGES = 3
-"""How often groups of parameters are exchanged and what was found refined, at most."""
+"""Maximum number of exchanges of parameter groups, each followed by a refinement."""
 
 
 @dataclass(frozen=True)

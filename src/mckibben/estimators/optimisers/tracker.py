@@ -37,14 +37,14 @@ class Tracker:
 
     progress: Progress | None = None
     budget: int = 1
-    """Evaluations expected, for the share done."""
+    """Expected number of evaluations, for the progress."""
 
     evaluations: int = 0
     best_cost: float = np.inf
     best: Array | None = None
     interrupted: bool = False
     notes: list[str] = field(default_factory=list)
-    """What the user should know of what was found."""
+    """Notes for the user on the result."""
 
     def reached(self, share: float) -> None:
         """Report the share of the work that is done, unless it is broken off."""

@@ -33,7 +33,7 @@ EMULATED = (
     *("-M", "mps2-an386", "-cpu", "cortex-m4", "-display", "none", "-monitor", "none"),
     *("-semihosting-config", "enable=on,target=native"),
 )
-"""The board that the emulator is."""
+"""Emulated board."""
 
 TICKS_PER_INSTRUCTION = 1.6
 """Of the 25 MHz timer, an instruction taking 64 ns of the emulator's time (icount shift 6)."""

@@ -21,10 +21,10 @@ from mckibben.errors import KernelError
 from mckibben.export.naming import commented
 
 BOOL, INT, REAL = "bool", "int", "float"
-"""Types of values, as annotated: each holds those before it."""
+"""Types of values, as annotated; each includes those before it."""
 
 TYPES = {BOOL: "int", INT: "int", REAL: "mck_real"}
-"""What they are in C."""
+"""Their types in C."""
 
 _FUNCTIONS = """acos acosh asin asinh atan atan2 atanh ceil copysign cos cosh exp expm1 fabs floor
 log log10 log1p log2 pow sin sinh sqrt tan tanh trunc"""
@@ -114,7 +114,7 @@ class Source:
 
 
 source_of = cache(Source)
-"""The source of a kernel, read once."""
+"""The source of a kernel; cached."""
 
 
 class _WithoutDerivatives(ast.NodeTransformer):

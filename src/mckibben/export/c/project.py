@@ -33,19 +33,21 @@ TOLERANCES = {False: "1e-9", True: "1e-4"}
 """Of the self-test, relative to the range: in double and in single precision."""
 
 SHARED = Path(__file__).parent / "server" / "mck.h"
-"""What all C of a model shares."""
+"""Files shared by the C code of all models."""
 
 LONGEST_STEP = 1e6
-"""Time between steps of an exported model [s]."""
+"""Largest sample time of an exported model [s]."""
 
 PACE, TURNS = 9, 24
-"""Samples from one turning point of test inputs to the next, and how many of those."""
+"""Samples between turning points of the test inputs, and their number."""
 
 NOTICED = 5e-5
-"""Error of a filter in single precision, relative to the range of its output."""
+"""Error of a filter in single precision, relative to its output range, above which a warning is
+issued.
+"""
 
 SAMPLES, MOST_PRODUCTS = 100_000, 30_000_000
-"""On which that is found: fewer samples of filters with very many states."""
+"""Number of samples of that test; fewer for filters with very many states."""
 
 
 def export_c(

@@ -20,7 +20,7 @@ from mckibben.export.templating import literal, render
 SERVER = tuple(Path(__file__).parent / "server" / f"mck_server.{end}" for end in ("c", "h"))
 
 ROOM = 236
-"""Bytes of a frame for what it says."""
+"""Payload of a frame [bytes]."""
 
 MOST_NUMBERS = 0xFFFF
 

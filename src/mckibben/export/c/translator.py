@@ -25,7 +25,7 @@ LEAST, MOST = 1e-6, 3.4e38
 """Range of the sizes of constants that are the same in both precisions."""
 
 ATOM, UNARY, TIMES, PLUS, RELATION, EQUAL, AND, OR, CHOICE = 15, 13, 12, 11, 9, 8, 5, 4, 3
-"""How tightly operators of C bind."""
+"""Precedence of operators in C."""
 
 _BINARY = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod)
 ARITHMETIC: dict[type[ast.AST], str] = dict(zip(_BINARY, "+-*//%", strict=True))
@@ -33,10 +33,10 @@ _COMPARED = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 COMPARISON = dict(zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True))
 
 WHOLE = 32767
-"""Largest whole number that is written out: each `int` of C holds it, and single precision."""
+"""Largest integer literal: it fits into an `int` of C and is exact in single precision."""
 
 FITTING = {INT: "take int(...) of it", BOOL: "compare it"}
-"""What to write instead of a number that a type does not hold."""
+"""Replacements for numbers that a type cannot represent."""
 
 
 class Value(NamedTuple):

@@ -42,7 +42,7 @@ _render = partial(render, "mckibben.export.fmu")
 FLAGS = ("-std=c99", "-O2", "-s", "-ffp-contract=off", "-shared")
 
 DEFAULT_STEP = 0.01
-"""Communication step suggested where the model has no time of its own [s]."""
+"""Suggested communication step of a model without sample time [s]."""
 
 BASE_UNITS: dict[str, dict[str, str] | None] = {
     "bar": {"kg": "1", "m": "-1", "s": "-2", "factor": "100000"},
@@ -56,7 +56,7 @@ BASE_UNITS: dict[str, dict[str, str] | None] = {
     "degC": {"K": "1", "offset": "273.15"},
     "1": {},
 }
-"""What units are of the SI; others are named without."""
+"""SI base units of the units; other units have only a name."""
 
 
 class Platform(NamedTuple):

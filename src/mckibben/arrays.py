@@ -1,4 +1,4 @@
-"""The array that the package computes with, and the narrowest range."""
+"""The array type of the package, and the narrowest range of a channel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NARROWEST = 1e-30
 def check_finite(
     values: Array, remedy: str = "leave those samples out", channel: str | None = None
 ) -> None:
-    """Refuse samples of which one is not finite, naming the first.
+    """Raise an error if a sample is not finite, naming the first.
 
     Raises
     ------

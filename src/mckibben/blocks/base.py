@@ -1,4 +1,4 @@
-"""What a block is: an immutable parameter set with dynamics.
+"""Base class of blocks: immutable parameter sets with dynamics.
 
 A block is one compiled kernel with its coefficients, or composes other blocks. Both kinds *bind*: given
 state, input and output arrays they return a function without arguments that runs them, and everything
@@ -55,7 +55,7 @@ SEVERAL: Ports = ("driven",), ("scheduled",), ("given",)
 
 @dataclass(frozen=True)
 class Cost:
-    """Arithmetic operations of a step, roughly: usual and at worst."""
+    """Approximate number of arithmetic operations of a step: typical and maximum."""
 
     usual: int
     worst: int
@@ -65,7 +65,7 @@ class Cost:
 
     @classmethod
     def of(cls, numbers: Array, n_states: int) -> Cost:
-        """Return the cost of one pass: about two operations a number, four a state."""
+        """Return the cost of one pass: about two operations per coefficient, four per state."""
         operations = 2 * numbers.size + 4 * n_states
         return cls(operations, operations)
 
@@ -140,12 +140,12 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def title(self) -> str:
-        """What the block is called among blocks: its kind, and of an inverse, of what."""
+        """Title of the block: its kind, and for an inverse also the kind of the inverted block."""
         return self.kind
 
     @property
     def needs_double(self) -> str:
-        """Why single precision will not do, as part of a sentence; empty where it does."""
+        """Why double precision is needed, as part of a sentence; empty if single precision suffices."""
         return ""
 
     # -- channels ----------------------------------------------------------------------------
@@ -155,7 +155,7 @@ class Block(DrawsItself, Parametrised):
         cls.__repr__ = Block.__repr__  # type: ignore[method-assign]  # not the long one of dataclasses
 
     def __repr__(self) -> str:
-        """Return the class and what is not at its default, cut to three lines of a terminal."""
+        """Return the class and all non-default fields, truncated to three lines."""
         values = [(f, getattr(self, f.name)) for f in dataclasses.fields(self)]  # type: ignore[arg-type]
         changed = [f"{f.name}={SHORT.repr(value)}" for f, value in values if value != f.default]
         return shorten(f"{type(self).__name__}({', '.join(changed)})", 240, placeholder=" ...)")
@@ -168,12 +168,12 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def scheduling(self) -> tuple[str, ...]:
-        """Names of the inputs that schedule the block but are not driven through it."""
+        """Names of the scheduling inputs."""
         return tuple(channel.name for channel in self._channels(*self.ports[1]))
 
     @property
     def n_driven(self) -> int:
-        """How many inputs, the first ones, are driven through the block."""
+        """Number of driven inputs; these come first."""
         return len(self.inputs) - len(self.scheduling)
 
     @property
@@ -189,7 +189,7 @@ class Block(DrawsItself, Parametrised):
         return tuple(found)
 
     def check_channels(self) -> None:
-        """Refuse names that repeat, or no channels at all."""
+        """Raise an error for repeated channel names, or no channels."""
         for channels in (self.inputs, self.outputs):
             names = [channel.name for channel in channels]
             if not names or len(set(names)) < len(names):
@@ -200,34 +200,34 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def input_limits(self) -> tuple[float, float]:
-        """Lowest and highest input; infinite where the block has no field ``input_range``."""
+        """Lowest and highest input; infinite if the block has no field ``input_range``."""
         ends: tuple[float, float] | None = getattr(self, "input_range", None)
         return (-np.inf, np.inf) if ends is None else ends
 
     @property
     def n_missable(self) -> int:
-        """How many of the last inputs may be absent: NaN, in a stream, in C, and in arrays."""
+        """Number of trailing inputs that may be missing (NaN), in streams, C and arrays."""
         return 0
 
     # -- memory ------------------------------------------------------------------------------
 
     @property
     def n_states(self) -> int:
-        """Length of the state vector: of all parts, one after another."""
+        """Length of the state vector, over all parts."""
         return sum(part.n_states for part in getattr(self, "parts", ()))
 
     @property
     def n_fitted(self) -> int:
-        """How many states, the first ones, are solved for where its `initial` is "fitted"."""
+        """Number of leading states that are estimated if `initial` is "fitted"."""
         return 0
 
     @property
     def n_scratch(self) -> int:
-        """How many numbers a step computes in beside the state, for code that cannot allocate."""
+        """Length of the working memory of a step, for code that cannot allocate."""
         return sum(part.n_scratch for part in getattr(self, "parts", ()))
 
     def shares(self, state: Array) -> list[tuple[Any, Array]]:
-        """Return every part with its own of a state, as a view; nothing where there are no parts."""
+        """Return every part with its slice of a state, as a view; empty without parts."""
         shares = []
         for part in getattr(self, "parts", ()):
             own, state = np.split(state, [part.n_states])
@@ -236,7 +236,7 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def start(self) -> Initial:
-        """Memory before the first sample that is used where none is given."""
+        """Default start state."""
         return getattr(self, "initial", "first_sample")
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
@@ -262,21 +262,21 @@ class Block(DrawsItself, Parametrised):
         return state
 
     def start_numbers(self) -> Array:
-        """Return the coefficients as starts read them, which no sample time changes."""
+        """Return the coefficients for start kernels, which do not depend on the sample time."""
         return self.coefficients(self.sample_time or 1.0)
 
     def state_at(self, first: Array, output: Array) -> Array | None:
-        """Return the state at rest at a first input and output; None where outputs are no part of it."""
+        """Return the equilibrium state for a first input and output; None if outputs do not matter."""
         return None
 
     def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
-        """Return the start to use on a recording, which some rules look at; by default as given."""
+        """Return the start to use on a recording; by default unchanged."""
         return initial
 
     # -- its kernel --------------------------------------------------------------------------
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the numbers that the kernel reads, one-dimensional; by default those of `layout`.
+        """Return the coefficients of the kernel, one-dimensional; by default those of `layout`.
 
         Raises
         ------
@@ -303,39 +303,39 @@ class Block(DrawsItself, Parametrised):
 
     @property
     def c_kernels(self) -> tuple[Callable[..., Any], ...]:
-        """Kernels of a step, and of the start if it has memory, which C is translated from."""
+        """Step and start kernels for translation to C."""
         step, start = getattr(self, "kernel", None), self.start_kernel
         if step is None or (self.n_states and start is None):
             return ()
         return (step, start) if self.n_states and start is not None else (step,)
 
     def cost(self, sample_time: float | None) -> Cost:
-        """Return what a step costs."""
+        """Return the cost of a step."""
         return Cost.of(self.coefficients(sample_time), self.n_states)
 
     def strictly_increasing(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Give the name and the numbers of every field that is `increasing`."""
+        """Yield name and values of every `increasing` field."""
         for name in self.increasing:
             yield name, getattr(self, name)
 
     def wired(self, board: Layout, taken: Sequence[Any]) -> list[Any]:
-        """Lay the block out on a board, run on signals, and return those that it gives."""
+        """Add the block to a layout of signals, and return its output signals."""
         return board.call(self, taken)
 
     def inverse(self) -> Block:
-        """Return the block that undoes this one; a `ModelError` says why there is none."""
+        """Return the inverse of this block; raise a `ModelError` if there is none."""
         raise ModelError(f"{self.kind!r} {self.no_inverse}", remedy=self.instead)
 
     @property
     def forward_model(self) -> Block | None:
-        """Of a compensator, the model that it undoes; None where it undoes none, as feedback alone."""
+        """The model that a compensator inverts; None if it inverts none, such as feedback alone."""
         try:
             return self.inverse()
         except ModelError:
             return None
 
     def reachable(self) -> tuple[Array, Array]:
-        """Return the lowest and highest outputs that can be reached whatever happened before.
+        """Return the lowest and highest outputs that are reachable from every state.
 
         Each has shape (n_outputs,); by default they are infinite.
         """
@@ -343,7 +343,7 @@ class Block(DrawsItself, Parametrised):
         return np.full(n, -np.inf), np.full(n, np.inf)
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the outputs that can be reached where the inputs between two ends can be.
+        """Return the output range for an input range.
 
         A block without memory must be monotone; one with memory answers with its own `reachable`.
         """
@@ -355,7 +355,7 @@ class Block(DrawsItself, Parametrised):
     # -- linear blocks -----------------------------------------------------------------------
 
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return a linear block as a state-space system; its state is 0 at the operating point.
+        """Return a linear block as a state-space system about its operating point.
 
         The time between samples [s] is needed by blocks that are continuous in time.
         """
@@ -365,7 +365,7 @@ class Block(DrawsItself, Parametrised):
         )
 
     def continuous(self) -> Polynomials | None:
-        """Return the transfer function of what is continuous in time, without dead time; else None."""
+        """Return the continuous transfer function without dead time, or None."""
         return None
 
     to_scipy = as_scipy
@@ -373,7 +373,7 @@ class Block(DrawsItself, Parametrised):
 
     @classmethod
     def example(cls) -> Self:
-        """Return a small, typical block of this class, for documentation and contract tests."""
+        """Return a small typical block of this class, for documentation and contract tests."""
         return cls(*cls.typical)
 
     # -- running -----------------------------------------------------------------------------
@@ -395,7 +395,7 @@ class Block(DrawsItself, Parametrised):
         initial: Initial | None = None,
         sample_time: float | None = None,
     ) -> Recording | Array:
-        """Run free over a recording or an array of inputs.
+        """Simulate the block (free-running) on a recording or an array of inputs.
 
         Parameters
         ----------
@@ -442,7 +442,7 @@ class Block(DrawsItself, Parametrised):
         return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
 
     def stream(self, sample_time: float | None = None, *, initial: Initial | None = None) -> Stream:
-        """Return a stepper for use sample by sample, before the first sample; see `Stream`."""
+        """Return a stepper for sample-by-sample use; see `Stream`."""
         return Stream(self, sample_time, initial)
 
     def simulate_many(
@@ -453,7 +453,7 @@ class Block(DrawsItself, Parametrised):
         initial: Initial | None = None,
         sample_time: float | None = None,
     ) -> Array:
-        """Run many parameter sets of this structure over the same inputs, on all cores.
+        """Simulate many parameter sets of this structure on the same inputs, on all cores.
 
         Parameters
         ----------
@@ -474,7 +474,7 @@ class Block(DrawsItself, Parametrised):
         return outputs[:, :, 0] if outputs.shape[2] == 1 else outputs
 
     def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
-        """Return the state after a recording, shape (n_states,): its memory, to start another with."""
+        """Return the state after a recording, shape (n_states,), to start the next one from."""
         inputs = self._inputs_from(data)
         state = self.initial_state(inputs[0], self.start_on(data, initial))
         self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
@@ -490,17 +490,17 @@ class Block(DrawsItself, Parametrised):
         return outputs
 
     def check_time(self, sample_time: float | None) -> None:
-        """Warn where a sample time changes what the block is, or a part of it."""
+        """Warn if the sample time changes the model or one of its parts."""
         for part in getattr(self, "parts", ()):
             part.check_time(sample_time)
 
     def report(self, state: Array) -> None:
-        """Warn of what happened during a run that its user should know, read off the final state."""
+        """Warn about events of a run, such as clipping, recorded in its final state."""
         for part, own in self.shares(state):
             part.report(own)
 
     def n_clipped(self, state: Array) -> int:
-        """Return how many samples were clipped, or not solved, in a run that ended in a state."""
+        """Return the number of samples that were clipped, or not solved, from the final state."""
         return sum(part.n_clipped(own) for part, own in self.shares(state))
 
     def _inputs_from(self, recording: Recording) -> Array:
@@ -535,12 +535,12 @@ class Block(DrawsItself, Parametrised):
         return saving.to_dict(self)
 
     def save(self, path: str | Path) -> None:
-        """Write the block as JSON that a person can read; see `mckibben.load`."""
+        """Save the block as readable JSON; see `mckibben.load`."""
         saving.save(self, path)
 
 
 def one_per(field: str, more: int = 0) -> Any:
-    """Return a property: how many numbers a field has, and ``more``."""
+    """Return a property: the number of entries of a field, plus ``more``."""
 
     def size(block: Block) -> int:
         return len(getattr(block, field)) + more
@@ -549,7 +549,7 @@ def one_per(field: str, more: int = 0) -> Any:
 
 
 def check_units(recording: Recording, channels: Sequence[Channel]) -> None:
-    """Refuse a recording in which a channel of a model is absent, or in another unit."""
+    """Raise an error if a channel of a model is missing in a recording, or has another unit."""
     for channel in channels:
         recording[channel.name]  # refuses what is absent
         if (unit := recording.units[channel.name]) != channel.unit:
@@ -580,12 +580,12 @@ def explicit_state(block: Block, initial: Initial) -> Array:
 
 
 def scratch_of(kernel: Callable[..., Any], size: int) -> list[Array]:
-    """Return the scratch that a kernel computes in, as a list of one array, or of none."""
+    """Return the working memory of a kernel as a list of one array, or an empty list."""
     return [np.zeros(size)] if in_scratch(kernel) else []
 
 
 def needs_sample_time(kind: str, sample_time: float | None) -> float:
-    """Return the sample time, or say that a rate-dependent block cannot do without."""
+    """Return the sample time; raise an error if a rate-dependent block has none."""
     if sample_time is None or not sample_time > 0:
         raise ModelError(
             f"{kind!r} depends on rate and needs a sample time, but the data have no time",
@@ -595,13 +595,13 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
 
 
 def rate_filter(time_constant: float, step: float) -> tuple[float, float]:
-    """Return what a first-order filter of a rate keeps over a step, and its gain of the change."""
+    """Return the decay per step of a first-order rate filter, and its gain on the change."""
     smoothing = math.exp(-step / time_constant) if time_constant > 0 else 0.0
     return smoothing, (1 - smoothing) / step
 
 
 def own_sample_time(kind: str, own: float, sample_time: float | None) -> float:
-    """Return the sample time of a discrete block, after checking that the data have the same."""
+    """Return the sample time of a discrete block after checking that the data have the same."""
     step = needs_sample_time(kind, sample_time)
     if abs(step - own) > 1e-3 * own:
         raise ModelError(

@@ -87,7 +87,7 @@ def _improved(evaluate: Any, target: Any, u: Any, memory: Any) -> Any:
 
 
 def _carried(name: str, slope: Callable[[float, float], float]) -> Callable[[Any], complex]:
-    """Return a function of ``math`` that carries its derivative, ``slope(x, value)``, along."""
+    """Return a function of ``math`` that propagates its derivative, ``slope(x, value)``."""
     own, by = getattr(math, name), deferred(slope)
 
     def carried(x: Any) -> complex:
@@ -138,7 +138,7 @@ PREFIX = "_twin_"
 
 
 class _Rewriting(ast.NodeTransformer):
-    """Turns the source of a kernel into that of its twin."""
+    """Rewrites the source of a kernel for complex numbers."""
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
         self.generic_visit(node)
@@ -182,7 +182,7 @@ def _helped(name: str, *given: Any) -> ast.Call:
 
 
 def _part(node: Any) -> Any:
-    """Return the real part of what is compared."""
+    """Return the real part of a compared value."""
     if isinstance(node, ast.Tuple):
         return ast.Tuple([_part(each) for each in node.elts], ast.Load())
     truth = ast.Compare | ast.BoolOp | ast.Constant
@@ -191,7 +191,7 @@ def _part(node: Any) -> Any:
 
 @cache
 def twin(kernel: Any) -> Any:
-    """Return a kernel for complex numbers, of a compiled one; it is compiled when it is called.
+    """Return the complex version of a compiled kernel, compiled at its first call.
 
     Parameters
     ----------

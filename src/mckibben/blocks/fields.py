@@ -1,4 +1,4 @@
-"""Fields of blocks: numbers, channels and starting memories, validated and kept as plain data."""
+"""Fields of blocks: validated numbers, channels and start states, stored as plain data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Initial = Rule | Sequence[float] | Array
 
 
 def plain_sequence(values: Any) -> Any:
-    """Return a list or an array as the tuple that a field keeps; anything else as it is."""
+    """Convert a list or an array to a tuple; return other values unchanged."""
     values = values.tolist() if isinstance(values, np.ndarray) else values
     return tuple(values) if isinstance(values, list) else values
 
@@ -45,7 +45,7 @@ PolynomialField = Annotated[Coefficients, MinLen(1)]
 
 
 def rows(value: Any) -> Any:
-    """Return a table of numbers as a field of a block holds it."""
+    """Return a table of numbers as the value of a field."""
     listed = plain_sequence(value)
     return tuple(map(plain_sequence, listed)) if isinstance(listed, tuple) else listed
 
@@ -72,7 +72,7 @@ NARROWEST_SHARE = 1e-9
 
 
 def wide(ends: tuple[float, float]) -> tuple[float, float]:
-    """Refuse an input range that is empty, or that steps through it could not be told apart in."""
+    """Raise an error for an input range that is empty or too narrow to resolve."""
     low, high = ends
     width = high - low
     if NARROWEST <= width < np.inf and width >= NARROWEST_SHARE * (abs(low) + abs(high)):
@@ -95,7 +95,7 @@ FittedInitial = Literal["first_sample", "virgin", "fitted"] | Vector
 
 
 def vector(values: ArrayLike) -> tuple[float, ...]:
-    """Return numbers as a field of a block holds them."""
+    """Return numbers as the value of a field."""
     return tuple(np.asarray(values, dtype=np.float64).tolist())
 
 

@@ -1,4 +1,4 @@
-"""How kernels are compiled.
+"""Compilation of kernels.
 
 A kernel is a numba function ``kernel(coefficients, state, inputs, outputs)`` on float64 arrays: it
 advances one sample, the state changed in place, nothing allocated, nothing global; the loop over samples
@@ -35,7 +35,7 @@ its own table.
 
 
 def kernel(function: Function) -> Function:
-    """Compile with exact arithmetic, for everything but weighted sums.
+    """Compile with exact arithmetic; for everything but weighted sums.
 
     Here and in what follows arrays are not reference-counted, which would take longer than a short
     kernel; so none is made, and a copy of one is a loop.
@@ -44,12 +44,12 @@ def kernel(function: Function) -> Function:
 
 
 def short_kernel(function: Function) -> Function:
-    """Compile a `kernel` into all that call it: one that takes no longer than to pass it its arrays."""
+    """Compile a `kernel` inlined into its callers; for very short kernels."""
     return deferred(function, _nrt=False, forceinline=True)
 
 
 def summing_kernel(function: Function) -> Function:
-    """Compile with the terms of weighted sums free to be reordered, which lets them vectorise.
+    """Compile with reassociation in weighted sums, so that they vectorise.
 
     Minima, maxima, NaN and infinity keep their meaning.
     """
@@ -57,13 +57,13 @@ def summing_kernel(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile into each kernel that calls it, for functions that take functions."""
+    """Compile inlined into every calling kernel, for functions that take functions."""
     return deferred(function, inline="always", _nrt=False)
 
 
 @kernel
 def accumulate(total: float, change: float, lost: Array, place: int) -> float:
-    """Return a sum after a change. C of single precision carries what rounding loses, in ``lost``.
+    """Return a sum after an increment; in single-precision C, ``lost`` carries the rounding error.
 
     For sums that go on from sample to sample: a million small changes would drift there.
     """
@@ -72,7 +72,7 @@ def accumulate(total: float, change: float, lost: Array, place: int) -> float:
 
 @kernel
 def remember(latest: float, past: Array) -> None:
-    """Put a number before past ones, of which the last is forgotten."""
+    """Shift a number into the past ones; the last is dropped."""
     for k in range(past.size - 1, 0, -1):
         past[k] = past[k - 1]
     if past.size > 0:
@@ -94,7 +94,7 @@ DERIVED = False
 
 @inlined
 def improved(evaluate: Any, target: float, u: float, memory: Any) -> float:
-    """Return a root of ``evaluate(u, memory) == target``, in twins with its derivative.
+    """Return a root of ``evaluate(u, memory) == target``; in complex versions with its derivative.
 
     A search ends on the root to rounding, but not on its derivative, which is that of the last step.
     """
@@ -115,11 +115,11 @@ class Step(Protocol):
     batch: Callable[..., None]
 
     def __call__(self, coefficients: Array, state: Array, *arrays: Array) -> None:
-        """Take the inputs of a sample, and fill its outputs, each of shape (n,)."""
+        """Compute the outputs of a sample in place, each of shape (n,)."""
 
 
 def step(function: Callable[..., None], **options: Any) -> Step:
-    """Compile a kernel that advances one sample, and make the loop over samples from it."""
+    """Compile a kernel that advances one sample, and the loop over samples."""
     options["_nrt"] = False
     one: Any = deferred(function, inline="always", **options)
 
@@ -139,11 +139,11 @@ def step(function: Callable[..., None], **options: Any) -> Step:
 
 
 def summing_step(function: Callable[..., None]) -> Step:
-    """Compile a `step` with the freedom of a `summing_kernel`."""
+    """Compile a `step` with the options of a `summing_kernel`."""
     return step(function, fastmath=SUMS)
 
 
 @cache
 def in_scratch(kernel: Callable[..., Any]) -> bool:
-    """Return whether a step or a start computes in scratch that is passed in."""
+    """Return whether a step or start kernel takes a working memory."""
     return "scratch" in signature(kernel).parameters

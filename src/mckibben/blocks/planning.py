@@ -1,4 +1,4 @@
-"""Plans of a horizon: pressures of all muscles in so many samples, as near a wish as limits let.
+"""Horizon optimisation: pressures of all muscles, closest to a target within limits.
 
     min sum_t |G_t (p_t - q_t) - e_t|^2 / 2   where all limits hold.
 
@@ -46,7 +46,7 @@ SINGLE = {"CLOSED": 1e-7, "STAYS": 1e-6, "FLAT": 1e-30, "STAYING": 1e-6}
 def limit_rows(
     low: Array, high: Array, change: float, total: float, draw: float, volumes: Array
 ) -> Array:
-    """Return all limits, shape (rows, 2 + n); those that are infinite are left out.
+    """Return all finite limits, shape (rows, 2 + n).
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def limit_rows(
 
 @kernel
 def weighed(row: Array, path: Array, t: int) -> float:
-    """Return the weighted sum that a row limits, in sample t of a path."""
+    """Return the weighted sum of a limit's row in sample t of a path."""
     n, total = row.size - 2, 0.0
     for k in range(n):
         from_here = path[t * n + k] if row[0] > 0.0 else 0.0
@@ -91,7 +91,7 @@ def weighed(row: Array, path: Array, t: int) -> float:
 
 @kernel
 def own_place(row: Array) -> int:
-    """Return the muscle that a row is of, or -1 if of several."""
+    """Return the muscle of a limit's row, or -1 for several."""
     found = -1
     for k in range(row.size - 2):
         if row[2 + k] != 0.0:
@@ -103,7 +103,7 @@ def own_place(row: Array) -> int:
 
 @kernel
 def allowed(n: int, rows: Array, path: Array, t: int, at_any_rate: bool) -> bool:
-    """Move sample t of a path to where it may be; return whether it was there already.
+    """Project sample t of a path onto the limits; return whether it changed nothing.
 
     Each pressure goes to its own limits; what the supply cannot give is taken from all changes in one
     share. Limits of changes are left out where it may move at any rate.
@@ -138,7 +138,7 @@ def allowed(n: int, rows: Array, path: Array, t: int, at_any_rate: bool) -> bool
 
 @kernel
 def kept_to(n: int, rows: Array, path: Array) -> bool:
-    """Clip a path to all limits, sample by sample; return whether it kept to them."""
+    """Clip a path to all limits, sample by sample; return whether it was feasible."""
     there = True
     for t in range(path.size // n - 1):
         one = allowed(n, rows, path, t, False)
@@ -148,7 +148,7 @@ def kept_to(n: int, rows: Array, path: Array) -> bool:
 
 @kernel
 def plan_scratch(length: int, n: int, rows: int) -> int:
-    """Return how many numbers a plan is computed in."""
+    """Return the length of the working memory of a plan."""
     if n == 1:
         return 9 * length + 4
     return length * (3 * n * n + 3 * n + 6 * rows) + 2 * n * n + 2 * n
@@ -156,7 +156,7 @@ def plan_scratch(length: int, n: int, rows: int) -> int:
 
 @kernel
 def invert_small(n: int, matrix: Array, result: Array) -> None:
-    """Invert a positive definite matrix, n by n in a row, by Gauss and Jordan; destroys it."""
+    """Invert a positive definite matrix, n by n in a row, by Gauss-Jordan elimination, in place."""
     for i in range(n * n):
         result[i] = 1.0 if i % (n + 1) == 0 else 0.0
     for i in range(n):
@@ -174,7 +174,7 @@ def invert_small(n: int, matrix: Array, result: Array) -> None:
 
 @kernel
 def applied(n: int, matrix: Array, x: Array, scale: float, y: Array) -> None:
-    """Add to y a matrix, n by n in a row, times x and a number."""
+    """Add to y a matrix, n by n in a row, times x and a factor."""
     for i in range(n):
         total = 0.0
         for j in range(n):
@@ -227,7 +227,7 @@ def factored(n: int, rows: Array, hessian: Array, duals: Array, system: Array, w
 def moved(
     n: int, rows: Array, system: Array, right: Array, step: Array, duals: Array, work: Array
 ) -> None:
-    """Solve for one step of a path, of the room that limits leave, and of their prices.
+    """Solve for one step of a path, of the slacks, and of their multipliers.
 
     ``right`` is what the pressures' gradient lacks; ``duals`` are [room, price, what rooms are off, what
     room times price shall become over room, step of room, step of price], all rows of each sample.
@@ -269,7 +269,7 @@ def moved(
 
 @kernel
 def furthest(values: Array, steps: Array) -> float:
-    """Return the share of a step, at most 1, at which the first value becomes 0."""
+    """Return the largest share of a step, at most 1, that leaves all values positive."""
     share = 1.0
     for i in range(values.size):
         if steps[i] < 0.0:
@@ -281,7 +281,7 @@ def furthest(values: Array, steps: Array) -> float:
 def plan_several(
     n: int, rows: Array, slopes: Array, nominal: Array, errors: Array, path: Array, scratch: Array
 ) -> int:
-    """Find the pressures of a horizon from those before it; return the steps taken.
+    """Find the pressures of a horizon from the preceding ones; return the number of steps.
 
     ``slopes`` are N by m by n, ``nominal`` (q) N by n and ``errors`` (e) N by m.
     """
@@ -433,7 +433,7 @@ def plan_one(
 def turned(
     count: int, x: Array, d: Array, low: float, high: float, best: Array, t: int
 ) -> tuple[int, float]:
-    """Find where the derivative passes 0, within the range; return the knot beyond, and the value."""
+    """Find where the derivative crosses 0 within the range; return the knot beyond, and the value."""
     place = 0
     while place < count and not d[place] > 0.0:
         place += 1

@@ -1,4 +1,4 @@
-"""What commands print: words and tables, or JSON, on standard output; notes and progress beside."""
+"""Output of commands: text, tables or JSON on standard output; notes and progress on standard error."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _UNSEEN = re.compile(
 
 
 class InterruptionError(MckibbenError):
-    """Work that the user stopped; the text says what was finished."""
+    """Work that the user stopped; the text states what was finished."""
 
 
 def visible(text: str) -> str:
-    r"""Return words with control characters written out: names in files may hold anything.
+    r"""Return text with control characters escaped; names in files may contain any.
 
     >>> visible("\x1b[2J")
     '\\u001b[2J'
@@ -48,7 +48,7 @@ _noted: set[str] = set()
 
 
 def note(text: str, *, error: bool = False) -> None:
-    """Print a note, unless it was printed before; its parameters as flags."""
+    """Print a note once, with its parameters as flags."""
     line = f"Note: {plainly(text)}"
     if line not in _noted:
         _noted.add(line)
@@ -56,7 +56,7 @@ def note(text: str, *, error: bool = False) -> None:
 
 
 def forget_notes() -> None:
-    """Begin a command: nothing was printed yet."""
+    """Reset the printed notes at the start of a command."""
     _noted.clear()
 
 

@@ -1,4 +1,4 @@
-"""Ctrl-C: the first stops the work and says what is finished, the second ends the program at once."""
+"""Ctrl-C: the first stops the work and reports what is finished, the second exits at once."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PATIENCE = 1.3
 
 @contextmanager
 def stoppable(folder: Path | None) -> Iterator[None]:
-    """Let long work be stopped; whatever it is at, the program ends soon.
+    """Make long work interruptible.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def stoppable(folder: Path | None) -> Iterator[None]:
 
 @contextmanager
 def _watched() -> Iterator[None]:
-    """Hear of signals in a thread too: the main one hears nothing while it is in compiled code."""
+    """Handle signals in a thread, as the main thread cannot while it runs compiled code."""
     heard, told = os.pipe()
     os.set_blocking(told, False)
 
@@ -94,7 +94,7 @@ def _watched() -> Iterator[None]:
 
 
 def _quiet(printed: Any) -> Any:
-    """Do not print where an interruption is lost: in what compiled code calls, as a compiler does."""
+    """Suppress messages about interruptions that are lost in compiled code."""
 
     def lost(what: sys.UnraisableHookArgs) -> None:
         if what.exc_type is not KeyboardInterrupt:
@@ -104,7 +104,7 @@ def _quiet(printed: Any) -> Any:
 
 
 def how_to_go_on(folder: Path | None) -> str:
-    """Return what was finished of work that was stopped, and how to go on."""
+    """Return what was finished of the stopped work, and how to resume."""
     if folder is None:
         return "Stopped."
     place = folder / UNFINISHED
@@ -114,7 +114,7 @@ def how_to_go_on(folder: Path | None) -> str:
 
 
 def stop_short(board: Leaderboard, folder: Path | None) -> None:
-    """Leave if a comparison was stopped before it was done.
+    """Exit if a comparison was stopped before it was done.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Linear coupling of muscles: what each gives is felt by all, h = G^T v.
+"""Linear coupling of muscles, h = G^T v.
 
 Muscles may be more than the coordinates that they move together, or the other way round.
 
@@ -27,7 +27,7 @@ WORST_CONDITION = 1e8
 
 @step
 def coupling_step(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Multiply by a matrix; coefficients are the matrix, row after row, one row an output."""
+    """Multiply by a matrix; coefficients are its rows, one per output."""
     n = inputs.size
     for j in range(outputs.size):
         total = 0.0
@@ -93,7 +93,7 @@ class Coupling(Block):
         return float(np.abs(np.linalg.eigvals(np.eye(n) - self.matrix.T)).max())
 
     def inverse(self) -> Block:
-        """Return the decoupling v = G^-T h, by direct solution; of several v, the least.
+        """Return the decoupling v = G^-T h; for redundant v, the one of least norm.
 
         Raises
         ------
@@ -111,7 +111,7 @@ class Coupling(Block):
         return Coupling(rows(undone(self.matrix)), self.given, self.driven)
 
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the outputs reached over a box of inputs, each by itself."""
+        """Return the range of each output over a box of inputs."""
         at_low, at_high = self.matrix.T * low, self.matrix.T * high
         return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
 

@@ -1,4 +1,4 @@
-"""Models in continuous time, integrated in substeps, and their response to inputs that repeat."""
+"""Steady-state responses of continuous models to periodic inputs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BETWEEN = 2
 
 
 def steady_state(block: Any, recording: Recording) -> Recording:
-    """Return the response to a recording that repeats for ever, after all starts have died away.
+    """Return the steady-state response to a periodic recording.
 
     The input is taken to be band-limited between samples, as a multisine measured over whole
     periods is; neither holds of `simulate`, which starts somewhere and joins samples as `hold` says.

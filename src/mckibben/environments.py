@@ -1,4 +1,4 @@
-"""Gymnasium environments: follow a reference with a virtual rig, or with a model of one's own muscle.
+"""Gymnasium environments: tracking with a virtual rig, or with a model of one's own muscle.
 
 Importing this module registers ``mckibben/RIG-vVERSION`` for every published rig that measures
 displacement (Towers et al., "Gymnasium: A Standard Interface for Reinforcement Learning
@@ -56,7 +56,7 @@ SPREAD_PARAMETERS = ("muscle.c10", "muscle.friction.contracting", "muscle.fricti
 
 
 class Tracking(gymnasium.Env[Vector, Vector]):
-    """Make the displacement of a rig, or of a model, follow a reference.
+    """Track a reference with the displacement of a rig or a model.
 
     The reference is what the same rig did under hidden random commands, and so can be followed.
 
@@ -202,7 +202,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Vector, dict[str, Any]]:
-        """Start an episode: a new reference, a rig at rest, and, with ``spread``, another muscle."""
+        """Start an episode: a new reference, a rig at rest, and, with ``spread``, a varied muscle."""
         super().reset(seed=seed)
         del options
         self._now = self._varied()
@@ -285,7 +285,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         return rig.changed(settings)
 
     def _hidden_run(self, plant: Rig | Twin) -> Array:
-        """Return what a rig does under hidden commands [mm], shape (samples, displacements)."""
+        """Return a rig's response to random commands [mm], shape (samples, displacements)."""
         from mckibben.signals import irregular_triangle, random_wave, sine
 
         n = len(self._wanted)
@@ -341,7 +341,7 @@ def register() -> None:
 
 
 def _twin(plant: object) -> Twin:
-    """Return a twin of what is given: itself, a model, or a model's file."""
+    """Return a twin: as given, or of a model or its file."""
     from mckibben.blocks.base import Block
     from mckibben.blocks.saving import load
     from mckibben.control import Twin

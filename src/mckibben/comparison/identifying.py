@@ -1,4 +1,4 @@
-"""One call to identify a family of models and choose its orders by cross-validated free-run error."""
+"""Identification of a model family, with orders chosen by cross-validated free-running error."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from mckibben.system.workers import checked
 
 @dataclass(frozen=True)
 class Identified:
-    """What `identify` found.
+    """Result of `identify`.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def identify(
     progress: bool | Tell | None = None,
     **settings: Any,
 ) -> Identified:
-    """Identify a family of models, its orders chosen by cross-validated free-run error.
+    """Identify a model family, with orders chosen by cross-validated free-running error.
 
     Parameters
     ----------

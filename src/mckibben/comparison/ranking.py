@@ -1,4 +1,4 @@
-"""Models × recordings: chosen on the training side, tested once on data used for nothing else."""
+"""Comparison of models on recordings: chosen on training data, tested once on independent data."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ SURE = 0.1
 
 @dataclass(frozen=True)
 class Standing:
-    """How far a comparison is: models done, those in work, the one that would be chosen so far.
+    """Progress of a comparison: finished and running models, and the best so far.
 
     ``seconds`` is about how long the rest takes.
     """
@@ -63,11 +63,11 @@ class Standing:
 
     @property
     def share(self) -> float:
-        """Models done, of all."""
+        """Share of finished models."""
         return self.done / max(self.total, 1)
 
     def __str__(self) -> str:
-        """Return it for a progress bar.
+        """Return the text of a progress bar.
 
         >>> str(Standing(12, 28, ("gpi",)))
         '12 of 28 models, fitting gpi'
@@ -101,7 +101,7 @@ def compare(
     found: Callable[[Leaderboard], None] | None = None,
     watch: Watch | None = None,
 ) -> Leaderboard:
-    """Fit models on the same data with the same seeds, choose one, and test all.
+    """Fit models to the same data, choose one by cross-validation, and test all.
 
     Every error is free-running. Models are fitted to the training recordings, and chosen by
     cross-validation within them (over recordings, or over blocks of cycles of a single one); nothing is
@@ -208,7 +208,7 @@ def compare(
 
 @dataclass(frozen=True)
 class Ranking:
-    """A leaderboard of the models finished, and their outputs on all recordings, training first."""
+    """A leaderboard of the finished models, and their outputs on all recordings, training first."""
 
     board: Leaderboard
     outputs: Mapping[str, tuple[Array, ...]] = field(repr=False)
@@ -222,7 +222,7 @@ def ranked(
     progress: Callable[[Standing], None] | None = None,
     watch: Watch | None = None,
 ) -> Generator[Ranking]:
-    """Yield the ranking whenever a model is finished, cheap models first; the last one is whole."""
+    """Yield the ranking after every model, fast models first; the last ranking is complete."""
     checked(jobs)
     data, table = plan.data, _Table(plan)
     keys = {
@@ -292,7 +292,7 @@ def ranked(
 
 
 def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
-    """Return the row of a model, with its band where it is the best until now, as it may be chosen."""
+    """Return the row of a model, with its band if it is the best so far."""
     try:
         row = row_of(plan.data, name, found, plan.constant.squares, plan.empty.seed)
     except MckibbenError as error:  # its outputs overflow
@@ -306,7 +306,7 @@ def _row(plan: Plan, name: str, found: FitResult, table: _Table) -> Row:
 
 
 class _Table:
-    """Rows that are finished, and the resamples of their test errors, on the same blocks for all."""
+    """Finished rows, and the resamples of their test errors, on common blocks."""
 
     def __init__(self, plan: Plan) -> None:
         self.rows: dict[str, Row] = {}
@@ -318,7 +318,7 @@ class _Table:
         self._resamples: dict[tuple[str, tuple[int, ...]], Array] = {}
 
     def add(self, row: Row, outputs: tuple[Array, ...]) -> None:
-        """Take the row of a model that is finished, and its outputs on all recordings."""
+        """Add the row of a finished model, and its outputs on all recordings."""
         self.rows[row.model] = row
         if row.test is not None:
             errors = self._errors[row.model] = self._plan.data.test_errors(outputs)
@@ -328,7 +328,7 @@ class _Table:
             self._correlation[row.model] = correlation_length(np.split(squares.mean(axis=1), ends))
 
     def sorted(self) -> list[Row]:
-        """Return the rows that were tested, in the order of the choice."""
+        """Return the tested rows in the order of the choice."""
         tested = [row for row in self.rows.values() if row.test is not None]
         return sorted(tested, key=lambda row: row.order)
 
@@ -362,7 +362,7 @@ class _Table:
         return Ranking(replace(board, constant=placed[-1]), outputs)
 
     def _resampled(self, models: Sequence[str]) -> list[Array]:
-        """Return resampled test RMSE of models; blocks suit the median of their correlation lengths."""
+        """Return resampled test RMSE of models; block lengths fit their median correlation length."""
         correlation = float(np.median(list(self._correlation.values())))
         blocks = tuple(block_length(n, correlation) for n in self._lengths)
         missing = [model for model in models if (model, blocks) not in self._resamples]

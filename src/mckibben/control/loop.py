@@ -49,7 +49,7 @@ class Beyond(NamedTuple):
 
 @dataclass(frozen=True)
 class Tracked(DrawsItself):
-    """What came of a loop.
+    """Result of a closed loop.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def track(
     seed: int = 0,
     progress: bool | Callable[[float], None] | None = None,
 ) -> Tracked:
-    """Let a controller make a plant's motions, or its force, follow references.
+    """Track references of motion or force with a controller on a plant.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ def track(
 def _check(
     approach: float, settle: float, noise: float, delay: int, slew: float | None, step: float
 ) -> None:
-    """Refuse settings out of range, and what is no number."""
+    """Raise an error for settings out of range."""
     longest = MOST_STEPS * step
     ranges = {
         "approach": (approach, longest, "s"),
@@ -289,7 +289,7 @@ def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:
 def ends(
     model: Block | None, followed: Sequence[Channel], rest_length: float | None
 ) -> dict[str, tuple[float, float]]:
-    """Return the lowest and highest that a model can reach of what is followed, as far as it says."""
+    """Return the lowest and highest value that a model can reach, if known."""
     found: dict[str, tuple[float, float]] = {}
     if model is None:
         return found
@@ -304,13 +304,13 @@ def ends(
 
 
 def outside(reference: Array, low: float, high: float) -> NDArray[np.bool_]:
-    """Return which samples of a reference, shape (n,), lie beyond both ends and rounding."""
+    """Return which samples of a reference, shape (n,), are out of the range by more than rounding."""
     margin = ROUNDING * (high - low)
     return np.asarray((reference < low - margin) | (reference > high + margin))
 
 
 def beyond(errors: Array, out: NDArray[np.bool_], low: float, high: float) -> Beyond | None:
-    """Return what of a reference is out of reach, by `outside`, or None."""
+    """Return the part of a reference that is out of reach, by `outside`, or None."""
     if not out.any():
         return None
     others = errors[~out]

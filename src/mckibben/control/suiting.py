@@ -1,4 +1,4 @@
-"""Whether what a plant tells of a controller holds: it may be another muscle, or know no time."""
+"""Checks whether results on a plant apply to the muscle of a compensator."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ REMEDY = "test it on a model of your own muscle (`plant=model.json`), where that
 
 
 def of_itself(model: Block | None, plant: Plant) -> bool:
-    """Tell whether a plant is the very model that a compensator undoes."""
+    """Return whether a plant is the model that a compensator inverts."""
     return (
         model is not None
         and isinstance(plant, Twin)
@@ -38,7 +38,7 @@ def of_itself(model: Block | None, plant: Plant) -> bool:
 
 
 def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
-    """Return what speaks against taking what a compensator does on a plant for what it does on a muscle.
+    """Return warnings against transferring results of a compensator from a plant to a muscle.
 
     ``rise`` is what the plant does while its commands rise slowly, from `mckibben.control.slow_rise`.
     """
@@ -58,7 +58,7 @@ def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
 
 
 def doubts_of_feedback(law: str, plant: Plant) -> list[str]:
-    """Return what speaks against feedback's errors on a plant: a model without time has no lag."""
+    """Return warnings about feedback on a plant: a static model has no lag."""
     if law == "feedforward" or not isinstance(plant, Twin) or plant.forward.rate_dependent:
         return []
     return [
@@ -69,7 +69,7 @@ def doubts_of_feedback(law: str, plant: Plant) -> list[str]:
 
 
 def _pressures(model: Block, plant: Plant, rise: Recording) -> list[str]:
-    """Tell of commands that a model was identified at, and that the plant does not let through."""
+    """Return a warning about identified pressures that the plant does not allow."""
     notes = []
     for channel in model.inputs:
         name, known = plain(channel.name), known_ranges(model).get(channel.name)
@@ -86,7 +86,7 @@ def _pressures(model: Block, plant: Plant, rise: Recording) -> list[str]:
 
 
 def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
-    """Tell where a plant's slow rise begins or ends elsewhere than the model's."""
+    """Return a warning if a plant's slow rise starts or ends elsewhere than the model's."""
     if any(plain(channel.name) not in rise for channel in model.inputs):
         return []
     known, within = known_ranges(model), np.ones(len(rise), dtype=bool)

@@ -1,4 +1,4 @@
-"""Tuning PID feedback on a plant, so that it is a fair baseline.
+"""Tuning of PID feedback on a plant, as a fair baseline.
 
 A step of every pressure from the middle of its range gives gain, time constant and dead time (at 28 and
 63 % of the response); from them SIMC's rules (Skogestad, "Simple analytic rules for model reduction and
@@ -114,7 +114,7 @@ def tune_pid(
 def untuned_pid(
     plant: Plant, scheduled: Collection[str] = (), references: Sequence[Channel] = ()
 ) -> PIDFeedback:
-    """Return PID feedback of a plant's channels, without gains; parameters are those of `tune_pid`.
+    """Return PID feedback for a plant's channels, without gains; parameters as in `tune_pid`.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def untuned_pid(
 
 
 def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
-    """Return the motion that an input of a plant makes: that of its number, or the only one there is."""
+    """Return the motion driven by an input of a plant: that of the same number, or the only one."""
     end = name[name.find("_") :] if "_" in name else ""
     found = [stem + end for stem in MOVED if stem + end in rig.outputs]
     if len(driven) == 1 and not found and isinstance(rig, Twin):
@@ -156,7 +156,7 @@ def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
 
 
 def _steepest(response: Array, ramp: Array, size: float) -> float:
-    """Return the largest gain over steps of a size, of a response to a ramp up and down."""
+    """Return the largest gain over steps of a size, from the response to a ramp up and down."""
     apart = max(round(size / float(ramp[1] - ramp[0])), 1)
     up, down = np.split(response, 2)
     run = float(ramp[apart] - ramp[0])
@@ -168,7 +168,7 @@ def _settled(response: Array) -> Array:
 
 
 def _moves(response: Array) -> bool:
-    """Tell whether something has moved, by more than it scatters."""
+    """Return whether a signal has moved by more than its scatter."""
     settled = _settled(response)
     return abs(float(settled.mean())) > float(settled.std())
 

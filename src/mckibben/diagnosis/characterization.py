@@ -64,7 +64,7 @@ BY_POSITION = {
 
 @dataclass(frozen=True)
 class Level:
-    """What is found where other inputs stand still: their channels, levels and units in ``held``."""
+    """Results with other inputs constant: their channels, levels and units in ``held``."""
 
     held: tuple[tuple[str, float, str], ...]
     found: Characterization
@@ -72,7 +72,7 @@ class Level:
 
 @dataclass(frozen=True, kw_only=True)
 class Characterization(DrawsItself):
-    """What a muscle does, from recordings alone; None for what they do not show.
+    """Characterization of a muscle from recordings; None for quantities that they do not determine.
 
     Units are those of the channels; percentages are of the output range. Figures are medians over
     repeats; ``intervals`` has the 95 % intervals of those with three repeats or more, by field.
@@ -181,7 +181,7 @@ class Characterization(DrawsItself):
 
     @property
     def has_loop(self) -> bool | None:
-        """Whether branches are apart; False only where they surely are by less than 1 % of the range.
+        """Whether branches differ; False only if their gap is significantly below 1 % of the range.
 
         None where too few branches, or too much noise, leave it open.
         """
@@ -193,14 +193,14 @@ class Characterization(DrawsItself):
 
     @property
     def follows_direction(self) -> bool:
-        """Whether the output follows the direction of motion, as friction does, and not position.
+        """Whether the output depends on the direction of motion, as friction does, and not on position.
 
         Such an output has no onset and no trend over the input, and no inverse by position.
         """
         return self.direction_share >= EXPLAINED and self.position_share <= POSITION
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything for JSON, with None for what could not be measured."""
+        """Return everything for JSON, with None for undetermined quantities."""
         return asdict(self) | {"follows_direction": self.follows_direction}
 
 
@@ -211,7 +211,7 @@ def characterize(
     *,
     beside: Sequence[str] = (),
 ) -> Characterization:
-    """Measure what a muscle does: width and shape of its loop, memory, creep, dependence on rate.
+    """Measure width and shape of the loop, memory, creep and rate dependence of a muscle.
 
     Sensor noise is averaged away first, over samples within which the input moves by 1 % of its range.
     Ranges are those of all recordings together.
@@ -286,7 +286,7 @@ def characterize(
 def _levels(
     runs: Sequence[Recording], given: str, wanted: str, others: Sequence[str]
 ) -> list[Level]:
-    """Return what is found at every level of other inputs that shows a loop, or a recording's gap."""
+    """Return the results at every level of other inputs that shows a loop, or a data gap."""
     levels = []
     low, high = extremes(runs, given)
     span = high - low
@@ -305,7 +305,7 @@ def _levels(
 
 
 def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any]:
-    """Return what is known of recordings without looking at loops."""
+    """Return counts and ranges of recordings."""
     durations, steps = [run.duration for run in runs], {run.sample_time for run in runs}
     return {
         "input_range": extremes(runs, given),
@@ -318,7 +318,7 @@ def _counts(runs: Sequence[Recording], given: str, wanted: str) -> dict[str, Any
 
 
 def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characterization:
-    """Return what is found in recordings in which nothing else moves, whatever their zeros."""
+    """Return the results of recordings in which other inputs are constant, with any zero offsets."""
     several = len(runs) > 1 and all(given in run and wanted in run for run in runs)
     scale, tracks = prepare(levelled(runs, given, wanted) if several else runs, given, wanted)
     loops, branches = loops_of(tracks, scale), branches_of(tracks, scale)
@@ -380,7 +380,7 @@ def _measured(runs: Sequence[Recording], given: str, wanted: str) -> Characteriz
 
 
 def _blanked(found: Characterization, absent: Collection[str]) -> Characterization:
-    """Return what is found without some of its figures."""
+    """Return results without some of their quantities."""
     cycles = () if "loop_width" in absent else found.cycles
     kept = {name: limits for name, limits in found.intervals.items() if name not in absent}
     blank: dict[str, Any] = dict.fromkeys(absent)
@@ -388,7 +388,7 @@ def _blanked(found: Characterization, absent: Collection[str]) -> Characterizati
 
 
 def _interval(values: Sequence[float]) -> Range | None:
-    """Return the 95 % interval of the median of repeated values by Student's t; None of two or fewer.
+    """Return the 95 % interval of the median of repeated values by Student's t; None for one or two.
 
     It does not reach beyond zero where all values are of one sign.
     """

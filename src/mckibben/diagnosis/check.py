@@ -1,4 +1,4 @@
-"""A model checked on recordings: whether what it leaves is noise, and if not, what it follows."""
+"""Model check: whether residuals are noise, and otherwise what they depend on."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ ALONE = ("drift", "offset")
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a residual was tested for.
+    """A tested cause of a residual.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class OutputCheck:
-    """What a model leaves of one output.
+    """Residual of one output.
 
     Parameters
     ----------
@@ -119,12 +119,12 @@ class OutputCheck:
 
     @property
     def useless(self) -> bool:
-        """Whether the mean is about as good; see `mckibben.comparison.choosing.useful`."""
+        """Whether the mean predicts about as well; see `mckibben.comparison.choosing.useful`."""
         return not useful(self.rmse, self.mean_error)
 
     @property
     def right(self) -> bool:
-        """Whether nothing is found that the model misses."""
+        """Whether no cause is significant."""
         return self.exact or not (self.missing or self.useless)
 
     def to_dict(self) -> dict[str, Any]:
@@ -136,7 +136,7 @@ class OutputCheck:
 
 @dataclass(frozen=True, eq=False)
 class Validation(DrawsItself):
-    """Whether a model is right on recordings, and what it misses.
+    """Result of a model check on recordings.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class Validation(DrawsItself):
 
     @property
     def right(self) -> bool:
-        """Whether nothing is found that the model misses."""
+        """Whether no cause is significant."""
         return all(one.right for one in self.outputs)
 
     def to_dict(self) -> dict[str, Any]:
@@ -185,7 +185,7 @@ def check(
     *,
     progress: bool | Tell | None = None,
 ) -> Validation:
-    """Test whether a model is right on recordings, and what it misses if it is not.
+    """Check a model on recordings, and find what its residuals depend on.
 
     The model runs free, from an honest start of its memory. What it leaves is tested for following a
     lag of the output, inputs, their branches by region (hysteresis that is left), recorded loads, time,
@@ -222,7 +222,7 @@ def check(
 def check_runs(
     model: Block, runs: Sequence[Run], tell: Tell | None = None, means: Array | None = None
 ) -> Validation:
-    """Check a model by what it made of recordings, running free; see `check`.
+    """Check a model by its free runs on recordings; see `check`.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def _output(
 
 
 class _Search:
-    """Groups that a residual follows, taken one by one, the most important first."""
+    """Forward selection of groups that explain a residual, the most important first."""
 
     def __init__(
         self,
@@ -314,7 +314,7 @@ class _Search:
         self.residual = np.concatenate(left)
 
     def missing(self) -> tuple[Finding, ...]:
-        """Return what is certain, each beside those before."""
+        """Return the significant groups, each given those before."""
         found: list[Finding] = []
         known: tuple[int, ...] = ()
         for kinds in ({g.kind for g in self.groups} - set(LAST), *({kind} for kind in LAST)):
@@ -339,7 +339,7 @@ class _Search:
     def finding(
         self, group: Group, known: tuple[int, ...] = (), others: tuple[tuple[str, str], ...] = ()
     ) -> Finding:
-        """Return what a group explains beside others."""
+        """Return what a group explains in addition to others."""
         test = self._test(group, known)
         coefficient, about = None, float(self.residual.mean())
         if group.kind == "lag":
@@ -363,7 +363,7 @@ class _Search:
         return self._test(group, known).p_value <= self.level
 
     def _gain(self, group: Group, known: tuple[int, ...]) -> float:
-        """Return how much more a group explains than noise would, by Mallows' C_p.
+        """Return the variance that a group explains beyond noise, by Mallows' C_p.
 
         Beside mean and start, and with what it is beside: a branch by region may move the curve, too.
         """
@@ -378,7 +378,7 @@ def _rms(pieces: Sequence[Array]) -> float:
 
 
 def _resolution(measured: Sequence[Array]) -> float:
-    """Return the step of a measured output whose samples are all whole steps apart; else 0."""
+    """Return the resolution of a quantised output; otherwise 0."""
     values = np.unique(np.concatenate(measured))
     steps = np.diff(values)
     steps = steps[steps > ROUNDING * (values[-1] - values[0])]

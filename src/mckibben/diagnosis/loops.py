@@ -1,4 +1,4 @@
-"""Loops: output over input along rising and falling branches, and what can be read off them."""
+"""Hysteresis loops: output over input along rising and falling branches, and their shape."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ class Cycle:
 
     @property
     def amplitude(self) -> float:
-        """High less low."""
+        """Highest minus lowest input."""
         return self.high - self.low
 
     def like(self, other: Cycle, within: float) -> bool:
-        """Tell whether another has the same extremes, within a share of the amplitude."""
+        """Return whether another cycle has the same extremes, within a share of the amplitude."""
         apart = max(abs(self.low - other.low), abs(self.high - other.high))
         return apart <= within * self.amplitude
 
@@ -132,7 +132,7 @@ def _loop(number: int, track: Track, piece: slice, scale: Scale) -> Loop | None:
 
 
 def largest_of(loops: Sequence[Loop]) -> list[Loop]:
-    """Return the largest loops, closed ones where there are any.
+    """Return the largest loops, closed ones if there are any.
 
     The first of a recording, which starts from an unknown memory, counts where there is no other.
     """
@@ -164,7 +164,7 @@ def curve(u: Array, y: Array, levels: Array, half: float) -> Array:
 
 
 def _half(scale: Scale, amplitude: float) -> float:
-    """Return how near samples make a curve: over several steps of a coarse sensor."""
+    """Return the half width of a curve's window: several steps of a coarse sensor."""
     steps = max(spread.step / spread.span for spread in (scale.u, scale.y))
     return max(WINDOW * amplitude, min(2 * steps, 0.25) * scale.u.span)
 
@@ -186,14 +186,14 @@ class Branches:
 
 
 def _mean(x: Array, axis: int) -> Array:
-    """Return the mean of what is known along an axis, NaN where nothing is."""
+    """Return the mean of known values along an axis, NaN if there are none."""
     known = np.isfinite(x)
     count = np.where(known.any(axis=axis), known.sum(axis=axis), np.nan)
     return np.asarray(np.where(known, x, 0.0).sum(axis=axis) / count)
 
 
 def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
-    """Return the curves of all major branches of three samples or more.
+    """Return the curves of all major branches with at least three samples.
 
     The first of five or more of a recording, which starts from an unknown memory, is left out.
     """
@@ -210,7 +210,7 @@ def branches_of(tracks: Sequence[Track], scale: Scale) -> Branches:
 
 
 def gap_of(found: Branches, sign: float) -> tuple[float | None, Range | None, float | None]:
-    """Return how far falling branches lie from rising ones, its 95 % interval, and p without a loop.
+    """Return the gap between falling and rising branches, its 95 % interval, and p without a loop.
 
     Every branch is compared with the mean of those before and after, so that drift cancels. The error
     is that of branches which differ as much as those of one direction do: a t-test. That direction
@@ -250,7 +250,7 @@ Curve = tuple[float | None, float | None, float | None]
 
 
 def curves_of(found: Branches, loops: Sequence[Loop], scale: Scale) -> list[Curve]:
-    """Return gain, onset and saturation of rising and falling output, where they show.
+    """Return gain, onset and saturation of rising and falling output, if determined.
 
     Of the largest loops where they cover the input range, else of all branches. The gain is the mean
     slope of both at mid input over a fifth of the range; below the onset and above the saturation the

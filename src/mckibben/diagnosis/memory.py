@@ -1,4 +1,4 @@
-"""Memory and time: dead zones, minor loops, creep in holds, dependence of the loop width on speed."""
+"""Memory and rate: dead zones, minor loops, creep in holds, loop width by speed."""
 
 from __future__ import annotations
 
@@ -97,13 +97,13 @@ def minor_loop_errors(tracks: Sequence[Track], scale: Scale) -> list[float]:
 
 
 def _branch(track: Track, k: int) -> tuple[slice, float]:
-    """Return the samples from a turning point to the next, and the sign of the way."""
+    """Return the samples from a turning point to the next, and the direction."""
     start, stop = track.turns[k : k + 2]
     return slice(start, stop + 1), float(np.sign(track.u[stop] - track.u[start]))
 
 
 def _first_reach(wanted: Array, x: Array, limit: float) -> float | None:
-    """Return ``wanted`` where ``x`` first reaches a limit, between samples; None if it never does."""
+    """Return ``wanted`` where ``x`` first reaches a limit, interpolated; None if it never does."""
     i = int(np.argmax(x >= limit))
     if not x[i] >= limit:
         return None
@@ -142,7 +142,7 @@ def creep(
 
 
 def rate_dependence(loops: Sequence[Loop]) -> tuple[float, Range, Range] | None:
-    """Return how much wider the loop is at twice the speed [%], its 95 % interval, and between which.
+    """Return the increase of loop width at twice the speed [%], its 95 % interval, and the speeds.
 
     By a straight line over the logarithm of the mean speed, of three or more closed cycles between like
     extremes that differ most in speed; the first of a recording, which starts from an unknown memory,

@@ -1,4 +1,4 @@
-"""The frequency responses of linear models, beside what was measured."""
+"""Frequency responses of linear models, with measured ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LEAST, MOST = 16, 4096
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """Of a linear model, from one input to one output.
+    """Frequency response of a linear model from one input to one output.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class FrequencyResponse:
 def frequency_responses(
     block: Block, recordings: Sequence[Recording], covariance: Array, half_width: float
 ) -> tuple[FrequencyResponse, ...]:
-    """Return the frequency response of every output to its own input; none of a model not linear.
+    """Return the frequency response of every output to its main input; none for a nonlinear model.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def frequency_responses(
 def _welch(
     recordings: Sequence[Recording], given: str, wanted: str, step: float
 ) -> tuple[Array, Array, Array]:
-    """Return frequency, gain and angle as measured, where coherence is high."""
+    """Return measured frequency, gain and angle, where coherence is high."""
     from scipy.signal import csd
 
     length = min(max(map(len, recordings)) // 4, MOST)

@@ -1,4 +1,4 @@
-"""What an estimator is: settings that find a block from recordings."""
+"""Base class of estimators: settings that identify a block from recordings."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ Initial = Literal[Start, "fitted"]
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """What a fit has to say of itself.
+    """Diagnostics of a fit.
 
     Errors are those of free runs on the samples fitted, in the unit of the output, each run started as
     fitted; of several outputs the mean of theirs.
@@ -127,7 +127,7 @@ class Diagnostics:
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class Estimator(ABC):
-    """Base of all estimators: of one input and one output, unless a class overrides that.
+    """Base class of all estimators; one input and one output unless a class overrides that.
 
     Settings are the fields of the class, to be read, changed, cloned and searched over by scikit-learn.
 
@@ -199,7 +199,7 @@ class Estimator(ABC):
     """Whether standard errors of the parameters are computed."""
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the settings by name; ``deep`` changes nothing, as none has settings of its own."""
+        """Return the settings by name; ``deep`` has no effect."""
         return {name: getattr(self, name) for name in self._names()}
 
     def set_params(self, **settings: Any) -> Self:
@@ -242,7 +242,7 @@ class Estimator(ABC):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> str | None:
-        """Return why the model has no place in a comparison on recordings, or None."""
+        """Return why the model does not apply to recordings, or None."""
         if len(inputs) != 1 or len(outputs) != 1:
             return "it is of one input and one output"
         if scheduling is not None:
@@ -268,7 +268,7 @@ class Estimator(ABC):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> dict[str, Any]:
-        """Return the settings that make it learn from some channels; None for its own choice."""
+        """Return the settings that select channels; None for the default choice."""
         return {"input": inputs[0], "output": outputs[0]}
 
     def channels(self, data: TrainingData) -> dict[str, Channel]:
@@ -278,11 +278,11 @@ class Estimator(ABC):
 
     @property
     def starting_rule(self) -> Start:
-        """The rule that blocks start by: that of `initial`, unless it is fitted."""
+        """Start rule of the block: `initial`, unless it is fitted."""
         return "virgin" if self.get_params().get("initial") == "virgin" else "first_sample"
 
     def common_fields(self, data: TrainingData) -> dict[str, Any]:
-        """Return the fields that most blocks with memory share: range of the input, start, channels."""
+        """Return the common fields of blocks with memory: input range, start, channels."""
         own = {"input_range": data.input_range, "initial": self.starting_rule}
         return own | self.channels(data)
 
@@ -291,11 +291,11 @@ class Estimator(ABC):
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
-        """Fields of the model that a rule or the structure fixes, each as kind and field, by a dot."""
+        """Fields of the model that are not fitted, each as kind and field, joined by a dot."""
         return ()
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places in ``block.pack()`` that the fit is not free to choose.
+        """Return the indices in ``block.pack()`` that are not fitted.
 
         They are no parameters of the model fitted. By default those of `fixed_fields`.
         """
@@ -308,18 +308,18 @@ class Estimator(ABC):
 
     @property
     def n_beside(self) -> int:
-        """How many numbers are found beside ``model_.pack()``, which has them as structure."""
+        """Number of fitted values that are not in ``model_.pack()``."""
         return 0
 
     @property
     def stops_early(self) -> bool:
-        """Whether runs that nothing is fitted to can stop the search."""
+        """Whether validation recordings can stop the search."""
         return False
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
-        """Return what is learned from recordings, checked."""
+        """Return the training data from recordings, checked."""
         # models of several muscles begin anew after rows left out, and so are fitted to bridges too
         measured = [~one.bridged for one in listed(recordings)]
         counted = measured if rows is None else map(np.logical_and, rows, measured)
@@ -331,7 +331,7 @@ class Estimator(ABC):
 
     @abstractmethod
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data with the memories at the start that belong to it."""
+        """Return the identified block, and the data with its initial peaks."""
 
     def fit(
         self,
@@ -343,7 +343,7 @@ class Estimator(ABC):
         validation: Sequence[Recording] = (),
         progress: bool | Progress | None = None,
     ) -> Self:
-        """Find the block that runs free closest to the recordings.
+        """Fit the block to recordings by its free-running error.
 
         Parameters
         ----------
@@ -385,7 +385,7 @@ class Estimator(ABC):
             raise
 
     def _recording(self, u: Any, y: Any, sample_time: float | None) -> Recording:
-        """Return arrays as a recording with the channels of this estimator; ``y`` may be None."""
+        """Return arrays as a recording with this estimator's channels; ``y`` may be None."""
         channels: dict[str, Array] = {}
         for given, names in ((u, self.input), (y, self.output)):
             columns = np.asarray(() if given is None else given, dtype=float)
@@ -431,7 +431,7 @@ class Estimator(ABC):
         return self
 
     def check_settings(self) -> None:
-        """Refuse settings that are not as they are declared.
+        """Raise an error for settings that violate their declarations.
 
         Raises
         ------
@@ -446,7 +446,7 @@ class Estimator(ABC):
         *,
         sample_time: float | None = None,
     ) -> Any:
-        """Return the model's free-running output, from the inputs alone.
+        """Return the model's free-running output.
 
         Every run starts as a stream would: no measured output is looked at.
 
@@ -473,7 +473,7 @@ class Estimator(ABC):
         return [outputs[:, 0] for outputs in found] if len(given) == 1 else found
 
     def score(self, recordings: Recording | Sequence[Recording], y: None = None) -> float:
-        """Return R² over all recordings of what `predict` gives; of several outputs the mean."""
+        """Return R² of `predict` over all recordings, averaged over outputs."""
         every = listed(recordings)
         predicted = np.concatenate(self.predict(every))
         given = [channel.name for channel in self.fitted.outputs]
@@ -485,7 +485,7 @@ class Estimator(ABC):
 
     @property
     def fitted(self) -> Block:
-        """The block found.
+        """The fitted block.
 
         Raises
         ------
@@ -526,7 +526,7 @@ class Estimator(ABC):
         )
 
     def undetermined(self) -> tuple[int, ...]:
-        """Return the places in ``model_.pack()`` of what the recordings do not determine.
+        """Return the indices in ``model_.pack()`` of undetermined parameters.
 
         By default, the parameters at no bound whose standard errors are not known.
         """
@@ -538,7 +538,7 @@ class Estimator(ABC):
         return tuple(place for place in unknown if place not in told)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks where samples count, each run started as fitted.
+        """Return free-running outputs of blocks at scored samples, with fitted starts.
 
         Shape (blocks, samples).
         """
@@ -553,13 +553,13 @@ class Estimator(ABC):
         return covariance_of(block, data, residual, at_bounds)
 
     def at_bounds(self, block: Block) -> tuple[int, ...]:
-        """Return the places of parameters that ended at a bound: by default those that are zero."""
+        """Return the indices of parameters at a bound: by default those equal to zero."""
         return tuple(np.flatnonzero(vanishing(block.pack())).tolist())
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class SearchEstimator(Estimator):
-    """An estimator of one input and one output with a search of its own.
+    """An estimator of one input and one output with its own search.
 
     Parameters
     ----------
@@ -583,7 +583,7 @@ def _rms(residual: Array) -> Array:
 
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:
-    """Return why nothing can be learned of what inputs do, if all rest in every recording; else None."""
+    """Return why inputs cannot be identified, if all rest in every recording; else None."""
     known = [r[name] for r in recordings for name in inputs if name in r]
     if not known or any(np.ptp(values) > 0 for values in known):
         return None

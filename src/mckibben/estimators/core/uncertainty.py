@@ -1,4 +1,4 @@
-"""What recordings tell of a block's parameters: condition and covariance, from how outputs move.
+"""Parameter uncertainty: condition and covariance from sensitivities of outputs.
 
 Covariances are those of least squares of the free run where residuals remember (the sandwich
 P J' R J P, P the pseudo-inverse of J' J): J holds the free-run sensitivities, and R the covariance of
@@ -42,7 +42,7 @@ NOTHING = 1e-9
 
 
 def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
-    """Return the free-running outputs of blocks at the samples that count, as `TrainingData.target`."""
+    """Return free-running outputs of blocks at the scored samples, as `TrainingData.target`."""
     outputs = []
     for run in data.runs:
         many = run_many(blocks, run.inputs, sample_time=run.sample_time)
@@ -52,7 +52,7 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
 
 
 def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
-    """Return the same with the states that are solved for at a start fitted to every run.
+    """Return the same with start states fitted to every run.
 
     Models of several outputs have no such states.
     """
@@ -68,7 +68,7 @@ def simulate_started(blocks: Sequence[Block], data: TrainingData) -> Array:
 
 
 def unknown(block: Block) -> Array:
-    """Return the covariance of a block's parameters of which nothing is known."""
+    """Return the covariance of undetermined parameters."""
     return np.full((block.n_parameters, block.n_parameters), np.nan)
 
 
@@ -79,7 +79,7 @@ def covariance_of(
     fixed: Sequence[int],
     simulated: Simulated = simulate_all,
 ) -> tuple[float, Array]:
-    """Return the condition of the parameters that are free, and the covariance of all.
+    """Return the condition of the free parameters, and the covariance of all.
 
     From finite differences of the free-running output. Parameters that are fixed, or that the data do
     not determine, have NaN; so have those at which the output overflows, and all of a model whose own
@@ -104,7 +104,7 @@ def covariance_of(
 
 
 def told_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[float, Array]:
-    """Return the condition of slopes, (n, k), and the covariance that they and residuals, (n,), make.
+    """Return the condition of sensitivities, (n, k), and the covariance for residuals, (n,).
 
     Both at the samples that count, as `TrainingData.target`.
     """
@@ -126,7 +126,7 @@ def told_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[f
 
 
 def autoregressions(left: Sequence[Array]) -> list[Autoregression]:
-    """Return that of every output, of residuals of runs, (n, m); NaN where samples do not count."""
+    """Return the autoregression of every output's residuals, (n, m); NaN at unscored samples."""
     return [
         autoregression([part for e in left for part in _pieces(e[:, j])])
         for j in range(left[0].shape[1])
@@ -136,7 +136,7 @@ def autoregressions(left: Sequence[Array]) -> list[Autoregression]:
 def sandwich(
     moves: Sequence[Array], left: Sequence[Array], models: Sequence[Autoregression]
 ) -> tuple[float, Array, NDArray[np.bool_]]:
-    """Return the condition of slopes, the covariance that they make, and which of them it is told of.
+    """Return condition, covariance, and which parameters are determined.
 
     The pseudo-inverse leaves out directions that nothing tells, so that a parameter beside two of which
     only the sum is told is as unsure as it is with their sum free.
@@ -170,24 +170,24 @@ def sandwich(
 
 
 def _pieces(series: Array) -> list[Array]:
-    """Return the stretches of a series without NaN."""
+    """Return the segments of a series without NaN."""
     return [series[start:stop] for start, stop in stretches(np.isfinite(series))]
 
 
 def relative_sizes(parameters: Array) -> Array:
-    """Return the sizes by which parameters are scaled; none is counted as very small."""
+    """Return the scales of parameters, with a lower bound."""
     return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
 
 
 def vanishing(parameters: Array) -> Array:
-    """Return which parameters are 0 but for rounding, beside the others."""
+    """Return which parameters are 0 to rounding, relative to the others."""
     return np.asarray(np.abs(parameters) <= NOTHING * relative_sizes(parameters))
 
 
 def sensitivities(
     block: Block, places: Sequence[int], sizes: Array, run: Callable[[list[Block]], Array]
 ) -> Array:
-    """Return how outputs move with k parameters, each in units of its size, shape (n, k).
+    """Return sensitivities of outputs by k parameters, in units of their scales, shape (n, k).
 
     ``run`` gives the outputs of blocks, shape (blocks, n).
     """
@@ -202,7 +202,7 @@ def sensitivities(
 
 
 def inverted(slopes: Array) -> tuple[float, Array]:
-    """Return the condition of scaled slopes, shape (n, k), and the inverse of their products, (k, k).
+    """Return the condition of scaled sensitivities, shape (n, k), and the inverse of their products.
 
     Rows and columns of what the slopes do not determine are NaN.
     """
@@ -211,7 +211,7 @@ def inverted(slopes: Array) -> tuple[float, Array]:
 
 
 def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
-    """Return the condition of slopes, (n, k), their products' pseudo-inverse, and what is told."""
+    """Return condition, pseudo-inverse of the products, and which parameters are determined."""
     singular, right = np.linalg.svd(np.linalg.qr(slopes, mode="r"), full_matrices=False)[1:]
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
     kept = singular > LEAST * singular[0]
@@ -220,7 +220,7 @@ def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
 
 
 def blanked(covariance: Array, told: NDArray[np.bool_]) -> Array:
-    """Return a covariance with NaN for what is not told."""
+    """Return a covariance with NaN for undetermined parameters."""
     covariance = covariance.copy()
     covariance[~told] = covariance[:, ~told] = np.nan
     return covariance

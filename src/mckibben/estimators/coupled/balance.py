@@ -1,4 +1,4 @@
-"""Identification of a balance of forces.
+"""Identification of a force balance.
 
 Forces are made to balance where the muscles were measured, by least squares within what physics asks;
 from there the free run is followed by Gauss-Newton steps. In between terms are chosen that lessen errors
@@ -93,7 +93,7 @@ PARTS = {"lags": "relaxation", "places": "obstacle", "pushes": "slack"}
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class BalanceEstimator(CoupledEstimator):
-    """Balance of forces with friction and relaxation of muscles in parallel, under load, scheduled.
+    """Force balance of muscles in parallel, with friction, relaxation, loads and scheduling inputs.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ class BalanceEstimator(CoupledEstimator):
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
-        """Return what is learned from recordings, of which some may lack a load that others have."""
+        """Return the training data; recordings may lack a load that others have."""
         every = listed(recordings)
         if self.unknown_load is False:
             return super().data(every, rows)
@@ -227,7 +227,7 @@ class BalanceEstimator(CoupledEstimator):
         return None if self.prior is None else (told_by(self.prior).sheet.stroke,)
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data without what tells nothing."""
+        """Return the identified block, and the data without uninformative runs."""
         data, names = without_held(data)
         tracker.notes += [
             f"in {name} nothing moves and no force was measured: it is left out: record the force"
@@ -236,7 +236,7 @@ class BalanceEstimator(CoupledEstimator):
         return super().find(data, tracker)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        """Return the balance, solved for coordinates, behind what acts in front of it."""
+        """Return the balance, solved for coordinates, after the air and dead zone."""
         if unknown := {*(self.terms or ())} - {*TERMS}:
             raise ModelError(
                 f"terms names {', '.join(sorted(unknown))}",
@@ -309,7 +309,7 @@ class BalanceEstimator(CoupledEstimator):
         return model(values, balance)
 
     def widest(self, bench: Bench, *, timed: bool) -> Structure:
-        """Return the structure of all that may be."""
+        """Return the structure with all candidate terms."""
         longest = LONGEST if self.prior is None else TRAVELS[-1]
         travels = np.geomspace(FINEST, longest, self.n_stops) * bench.stroke
         limits = travels / bench.highest
@@ -338,11 +338,11 @@ class BalanceEstimator(CoupledEstimator):
         )
 
     def may(self, kind: str) -> bool:
-        """Tell whether terms of a kind may be added."""
+        """Return whether terms of a kind may be added."""
         return self.terms is None or kind in self.terms
 
     def _first(self, structure: Structure, belief: Belief | None) -> Mask:
-        """Return which terms are free from the beginning."""
+        """Return which terms are free initially."""
 
         def there(term: Term) -> bool:
             kind, which, _ = term
@@ -364,7 +364,7 @@ class BalanceEstimator(CoupledEstimator):
     def _found(
         self, data: TrainingData, structure: Structure, belief: Belief | None, tracker: Tracker
     ) -> tuple[Search, Array]:
-        """Return the search of the terms chosen, and what they are."""
+        """Return the search with the selected terms, and their values."""
         few = compared(coarser(data, FEW), FEW, of_force=structure.bench.of_force)
         search = Search(few, structure, self._first(structure, belief), belief)
         z = self._balanced(search, tracker)
@@ -409,7 +409,7 @@ class BalanceEstimator(CoupledEstimator):
         return search, z
 
     def _long_held(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search in which muscles had long been where runs begin, if that explains these.
+        """Return the search with settled starts, if that explains the beginning of runs.
 
         Their first parts count then, which they do not where what came before is unknown.
         """
@@ -420,7 +420,7 @@ class BalanceEstimator(CoupledEstimator):
         return (settled, found) if settled.cost(found) < most else (search, z)
 
     def _balanced(self, search: Search, tracker: Tracker) -> Array:
-        """Return what balances forces best where muscles were measured, of several grips."""
+        """Return the best linear force balance at measured positions, over several friction offsets."""
         structure, problem, starts = search.structure, search.problem, []
         grips = GRIPS[: None if structure.n_stops else 1]
         for grip in grips if self.friction == "pressure" else (CONSTANT,):
@@ -432,7 +432,7 @@ class BalanceEstimator(CoupledEstimator):
         return min(starts, key=lambda start: start[0])[1]
 
     def _likely(self, search: Search) -> Array:
-        """Return what is likely before anything was recorded."""
+        """Return the most probable model of the prior."""
         structure, belief, problem = search.structure, search.belief, search.problem
         assert belief is not None
         z = np.zeros(problem.size(structure))
@@ -446,7 +446,7 @@ class BalanceEstimator(CoupledEstimator):
         return alone.descend(z, TOWARDS, Tracker())
 
     def _tried(self, structure: Structure, term: Term) -> bool:
-        """Return whether a term may be added."""
+        """Return whether a term is a candidate."""
         if term.muscle is not None:
             return self.may("muscles")
         if term.kind in ("grip", "grips") and self.friction == "constant":
@@ -456,7 +456,7 @@ class BalanceEstimator(CoupledEstimator):
         return self.may(PARTS.get(term.kind, term.kind)) and term.kind != "pushes"
 
     def _slack(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search in which muscles go slack, if that lessens errors; else the same."""
+        """Return the search with slackening muscles if that reduces errors; otherwise the same."""
         structure = search.structure
         place = [i for i, term in enumerate(structure.terms) if term.kind == "pushes"]
         active = search.active.copy()
@@ -467,7 +467,7 @@ class BalanceEstimator(CoupledEstimator):
         return (slack, found) if search.improved(z, slack, found) else (search, z)
 
     def _own_loads(self, search: Search, z: Array, data: TrainingData) -> tuple[Search, Array]:
-        """Return the search in which recordings have loads of their own, if that helps much."""
+        """Return the search with constant loads per recording, if that helps considerably."""
         bench, every = search.structure.bench, without_load(data, every=True)
         if bench.loaded or bench.unmeasured or bench.tare or not every:
             return search, z
@@ -479,7 +479,7 @@ class BalanceEstimator(CoupledEstimator):
         return (own, found) if search.improved(z, own, found, by=OWN_HELPS) else (search, z)
 
     def _started(self, search: Search, z: Array) -> tuple[Search, Array]:
-        """Return the search in which runs that do not begin at rest have starts, found by themselves.
+        """Return the search with estimated start states of runs that do not begin at rest.
 
         Where these follow runs no better than the model's own start, that is left.
         """
@@ -494,7 +494,7 @@ class BalanceEstimator(CoupledEstimator):
         return (started, found) if started.cost(found) < whole.cost(z) else (search, z)
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places of sides, of a front's gain, and of what sets the unit of force."""
+        """Return the indices of sides, of a front's gain, and of the unit of force."""
         names = block.parameter_names
         shares = [name for name in names if name.startswith("share of ")]
         unit = shares[0] if len(shares) == 1 else r"area( of muscle 1)? at rest"
@@ -504,12 +504,12 @@ class BalanceEstimator(CoupledEstimator):
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
-        """Return condition and covariance of what is free, in the unit of forces that was set."""
+        """Return condition and covariance of the free parameters, in the unit of force."""
         fixed = sorted({*at_bounds, *self.fixed(block)})
         return covariance_of(block, data, residual, fixed, self.free_runs)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks, each run under its own load from its own start."""
+        """Return free-running outputs of blocks, each run with its own load and start."""
         return self._search.problem.simulated(blocks, data, self._search.structure, self._z)
 
 
@@ -531,12 +531,12 @@ explain the runs.
 
 
 def _within(given_range: tuple[float, float] | None, block: Block) -> Block:
-    """Return a block in front, of which the inverse gives pressures within a range."""
+    """Return a front block whose inverse stays within a pressure range."""
     return replace(block, input_range=given_range) if isinstance(block, Air) else block
 
 
 def in_newtons(balance: Balance) -> Balance:
-    """Return a balance of which forces are in the unit of its load, if that is one on one coordinate."""
+    """Return a balance with forces in the load's unit, if it has one load on one coordinate."""
     share = abs(balance.loads[0][0]) if np.shape(balance.loads) == (1, 1) else 0.0
     if not share > 0.0:
         return balance

@@ -1,4 +1,4 @@
-"""What recordings settle before a balance is identified: channels, directions, ranges, loads."""
+"""Set-up of a balance from recordings: channels, directions, ranges, loads."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ channel is at rest.
 def with_loads(
     recordings: Sequence[Recording], scheduling: Sequence[str]
 ) -> tuple[list[Recording], list[tuple[str, ...]]]:
-    """Return recordings that all have the loads that any has, and for each which it had not.
+    """Return recordings that all have every load, and the loads each one lacked.
 
     These are what they are in others on average.
     """
@@ -71,7 +71,7 @@ def with_loads(
 
 
 def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
-    """Return data without runs in which nothing moves and no force was measured, and their names."""
+    """Return data without runs that have neither motion nor measured force, and their names."""
     loaded = any(channel.unit in LOADS for channel in data.scheduled)
     tells = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
     if all(tells) or not any(tells):
@@ -83,13 +83,13 @@ def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
 
 
 def only_forces(data: TrainingData) -> bool:
-    """Tell whether one coordinate is held in every run, so that its one load is all that is known."""
+    """Return whether the one coordinate is held in every run, so that only the load is informative."""
     loads = sum(channel.unit in LOADS for channel in data.scheduled)
     return loads == len(data.outputs) == 1 and all(held(data, run) for run in data.runs)
 
 
 def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
-    """Return data without loads and schedules that never change, loads last; and what was left out."""
+    """Return data without constant loads and scheduling inputs, loads last; and those left out."""
     kept, constant = list[int](), list[int]()
     for place in range(len(data.scheduled)):
         columns = [run.scheduled[:, place] for run in data.runs]
@@ -111,7 +111,7 @@ def varying(data: TrainingData) -> tuple[TrainingData, list[str]]:
 
 
 def check_numbers(data: TrainingData) -> None:
-    """Refuse numbers that no muscle has, outputs that stay, and pressures that never act.
+    """Raise an error for implausible numbers, constant outputs, and pressures without effect.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def check_numbers(data: TrainingData) -> None:
 
 
 def directions(data: TrainingData) -> Array:
-    """Return how much shorter every muscle is by coordinates, shape (muscles, coordinates).
+    """Return the shortening of every muscle per coordinate, shape (muscles, coordinates).
 
     A muscle shortens along the way in which its pressure moves coordinates, by least squares on all
     inputs; each by its own coordinate alone where that is the one that its pressure moves most.
@@ -181,7 +181,7 @@ def directions(data: TrainingData) -> Array:
 
 
 def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block], Array]:
-    """Return data whose outputs count from about zero, what gives the measured ones, and directions.
+    """Return data with outputs relative to about zero, the offset block, and directions.
 
     Muscles with a coordinate each shorten by that.
     """
@@ -205,7 +205,7 @@ def from_zero(data: TrainingData, ways: Array) -> tuple[TrainingData, list[Block
 
 
 def one_speed(data: TrainingData) -> bool:
-    """Tell whether all inputs always move at about one speed, which tells nothing of rate."""
+    """Return whether all inputs always move at about one speed, so that rate is not identifiable."""
     if any(run.sample_time is None for run in data.runs):
         return True
     speeds = [
@@ -221,7 +221,7 @@ def one_speed(data: TrainingData) -> bool:
 
 
 def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
-    """Return the recordings without a load that others have; or every one but the first with it."""
+    """Return the recordings without a load that others have; or all but the first with it."""
     lacking = {run.recording for run in data.runs if run.unmeasured}
     found = dict.fromkeys(run.recording for run in data.runs)
     reference = next((one for one in found if one not in lacking), None)
@@ -229,7 +229,7 @@ def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
 
 
 def bench_of(data: TrainingData, ways: Array, *, tare: bool | None) -> Bench:
-    """Return what the recordings settle, of outputs that count from about zero."""
+    """Return the set-up from recordings, for outputs relative to about zero."""
     loads = [channel.unit in LOADS for channel in data.scheduled]
     n_x = loads.index(True) if any(loads) else len(loads)
     x = data.stacked("scheduled")

@@ -1,4 +1,4 @@
-"""Force by length, or displacement, and pressure: a balance of forces asked for its load.
+"""Force by length, or displacement, and pressure: a force balance solved for its load.
 
 Unlike a static law it remembers: friction and what relaxes come from the balance, at held length
 through the stretch of the wall. Its errors of force are what is made least.
@@ -28,7 +28,7 @@ from mckibben.recording import Recording
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class BalanceForceEstimator(SearchEstimator):
-    """Force by length or displacement and pressure, from a balance of forces.
+    """Force by length or displacement and pressure, from a force balance.
 
     Parameters
     ----------

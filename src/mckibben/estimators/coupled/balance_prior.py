@@ -1,4 +1,4 @@
-"""What is likely of a muscle, weighed against what its recordings tell."""
+"""Prior of a muscle, combined with its recordings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Told = str | Path | Sheet | InstanceOf[Prior] | None
 
 @dataclass(frozen=True)
 class Belief:
-    """A prior as errors beside those of recordings.
+    """A prior as additional residuals.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ class Belief:
 
     @cached_property
     def weights(self) -> Array:
-        """Rows that make independent numbers of traits."""
+        """Rows that decorrelate the numbers of traits."""
         return self.prior.weights()
 
     def errors(
         self, structure: Structure, z: Array, wanted: Mask | None = None
     ) -> tuple[Array, Array]:
-        """Return how far terms are from what is likely, and the slopes by those wanted, others 0.
+        """Return prior residuals, and derivatives by the requested terms, others 0.
 
         Where displacements count from is as likely makes them most so (variable projection). Traits are
         values at a few places; between them areas are smooth, no coefficient beyond that at rest.
@@ -94,14 +94,14 @@ class Belief:
 
 
 def told_by(given: Any) -> Prior:
-    """Return a prior, or that of a muscle's name, a file or a data sheet."""
+    """Return a prior, or the one of a muscle's name, a file or a data sheet."""
     if isinstance(given, Prior):
         return given
     return prior_of(Sheet(**given) if isinstance(given, Mapping) else given)
 
 
 def check_alone(data: TrainingData) -> None:
-    """Refuse a prior of several muscles, or one that something else than a load schedules.
+    """Raise an error for a prior of several muscles, or with scheduling inputs other than a load.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def check_alone(data: TrainingData) -> None:
 
 
 def believed(bench: Bench, given: Any) -> tuple[Bench, Belief]:
-    """Return a bench that covers all that the muscle can do, recorded or not, and what is likely."""
+    """Return the set-up over the muscle's full range, recorded or not, and its prior."""
     prior = told_by(given)
     shortest, longest = bench.lag_range
     return replace(

@@ -1,4 +1,4 @@
-"""The search for a balance of forces: which terms it has, and what they are, by its free run.
+"""Search of a force balance: term selection and descent on free-running errors.
 
 Terms are found by a forward search on the free run made straight: its slopes by everything that may be
 free, what is not yet included, give by least squares the errors that any choice of terms would leave. A
@@ -65,7 +65,7 @@ POSITIVE_SHAPE = ("grip", "grips", "walls", "filling", "dead", "contact")
 
 @dataclass
 class Search:
-    """Numbers z of a structure's terms, and of what recordings and runs have of their own.
+    """Unknowns z: of a structure's terms, and per-recording and per-run parameters.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Search:
     belief: Belief | None = None
 
     def errors(self, z: Array, wanted: Mask | None = None) -> tuple[Array, Array]:
-        """Return all errors, and the slopes that are wanted, those of the belief last."""
+        """Return all residuals, and the requested derivatives; those of the prior last."""
         parts, slopes = self.problem.errors(self.structure, z, wanted)
         errors = np.concatenate(parts) if parts else np.zeros(0)
         if self.belief is None:
@@ -93,7 +93,7 @@ class Search:
         return np.append(errors, far), np.concatenate([slopes, whole])
 
     def weighed(self, z: Array) -> Search:
-        """Return the search in which the belief is weighed by the noise of independent errors."""
+        """Return the search with the prior weighted by the noise of independent errors."""
         if self.belief is None:
             return self
         parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
@@ -102,20 +102,20 @@ class Search:
         return replace(self, belief=replace(self.belief, noise=max(float(noise), LEAST_NOISE)))
 
     def cost(self, z: Array) -> float:
-        """Return the root mean square of the errors."""
+        """Return the root mean square error."""
         found = _size(self.errors(z)[0])
         return found if np.isfinite(found) else np.inf
 
     @property
     def free(self) -> NDArray[np.intp]:
-        """Places of what is found."""
+        """Indices of the free unknowns."""
         rest = self.problem.size(self.structure) - self.active.size
         return np.flatnonzero(np.append(self.active, np.ones(rest, dtype=bool)))
 
     # -- descent ---------------------------------------------------------------------------------
 
     def narrowed(self, z: Array) -> tuple[Search, Array]:
-        """Return the search of the terms that are free, without the others, and the same numbers."""
+        """Return the search restricted to free terms, and the unknowns."""
         structure, n = self.structure, len(self.structure.terms)
         free = set(compress(structure.keys, self.active))
         needed = structure.needed(list(compress(structure.terms, self.active)))
@@ -124,13 +124,13 @@ class Search:
         return replace(self, structure=needed, active=active), moved
 
     def descended(self, z: Array, steps: int, tracker: Tracker) -> Array:
-        """Return the numbers to which a descent of the terms that are free leads."""
+        """Return the unknowns after a descent in the free terms."""
         few, narrow = self.narrowed(z)
         found, n = few.descend(narrow, steps, tracker), len(few.structure.terms)
         return np.append(few.structure.moved_to(self.structure, found[:n], z), found[n:])
 
     def descend(self, z: Array, steps: int, tracker: Tracker) -> Array:
-        """Show a tracker ever better numbers, and return the best."""
+        """Descend, report improvements to a tracker, and return the best unknowns."""
         damping, slow = FIRST_DAMPING, 0
         errors, slopes = self.errors(z, self.active)
         cost = _size(errors)
@@ -162,7 +162,7 @@ class Search:
         return z
 
     def _solved(self, triangle: Array, z: Array, damping: float) -> Array:
-        """Return numbers with the least errors, were these straight, that physics allows.
+        """Return the least-squares solution of the linearised problem within physical bounds.
 
         ``triangle`` is that of slopes and target. Damped towards what they are, by every number's own
         effect, so that units do not matter; where it has none it stays. Springs are made stiff where
@@ -197,7 +197,7 @@ class Search:
         return tried
 
     def _conditions(self, z: Array) -> tuple[Array, Array]:
-        """Return what is asked of all numbers: sides @ z >= least."""
+        """Return linear constraints of all unknowns: sides @ z >= least."""
         structure = self.structure
         n, n_terms = structure.mix.shape[1], len(structure.terms)
         sides, least = structure.conditions(structure.expanded(z[:n_terms]))
@@ -230,7 +230,7 @@ class Search:
     # -- choice ----------------------------------------------------------------------------------
 
     def chosen(self, z: Array, tried: Mask) -> tuple[Mask, Array]:
-        """Return which terms are free after a forward search, of those ``tried``, and where to go on.
+        """Return the selected terms after a forward search over ``tried``, and their unknowns.
 
         New shape begins where least squares have it.
         """
@@ -271,19 +271,19 @@ class Search:
         return active, found
 
     def improved(self, z: Array, other: Search, found: Array, by: float = 0.0) -> bool:
-        """Tell whether another search has less error, by more than its standard error over blocks."""
+        """Return whether another search has significantly smaller errors over blocks."""
         before, after = self._by_block(z), other._by_block(found)
         gain = before - after
         least = max(np.sqrt(gain.size) * gain.std(), (1.0 - (1.0 - by) ** 2) * before.sum())
         return bool(gain.sum() > least)
 
     def _by_block(self, z: Array) -> Array:
-        """Return the squared errors by block of time."""
+        """Return the squared errors per block of time."""
         parts = self.problem.errors(self.structure, z)[0][: len(self.problem.runs)]
         return np.array([float(block @ block) for part in _blocks(parts) for block in part])
 
     def _grams(self, z: Array, wanted: Mask, new: Mask | None = None) -> Array:
-        """Return the products of all slopes and of their target, by block of time."""
+        """Return the products of derivatives and target, per block of time."""
         parts, slopes = self.problem.errors(self.structure, z, wanted, new)
         parts = parts[: len(self.problem.runs)]  # without what is likely of starts
         slopes = slopes[: sum(part.size for part in parts)]
@@ -294,7 +294,7 @@ class Search:
         return np.array([block.T @ block for block in blocks])
 
     def _likely(self, z: Array, wanted: Mask) -> Array:
-        """Return the products of slopes of what is believed, and of their target."""
+        """Return the products of the prior's derivatives and target."""
         table = np.zeros((1, z.size + 1))
         if self.belief is not None:
             far, by = self.belief.errors(self.structure, z, wanted)
@@ -304,7 +304,7 @@ class Search:
         return np.asarray(table.T @ table)
 
     def _bounded(self, size: int) -> Mask:
-        """Return which of all numbers are not negative."""
+        """Return which unknowns are non-negative."""
         bounded = np.zeros(size, dtype=bool)
         bounded[: self.structure.mix.shape[1]] = (
             self.structure.not_negative @ self.structure.mix > 0
@@ -315,7 +315,7 @@ class Search:
         return bounded
 
     def without_folds(self, z: Array) -> list[Array]:
-        """Return what a step finds without each part of the runs; nothing if physics allows none."""
+        """Return the steps without each fold; empty if none is feasible."""
         free = np.append(self.active, np.ones(z.size - self.active.size, dtype=bool))
         parts = _reduced(self._grams(z, self.active), free, z)
         likely = _reduced(self._likely(z, self.active)[np.newaxis], free, z)[0]
@@ -330,7 +330,7 @@ class Search:
         return found
 
     def _candidates(self, active: Mask, z: Array) -> Iterator[Mask]:
-        """Yield groups of terms that may be added to those that are active."""
+        """Yield candidate groups of terms beyond the active ones."""
         terms = self.structure.terms
 
         def group(*wanted: Term) -> Mask:
@@ -379,7 +379,7 @@ class Search:
                 yield group(*(Term(*one, k) for one in whiches for k in range(1, self.structure.n)))
 
     def _apart(self, which: int, active: Mask, z: Array) -> bool:
-        """Tell whether a time constant is apart from those that are free, and in order with them."""
+        """Return whether a time constant is distinct from the free ones, and in order."""
         terms = self.structure.terms
         places = [place for place, term in enumerate(terms) if term.kind == "lags"]
         apart = (
@@ -388,19 +388,19 @@ class Search:
         return all(one > APART for one in apart)
 
     def _with_own(self, kind: str, whiches: range | tuple[int, ...], own: set[str]) -> list[Term]:
-        """Return terms of a kind, and those by which muscles differ if they do."""
+        """Return terms of a kind, with differences between muscles if they are free."""
         muscles = [None, *(range(1, self.structure.n) if kind in own else ())]
         return [Term(kind, which, muscle) for which in whiches for muscle in muscles]
 
 
 def _blocks(parts: list[Array]) -> list[list[Array]]:
-    """Return the blocks of time of every run."""
+    """Return the time blocks of every run."""
     total = sum(len(part) for part in parts)
     return [np.array_split(part, max(1, round(BLOCKS * len(part) / total))) for part in parts]
 
 
 def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask, likely: Array) -> Array:
-    """Return the squared errors of every block by what least squares of the others find.
+    """Return the squared errors of every block under the least squares of the others.
 
     ``grams`` are products of slopes and target by block, and ``likely`` those of what is believed; what
     is not free is as it is.
@@ -418,7 +418,7 @@ def _left_out(grams: Array, free: Mask, z: Array, bounded: Mask, likely: Array) 
 
 
 def _reduced(grams: Array, free: Mask, z: Array) -> Array:
-    """Return products of the slopes of what is free and of the target less what is fixed."""
+    """Return the products for free unknowns, with the target reduced by fixed ones."""
     fixed = np.flatnonzero(~free)
     keep = np.append(np.flatnonzero(free), grams.shape[1] - 1)
     parts = grams[:, keep][:, :, keep].copy()

@@ -1,4 +1,4 @@
-"""Estimators of several muscles that move one another, or of a muscle and its load."""
+"""Estimators of coupled muscles, or of a muscle and its load."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class CoupledEstimator(Estimator):
 
     @classmethod
     def fits(cls, n_inputs: int, n_outputs: int) -> bool:
-        """Tell whether there may be so many of both."""
+        """Return whether the numbers of inputs and outputs are allowed."""
         fewer = cls.fewer_outputs and n_outputs < n_inputs
         return fewer or not cls.paired or n_inputs == n_outputs
 
@@ -132,7 +132,7 @@ class CoupledEstimator(Estimator):
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
-        """Return what is learned from recordings, their channels found by name where not given."""
+        """Return the training data, with channels found by name if not given."""
         every = listed(recordings)
         if not every:
             raise DataError("there are no recordings", remedy="give at least one")
@@ -189,26 +189,26 @@ class CoupledEstimator(Estimator):
 
     @property
     def pairs(self) -> bool:
-        """Whether these settings need an output to every input."""
+        """Whether these settings need one output per input."""
         return self.paired
 
     @property
     def spans(self) -> tuple[float, ...] | None:
-        """Ranges of the outputs, if they are known before."""
+        """Ranges of the outputs, if known in advance."""
         return None
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data without channels that it does not use."""
+        """Return the identified block, and the data without unused channels."""
         block = self.identify(data, tracker)
         return block, of_channels(data, block.scheduling)
 
     @abstractmethod
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
-        """Return the block found."""
+        """Return the identified block."""
 
 
 def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
-    """Return data with some of the channels that schedule, in that order."""
+    """Return data with some of the scheduling channels, in that order."""
     known = [channel.name for channel in data.scheduled]
     places = [known.index(name) for name in names]
     runs = tuple(replace(run, scheduled=run.scheduled[:, places]) for run in data.runs)
@@ -216,7 +216,7 @@ def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
 
 
 def bridged(data: TrainingData) -> TrainingData:
-    """Return the runs up to their last outputs that count, with likely ones for those that do not.
+    """Return the runs up to their last scored output, with unscored outputs interpolated.
 
     These go straight with the inputs, as those that count do, and meet them on either side.
     """
@@ -243,7 +243,7 @@ def alone(data: TrainingData, place: int) -> list[Run]:
 
 
 def moves_alone(driven: Array, place: int, lowest: Array, highest: Array) -> bool:
-    """Tell whether one input moves and all others rest.
+    """Return whether one input moves and all others rest.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def moves_alone(driven: Array, place: int, lowest: Array, highest: Array) -> boo
 
 
 def _never_alone(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:
-    """Return which muscle moves alone in no run, or None."""
+    """Return a muscle that never moves alone, or None."""
     driven = [recording.matrix(inputs) for recording in recordings]
     lowest = np.min([run.min(axis=0) for run in driven], axis=0)
     highest = np.max([run.max(axis=0) for run in driven], axis=0)
@@ -273,7 +273,7 @@ def _never_alone(recordings: Sequence[Recording], inputs: Sequence[str]) -> str 
 
 
 def driving(recording: Recording) -> tuple[str, ...]:
-    """Return the channels that drive the muscles of a recording, by name, the pressure first."""
+    """Return the driving channels of a recording, by name, pressure first."""
     several = numbered(recording, "pressure") or numbered(recording, "voltage")
     return several or one(recording, "pressure", "voltage")
 
@@ -287,12 +287,12 @@ def moved(recording: Recording) -> tuple[str, ...]:
 def in_any(
     recordings: Sequence[Recording], named: Callable[[Recording], tuple[str, ...]]
 ) -> tuple[str, ...]:
-    """Return the channels of so many muscles as any recording has, whichever comes first."""
+    """Return the channels of so many muscles that any recording has."""
     return max((named(recording) for recording in recordings), key=len)
 
 
 def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the channels of any recording that schedule a model by default, others excepted.
+    """Return the default scheduling channels of any recording, with exceptions.
 
     Of forces and torques there may be several, with numbers.
     """
@@ -306,7 +306,7 @@ def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tu
 
 
 def loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:
-    """Return the forces beside other inputs: loads, which are given, and nobody commands."""
+    """Return forces that are loads: given, and not commanded."""
     found = tuple(
         name
         for name in inputs

@@ -131,7 +131,7 @@ def solved(blocks: Array, width: int, ridge: float | None) -> tuple[Array, tuple
         )
 
     def missed(block: Array, penalty: float) -> Array:
-        """Return the squared error of every output on a block left out, relative to its own."""
+        """Return the squared error of every output on a held-out block, relative to its own."""
         w = np.vstack([fit(total - block, penalty), -np.eye(m)])
         return np.asarray(np.einsum("ij,ik,kj->j", w, block, w))
 
@@ -149,7 +149,7 @@ def solved(blocks: Array, width: int, ridge: float | None) -> tuple[Array, tuple
 
 
 def features(block: CoupledMemory, run: Run) -> Array:
-    """Return what the readout multiplies over a run, shape (n, width)."""
+    """Return the features over a run, shape (n, width)."""
     inputs = run.inputs
     n, width = inputs.shape[1], len(block.readout[0])
     many = CoupledMemory(

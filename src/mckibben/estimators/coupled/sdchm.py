@@ -124,16 +124,16 @@ class SDCHMEstimator(CoupledEstimator):
 
     @property
     def stops_early(self) -> bool:
-        """Where there is a network."""
+        """Whether there is a network."""
         return self.n_sets > 0
 
     @property
     def pairs(self) -> bool:
-        """Whether these settings need an output to every input: every muscle's hysteresis does."""
+        """Whether these settings need one output per input, for the hysteresis of every muscle."""
         return self.memory is not None
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places of a muscle's gain to itself, 1, and of what its hysteresis's fit fixes."""
+        """Return the indices of the unit gains, and of parameters fixed by the hysteresis fits."""
         places = [
             place
             for place, (part, _, index) in enumerate(block.numbers())
@@ -223,7 +223,7 @@ class SDCHMEstimator(CoupledEstimator):
         return as_block(found, driven, data.outputs, data.scheduled, limits, self.constants)
 
     def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
-        """Return the memory of a muscle's own motion: play operators, all partial sums positive."""
+        """Return the friction memory of a muscle: play operators with positive partial sums."""
         low = min(float(part.min()) for part in given)
         high = max(float(part.max()) for part in given)
         span = high - low
@@ -293,7 +293,7 @@ def as_block(
 
 
 def network_inputs(front: Sequence[Block], runs: Sequence[Run]) -> Array:
-    """Return what the network is given over all runs: driven through blocks, and what schedules."""
+    """Return the network's inputs over all runs: driven through blocks, and scheduling."""
 
     def of(run: Run) -> Array:
         driven = np.ascontiguousarray(run.driven)
@@ -305,7 +305,7 @@ def network_inputs(front: Sequence[Block], runs: Sequence[Run]) -> Array:
 
 
 def softest(data: TrainingData, muscle: int) -> Run:
-    """Return the run to identify a muscle's hysteresis from.
+    """Return the run for a muscle's hysteresis.
 
     It moves alone; what schedules is lowest; and the run is the longest of those.
 
@@ -330,7 +330,7 @@ def softest(data: TrainingData, muscle: int) -> Run:
 
 
 def coupled(memories: list[Block], runs: list[Run], data: TrainingData) -> Coupling:
-    """Return the coupling: what moves with muscle i alone, by least squares on its hysteresis."""
+    """Return the coupling by least squares on the hysteresis of muscle i moving alone."""
     n = len(memories)
     gains = np.eye(n)
     for i, (block, run) in enumerate(zip(memories, runs, strict=True)):
@@ -347,7 +347,7 @@ def trained_inverse(
     seed: int = 0,
     progress: Callable[[float, float], None] | None = None,
 ) -> tuple[Series, dict[str, float]]:
-    """Return `learned_inverse` by the paper's swarm, and its RMSE on the recordings by output."""
+    """Return `learned_inverse` by the paper's swarm, and its RMSE on the recordings per output."""
     search = Search("pso", SDCHMEstimator.search_samples, printed_swarm(), seed)
     tracker = Tracker(progress=progress)
     inverse = learned_inverse(model, recordings, search=search, tracker=tracker)
@@ -367,7 +367,7 @@ def learned_inverse(
     ridge: float = 1e-9,
     tracker: Tracker | None = None,
 ) -> Series:
-    """Return the inverse whose network is learned: SDIHC, as its paper has it (Section 4).
+    """Return the inverse with a trained network: SDIHC, as in its paper (Section 4).
 
     A network of the model's shape is trained on recordings with inputs and outputs swapped, from
     displacements to the coupled hysteresis; friction, coupling and hysteresis have their exact inverses.

@@ -32,7 +32,7 @@ class Swarm:
 
     @property
     def budget(self) -> int:
-        """Evaluations: of all particles before the first move, and after every one."""
+        """Number of evaluations: of all particles initially, and after every iteration."""
         return self.particles * (self.iterations + 1)
 
 

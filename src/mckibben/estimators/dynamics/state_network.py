@@ -56,7 +56,7 @@ LARGEST = 1e6
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class StateNetworkEstimator(SearchEstimator):
-    """State-space network by Gauss-Newton on free runs, told nothing but how many states there are.
+    """State-space network by Gauss-Newton on free runs, with a given number of states.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ class StateNetworkEstimator(SearchEstimator):
         return template.unpack(tracker.best), data
 
     def start(self, linear: Linear, data: TrainingData, substeps: int) -> StateNetwork:
-        """Return the network that the descent begins with."""
+        """Return the initial network of the descent."""
         rng, n, units = np.random.default_rng(self.seed), self.n_states, self.n_units
         force, moved = data.stacked("driven")[:, 0], data.target
         sizes = float(np.std(force)), float(np.std(moved))
@@ -153,7 +153,7 @@ class StateNetworkEstimator(SearchEstimator):
         return NetworkRuns(template, data, self._warm if self.periodic else None, tracker)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the outputs of blocks where samples count: in steady state, of periodic recordings."""
+        """Return the outputs of blocks at scored samples: in steady state for periodic recordings."""
         if not self.periodic:
             return super().free_runs(blocks, data)
         networks = [cast("StateNetwork", block) for block in blocks]
@@ -188,7 +188,7 @@ class NetworkRuns:
         self.paths = paths(data, template.substeps, warm, self.at_rest)
 
     def errors(self, theta: Array) -> Array:
-        """Return the errors where samples count; infinite where a run leaves all bounds."""
+        """Return the errors at scored samples; infinite for diverging runs."""
         found = self._followed(theta, theta.size)
         self._slopes = found[:, 1:]
         errors = found[:, 0] - self.target
@@ -196,16 +196,16 @@ class NetworkRuns:
         return np.asarray(errors)
 
     def slopes(self, theta: Array) -> Array:
-        """Return the derivatives where errors were last asked for."""
+        """Return the derivatives of the last evaluation of errors."""
         del theta
         return self._slopes
 
     def outputs(self, theta: Array) -> Array:
-        """Return the outputs where samples count."""
+        """Return the outputs at scored samples."""
         return self._followed(theta, 0)[:, 0]
 
     def _followed(self, theta: Array, p: int) -> Array:
-        """Return the outputs where samples count, and their derivatives by p weights, (n, 1 + p)."""
+        """Return the outputs at scored samples, and derivatives by p weights, (n, 1 + p)."""
         model = self.template
         n, units = len(model.linear), len(model.hidden)
         parts: Any = np.split(theta, np.cumsum([n * (n + 2), units * (n + 2)]))
@@ -295,7 +295,7 @@ def follow_network(
     skipped: int,
     found: Array,
 ) -> bool:
-    """Run a network over inputs joined by straight lines, one Runge-Kutta step each.
+    """Simulate a network with linearly interpolated inputs, one Runge-Kutta step per sample.
 
     Parameters
     ----------

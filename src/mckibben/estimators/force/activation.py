@@ -1,4 +1,4 @@
-"""Identification of activation pressure: with memory, solved for at once; and as in its paper.
+"""Identification of activation pressure: with memory, in closed form; and as in its paper.
 
 Source of the latter: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization
 and Particle Swarm Optimization", Sections 4.2 to 4.4; gamma and phi are found by least squares where
@@ -34,7 +34,7 @@ SMOOTHED = 3.0
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class ActivationMemoryEstimator(SeparableEstimator):
-    """Activation pressure that needs no frequency.
+    """Activation pressure for any frequency.
 
     Parameters
     ----------
@@ -111,13 +111,13 @@ class ActivationMemoryEstimator(SeparableEstimator):
         )
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the output by each coefficient alone but the constant, over the run's history."""
+        """Return the response to each coefficient but the constant, over the run's history."""
         unit = self.unit(data)
         alone = np.eye(unit.n_parameters)[1:]
         return unit.simulate_many(alone, run.inputs, sample_time=run.sample_time).T
 
     def solve(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
-        """Solve with every run's errors relative to its own range, so that light loads count too."""
+        """Solve with every run's errors relative to its own range, so that light loads count equally."""
         parts = [run.y[run.counts] for run in data.runs]
         weights = np.concatenate(
             [np.full(y.size, 1.0 / max(float(np.ptp(y)), 1e-9)) for y in parts]
@@ -175,7 +175,7 @@ class ActivationPressureEstimator(SearchEstimator):
     frequency: Annotated[float, Ge(0)] | None = None
 
     def fixed(self, block: Block) -> tuple[int, ...]:
-        """Return the places of powers that forces or frequencies are too few for, and of gamma's factor.
+        """Return the indices of undetermined powers of force or frequency, and of gamma's factor.
 
         Those powers are exactly 0; gamma is 1 at the mean frequency, as phi has the size of both.
         """
@@ -183,7 +183,7 @@ class ActivationPressureEstimator(SearchEstimator):
         return tuple(sorted({*absent, block.n_parameters - 1}))
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the model found, set to the first moving run's frequency, and the data."""
+        """Return the model, set to the first moving run's frequency, and the data."""
         step, smoothed, given = data.timed(), self.rate_time_constant, self.frequency
         at = frequencies(data.runs) if given is None else np.full(len(data.runs), given)
         moving = at >= STATIC_SHARE * at.max()
@@ -236,14 +236,14 @@ class ActivationPressureEstimator(SearchEstimator):
 
 
 def frequencies(runs: Sequence[Run]) -> Array:
-    """Return the strongest frequency of each run's input [Hz]; 0 of one that is held."""
+    """Return the dominant frequency of each run's input [Hz]; 0 if it is constant."""
     spans = np.array([float(np.ptp(run.u)) for run in runs])
     found = np.array([dominant_frequency(run) for run in runs])
     return np.where(spans < HELD * spans.max(), 0.0, found)
 
 
 def dominant_frequency(run: Run) -> float:
-    """Return the strongest frequency of a run's input [Hz]."""
+    """Return the dominant frequency of a run's input [Hz]."""
     assert run.sample_time is not None
     moved = run.u - run.u.mean()
     spectrum = np.abs(np.fft.rfft(moved * np.hanning(moved.size), 4 * moved.size))
@@ -319,7 +319,7 @@ def characteristic_points(runs: Sequence[Run], moving: Sequence[bool]) -> tuple[
 
 
 def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
-    """Return which runs have one mean force [N], weakest first."""
+    """Return the runs of equal mean force [N], weakest first."""
     means = [float(run.scheduled.mean()) for run in runs]
     groups: dict[float, list[int]] = {}
     apart = SAME_FORCE * max(map(abs, means))
@@ -330,13 +330,13 @@ def by_force(runs: Sequence[Run]) -> dict[float, list[int]]:
 
 
 def outermost(runs: Sequence[Run]) -> Array:
-    """Return contraction and pressure, (2, 2), where the runs turn at the least and the most."""
+    """Return contraction and pressure, (2, 2), at the outermost turning points."""
     turns = np.concatenate([_turns(run) for run in runs])
     return turns[[turns[:, 0].argmin(), turns[:, 0].argmax()]]
 
 
 def _turns(run: Run) -> Array:
-    """Return contraction and pressure where a run turns, or of all of it where it hardly does."""
+    """Return contraction and pressure at turning points, or over all of a run that hardly turns."""
     # where a run begins and ends, it does not turn
     places = [place for place in reversals(run.u)[1:-1] if run.counts[place]]
     if len(places) < 2:
@@ -345,7 +345,7 @@ def _turns(run: Run) -> Array:
 
 
 def boundaries(runs: Sequence[Run], extremes: Array, levels: tuple[float, float]) -> Array:
-    """Return the contractions e_3 and e_4 of a cubic that goes through the extremes at one force.
+    """Return the contractions e_3 and e_4 of a cubic through the extremes at one force.
 
     The errors of a run are relative to its own range of pressure, so that loops and slow cycles count
     alike.
@@ -373,7 +373,7 @@ def boundaries(runs: Sequence[Run], extremes: Array, levels: tuple[float, float]
 
 
 def regress(forces: Array, values: Array) -> Array:
-    """Return a cubic of the force through values, of lower order where there are few forces."""
+    """Return a cubic of the force through values; of lower order for few forces."""
     order = min(3, forces.size - 1)
     scale = max(float(np.abs(forces).max()), 1.0)
     found = np.polyfit(forces / scale, values, order) / scale ** np.arange(order, -1, -1)

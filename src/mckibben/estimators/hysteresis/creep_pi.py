@@ -1,4 +1,4 @@
-"""Identification of a Prandtl-Ishlinskii memory followed by an increasing map and visco-elastic creep.
+"""Identification of a Prandtl-Ishlinskii model with increasing map and viscoelastic creep.
 
 Two things that rate-independent loops leave out of a pneumatic muscle: its friction grows with pressure,
 so the play operators act on log(u + offset); and braid and rubber creep, so the output goes on moving
@@ -106,7 +106,7 @@ class CreepPIEstimator(SeparableEstimator):
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
-        """The offset of the operators' sum, which begins at 0."""
+        """The offset of the operators' sum, which starts at 0."""
         return ("pi.offset",)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -132,7 +132,7 @@ class CreepPIEstimator(SeparableEstimator):
         return begun
 
     def _foresees(self, data: TrainingData, tracker: Tracker) -> bool:
-        """Tell whether what comes later in the runs is foreseen better with what was left of creep."""
+        """Return whether estimated initial creep improves the prediction of later parts of runs."""
         missed = {True: 0.0, False: 0.0}
         for end in (0.5, 0.75):
             known = data.between(0.0, end).thinned(SEARCH_SAMPLES)
@@ -169,13 +169,13 @@ class CreepPIEstimator(SeparableEstimator):
         return np.array(lower), np.array(upper)
 
     def n_begun(self, data: TrainingData) -> int:
-        """Return how many columns the basis has for creep that was under way when runs began."""
+        """Return the number of regressors of initial creep."""
         if self.settled is not False:
             return 0
         return self.n_creep * (1 + max(run.place for run in data.runs))
 
     def begun(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return how creep that was under way when runs began fades over a run's history, (n, n_begun).
+        """Return the decay of initial creep over a run's history, (n, n_begun).
 
         What an element was behind by, times its compliance, is one number an element and a run.
         """
@@ -187,25 +187,25 @@ class CreepPIEstimator(SeparableEstimator):
         return columns
 
     def begun_moves(self, theta: Array, left: Array, run: Run, data: TrainingData) -> Array:
-        """Return how that moves with the logarithms of the time constants, (n, n_creep)."""
+        """Return its derivatives by the logarithms of the time constants, (n, n_creep)."""
         taus, _ = self.tail(theta)
         columns = self.begun(theta, run, data) * left
         by_element = columns.reshape(len(columns), -1, self.n_creep).sum(axis=1)
         return np.asarray(by_element * elapsed(run)[:, np.newaxis] / taus)
 
     def tail(self, theta: Array) -> tuple[Array, Array]:
-        """Return time constants and compliances as they are searched."""
+        """Return time constants and compliances in the order of the search."""
         taus, compliances = np.split(theta[theta.size - 2 * self.n_creep :], 2)
         return np.exp(taus), compliances
 
     def creep(self, theta: Array) -> tuple[Array, Array]:
-        """Return time constants and compliances, the fastest first."""
+        """Return time constants and compliances, fastest first."""
         taus, compliances = self.tail(theta)
         order = np.argsort(taus, kind="stable")
         return taus[order], compliances[order]
 
     def creep_parts(self, theta: Array, channel: Channel) -> tuple[Block, ...]:
-        """Return the block of the creep, if there is any."""
+        """Return the creep block, if there is any."""
         taus, compliances = self.creep(theta)
         rule: Literal["first_sample", "fitted"] = (
             "fitted" if self.settled is False else "first_sample"
@@ -215,7 +215,7 @@ class CreepPIEstimator(SeparableEstimator):
         return (Creep(vector(compliances), vector(taus), rule, channel, channel),)
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return fading weights, on the logarithm and nearly on the input itself, with some creep."""
+        """Return decreasing weights, on the logarithm and nearly on the input, with some creep."""
         lower, upper = self.bounds(data)
         n, k = self.n_operators, self.n_creep
         place = np.linspace(lower[n + 1 : n + 1 + k], upper[n + 1 : n + 1 + k], 5)[1:4]
@@ -229,7 +229,7 @@ class CreepPIEstimator(SeparableEstimator):
         return guesses
 
     def memory(self, theta: Array, data: TrainingData) -> tuple[float, Array, Array, Array]:
-        """Return the logarithm's offset, thresholds on it, its ends, and the operators' sums there."""
+        """Return the logarithm's offset, its thresholds and range, and the operators' sums there."""
         offset = float(np.exp(theta[self.n_operators]))
         ends = Logarithm(offset).simulate(np.array(data.input_range))
         radii = self.threshold_share * spread(self.n_operators, (ends[0], ends[1]))
@@ -275,7 +275,7 @@ class CreepPIEstimator(SeparableEstimator):
         return counting(data, of)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return a little of every piece, so that the map increases everywhere."""
+        """Return a small lower bound of every piece, so that the map increases."""
         low, high = data.output_range
         floor = np.full(matrix.shape[1], 1e-6 * (high - low))
         floor[self.map_size :] = -np.inf  # what is left of creep
@@ -303,7 +303,7 @@ class CreepPIEstimator(SeparableEstimator):
 
 
 def elapsed(run: Run) -> Array:
-    """Return the time since a run began, as its elements have felt it [s]."""
+    """Return the time since the start of a run, for its creep elements [s]."""
     assert run.sample_time is not None
     return np.asarray(run.sample_time * np.arange(1.0, 1.0 + run.history.size))
 
@@ -311,7 +311,7 @@ def elapsed(run: Run) -> Array:
 def with_creep(
     columns: Array, taus: Sequence[float] | Array, compliances: Array, step: float | None
 ) -> Array:
-    """Return columns, shape (n, k), each with visco-elastic creep."""
+    """Return columns, shape (n, k), each with viscoelastic creep."""
     if len(taus) == 0:
         return columns
     assert step is not None
@@ -323,7 +323,7 @@ def with_creep(
 
 
 def creep_moves(given: Array, taus: Array, compliances: Array, step: float | None) -> Array:
-    """Return how something with creep moves with log time constants, then compliances, (n, 2 k)."""
+    """Return derivatives of a creeping signal by log time constants, then compliances, (n, 2 k)."""
     from scipy.signal import lfilter
 
     if len(taus) == 0:

@@ -123,14 +123,14 @@ class GPIEstimator(SeparableEstimator):
 
     @property
     def solves_offset(self) -> bool:
-        """Whether the envelopes' common height is solved for.
+        """Whether the envelopes' common height is fitted.
 
         Virgin operators are nearest to 0, wherever the envelopes are, so their height is searched.
         """
         return self.starting_rule != "virgin"
 
     def shape(self, data: TrainingData) -> Shape:
-        """Return the parametrisation: of the shape, the gap, and the height where it is searched."""
+        """Return the parametrisation: shape, gap, and the height if it is searched."""
         lower, upper, guesses, envelopes = SHAPES[self.envelope](*data.input_range, self.n_knots)
         low, high = data.output_range
         most = 1.0 + 2.0 * max(abs(low), abs(high)) / max(high - low, 1e-12)
@@ -147,7 +147,7 @@ class GPIEstimator(SeparableEstimator):
         return self.shape(data)[2]
 
     def envelopes(self, theta: Array, data: TrainingData) -> tuple[Envelope, Envelope]:
-        """Return both envelopes, in order over the whole input range."""
+        """Return both envelopes, ordered over the whole input range."""
 
         def made() -> tuple[Envelope, Envelope]:
             gap = theta.size - 2 + self.solves_offset

@@ -109,7 +109,7 @@ class MPIEstimator(SeparableEstimator):
 
     @property
     def fixed_fields(self) -> tuple[str, ...]:
-        """The offset of the operators' sum, which begins at the output's lowest."""
+        """The offset of the operators' sum, which starts at the output's lowest value."""
         return ("pi.offset", "rate-dependent-pi.offset")
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
@@ -152,11 +152,11 @@ class MPIEstimator(SeparableEstimator):
 
     @property
     def n_beside(self) -> int:
-        """Thresholds that are identified."""
+        """Number of identified thresholds."""
         return self.n_operators * self.identified
 
     def most_evaluations(self, size: int) -> int:
-        """Return more where thresholds are searched, too."""
+        """Return a larger number if thresholds are searched."""
         return MOST_STEPS if self.identified else super().most_evaluations(size)
 
     def radii(self, theta: Array, data: TrainingData) -> Array:
@@ -167,11 +167,11 @@ class MPIEstimator(SeparableEstimator):
         return np.asarray(0.5 * (high - low) * theta[-self.n_operators :])
 
     def weights(self, theta: Array) -> Array:
-        """Return the relative weights, then those by rate."""
+        """Return the relative weights, then the rate-dependent ones."""
         return theta[: self.n_operators * (1 + self.rate_dependent)]
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the relative weights, then of those by rate relative to the fastest.
+        """Return bounds of the relative weights, then of the rate-dependent ones.
 
         Then of thresholds that are identified, relative to half the input's range.
         """
@@ -184,7 +184,7 @@ class MPIEstimator(SeparableEstimator):
         return np.concatenate([lower, -share, none]), np.concatenate([np.ones(n), share, none + 1])
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return the weights of the best PI model, and two even distributions, whatever the rate."""
+        """Return the weights of the best PI model, and two even distributions, without rate."""
         low, high = data.input_range
         by_rate = np.zeros(self.n_operators * self.rate_dependent)
         even, guesses = spread(self.n_operators, data.input_range), []
@@ -205,7 +205,7 @@ class MPIEstimator(SeparableEstimator):
         return counting(data, lambda run: play_operators(run.history, radii, self.starting_rule))
 
     def operators(self, radii: Array, run: Run, data: TrainingData) -> Array:
-        """Return play operators over the run's history, then these times the relative rate."""
+        """Return play operators over the run's history, then their products with the relative rate."""
         play = play_operators(run.history, radii, self.starting_rule)
         if not self.rate_dependent:
             return play
@@ -219,7 +219,7 @@ class MPIEstimator(SeparableEstimator):
         return float(weights @ lowest), float(weights @ highest)
 
     def _ends(self, theta: Array, columns: Array, data: TrainingData) -> tuple[Array, Array]:
-        """Return rows of columns, of which operators are the first, at the ends of the map's argument.
+        """Return columns, operators first, at the ends of the map's argument.
 
         Where the input has only risen to the ends of its range, and rests there; of thresholds that are
         identified, where the weighted sum of the data is least and most.
@@ -240,7 +240,7 @@ class MPIEstimator(SeparableEstimator):
         return self._pieces(theta, self.operators(self.radii(theta, data), run, data), data)
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:
-        """Return the basis at the samples that count; the operators are computed only once."""
+        """Return the basis at the scored samples; operators are computed only once."""
         return self._pieces(theta, self._operators(theta, data), data)
 
     def _operators(self, theta: Array, data: TrainingData) -> Array:
@@ -275,13 +275,13 @@ class MPIEstimator(SeparableEstimator):
         return np.asarray((self.map.slopes(x) @ linear)[:, np.newaxis] * moved)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
-        """Return a little of every piece, so that the map increases everywhere."""
+        """Return a small lower bound of every piece, so that the map increases."""
         span = data.output_range[1] - data.output_range[0]
         return np.full(matrix.shape[1], LEAST_PIECE * span)
 
     @property
     def solves_nonnegative(self) -> bool:
-        """Whether the linear parameters may not be negative: for increasing maps only."""
+        """Whether linear parameters must be non-negative: for increasing maps only."""
         return self.nonnegative and self.output_map in ("piecewise-linear", "polynomial")
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
@@ -294,7 +294,7 @@ class MPIEstimator(SeparableEstimator):
         return Series((first, self.map.build(linear, offset, bottom, top, channel)))
 
     def first_part(self, theta: Array, scale: float, offset: float, data: TrainingData) -> Block:
-        """Return the hysteresis part, thresholds in their order and none twice."""
+        """Return the hysteresis part, with sorted distinct thresholds."""
         n, radii = self.n_operators, self.radii(theta, data)
         weights = (scale * self.weights(theta)).reshape(-1, n)
         if self.identified:

@@ -1,4 +1,4 @@
-"""Identification of oscillators with hysteresis in their loop: Gauss-Newton on free runs.
+"""Identification of oscillators with internal hysteresis: Gauss-Newton on free runs.
 
 A linear oscillator is found first; its stiffness is shared between spring and element in a few ways,
 from each of which a descent on one run in coarse steps begins, and the best goes on with all runs in
@@ -79,7 +79,7 @@ TIGHT = 0.8
 
 
 def following(element: Any) -> Callable[..., None]:
-    """Return what runs an oscillator over inputs a step apart, joined by straight lines.
+    """Return a simulation of an oscillator with linearly interpolated inputs.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ follow_bouc_wen, follow_duhem = following(bouc_wen_element), following(duhem_ele
 
 
 def bouc_wen_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
-    """Return oscillators whose element hardens, and softens."""
+    """Return initial oscillators with hardening and softening elements."""
     return [
         BoucWenOscillator(slope=slope, gamma=bend, delta=way * bend, **fields)
         for way in (-0.5, 0.5)
@@ -192,7 +192,7 @@ def bouc_wen_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[O
 
 
 def duhem_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
-    """Return one of two pieces a curve, whose slope goes to 0 where its element's force is largest."""
+    """Return an initial element of two pieces per curve, whose slope vanishes at its largest force."""
     most, rising = slope / bend, (2.0 * slope, slope, 0.0)
     return [
         DuhemOscillator(rising=rising, falling=rising[::-1], knots=(-most, 0.0, most), **fields)
@@ -201,7 +201,7 @@ def duhem_starts(slope: float, bend: float, fields: dict[str, Any]) -> list[Osci
 
 @dataclass(frozen=True)
 class Element:
-    """How oscillators with one kind of element are searched."""
+    """Search of oscillators with one kind of element."""
 
     n_positive: int
     """Number of leading parameters that are searched by their logarithms."""
@@ -223,7 +223,7 @@ ELEMENTS = {
 
 
 class FreeRuns:
-    """Errors of models of one structure on all runs, and their derivatives, computed with them.
+    """Errors of models of one structure on all runs, with derivatives.
 
     A tracker counts evaluations, and is told of the best where ``told``.
     """
@@ -250,7 +250,7 @@ class FreeRuns:
             self.size[-1] = travel
 
     def coordinates(self, model: Oscillator) -> Array:
-        """Return where a model is searched: logarithms of what is positive, then the others' sizes."""
+        """Return the search coordinates of a model: logarithms of positive parameters, then others."""
         theta = model.pack() / self.size
         theta[: self.n_positive] = np.log(np.maximum(theta[: self.n_positive], 1e-300))
         return theta
@@ -287,7 +287,7 @@ class FreeRuns:
         return self.model(theta), float(np.sqrt(np.mean(errors**2)))
 
     def errors(self, theta: Array) -> Array:
-        """Return the errors where samples count; infinite where there is no such model."""
+        """Return the errors at scored samples; infinite if there is no such model."""
         try:
             model = self.model(theta)
             found = self.outputs(model, slopes=True) - self.target
@@ -306,7 +306,7 @@ class FreeRuns:
         return found
 
     def slopes(self, theta: Array) -> Array:
-        """Return the derivatives where errors were last asked for."""
+        """Return the derivatives of the last evaluation of errors."""
         with np.errstate(invalid="ignore", over="ignore"):
             found: Array = self._slopes * self.scale(self.model(theta))
         return found
@@ -317,7 +317,7 @@ class FreeRuns:
         return self._forces
 
     def outputs(self, model: Oscillator, slopes: bool = False) -> Array:
-        """Return the outputs where samples count; note the derivatives by the parameters, if wanted."""
+        """Return the outputs at scored samples; store derivatives by the parameters if requested."""
         values = model.pack()
         has_offset = model.output_offset is not None
         p = values.size - has_offset
@@ -343,7 +343,7 @@ class FreeRuns:
         return np.concatenate(found) + (model.output_offset or 0.0)
 
     def _begun(self, model: Oscillator, path: Path, p: int) -> tuple[Array, Array]:
-        """Return the state before the first input of a path, and its derivatives."""
+        """Return the initial state of a path, and its derivatives."""
         moved = np.zeros((3, p))
         if not self.at_rest:
             return np.zeros(3), moved
@@ -362,7 +362,7 @@ class FreeRuns:
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class OscillatorEstimator(SearchEstimator):
-    """Mass, damper, spring and an element that remembers, by Gauss-Newton on free runs.
+    """Mass, damper, spring and a hysteretic element, by Gauss-Newton on free runs.
 
     Parameters
     ----------
@@ -398,7 +398,7 @@ class OscillatorEstimator(SearchEstimator):
     effort: ClassVar[float] = 3.0
 
     def refined(self, model: Oscillator, forces: Array) -> Oscillator | None:
-        """Return the model with up to twice the pieces, spread over the forces that its element has."""
+        """Return the model with up to twice the pieces, spread over its element's forces."""
         if not isinstance(model, DuhemOscillator):
             return None
         n, most = len(model.knots) // 2, float(np.abs(forces).max())
@@ -472,11 +472,11 @@ class OscillatorEstimator(SearchEstimator):
 
     @property
     def at_rest(self) -> bool:
-        """Whether runs begin at rest where their first input leads, instead of at none."""
+        """Whether runs start in equilibrium with their first input, instead of at zero."""
         return not self.periodic and self.starting_rule == "first_sample"
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the outputs of blocks where samples count: in steady state, of periodic recordings."""
+        """Return the outputs of blocks at scored samples: in steady state for periodic recordings."""
         if not self.periodic:
             return super().free_runs(blocks, data)
         rows = []

@@ -1,4 +1,4 @@
-"""Parameters that a model is linear in, solved for."""
+"""Linear least squares."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ TICKS_PER_INSTRUCTION = 1.6
 
 @dataclass(frozen=True)
 class Emulation:
-    """What a model did on the emulated microcontroller.
+    """Result of a model on the emulated microcontroller.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Emulation:
 
 
 def missing_tools() -> list[str]:
-    """Return the programs that emulation needs and this machine has not."""
+    """Return the programs for emulation that are not installed."""
     return [tool for tool in (COMPILER, SIZE, EMULATOR) if shutil.which(tool) is None]
 
 
@@ -143,7 +143,7 @@ def serial_device(
     single: bool = True,
     emulated: bool = False,
 ) -> Iterator[str]:
-    """Run a served model without a board, and give the name of its serial port.
+    """Run a served model without a board, and yield the name of its serial port.
 
     Parameters
     ----------

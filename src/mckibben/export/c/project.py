@@ -1,4 +1,4 @@
-"""A model as a folder of C99 that compiles as it is: on a PC, a microcontroller, Arduino, MATLAB."""
+"""A model as a folder of portable C99: for a PC, a microcontroller, Arduino, MATLAB."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def export_c(
     force: bool = False,
     serving: Serving | None = None,
 ) -> Path:
-    """Write a model as a folder of C99, with a self-test whose vectors Python computed.
+    """Write a model as a folder of C99, with a self-test against vectors from Python.
 
     The same model gives the same bytes.
 
@@ -127,7 +127,7 @@ def c_files(
 
 
 def vectors(block: Block, sample_time: float | None, *, single: bool = False) -> dict[str, Any]:
-    """Return test vectors: inputs within the range of the model, and what Python makes of them.
+    """Return test vectors: inputs within the model's range, and Python's outputs.
 
     Inputs have minor loops and holds; single precision can hold them where it is asked for.
 
@@ -177,7 +177,7 @@ def source_files(content: Mapping[str, Any]) -> dict[str, str]:
 def described(
     block: Block, *, name: str, sample_time: float | None, single: bool
 ) -> dict[str, Any]:
-    """Return all that the templates say of a model."""
+    """Return the values for the templates of a model."""
     from mckibben import __version__
 
     identifier(name)
@@ -228,7 +228,7 @@ def described(
 
 
 def check_single(block: Block, sample_time: float | None) -> None:
-    """Refuse what single precision cannot hold, and warn of a filter that it would lead astray.
+    """Raise an error for values that single precision cannot hold, and warn of inaccurate filters.
 
     Raises
     ------
@@ -251,7 +251,7 @@ def check_single(block: Block, sample_time: float | None) -> None:
 
 
 def _warn_of_rounding(block: Block, sample_time: float | None) -> None:
-    """Run the same kernel on single and on double precision numbers."""
+    """Compare the same kernel in single and double precision."""
     rng = np.random.default_rng(0)
     samples = min(SAMPLES, MOST_PRODUCTS // max(block.n_states, 1))
     inputs = wander(*input_limits(block), rng, 400, samples // 400).astype(np.float32)
@@ -275,7 +275,7 @@ def _run(block: Block, inputs: np.ndarray, sample_time: float | None) -> np.ndar
 
 
 def checked_sample_time(block: Block, sample_time: float | None) -> float | None:
-    """Return the time between steps of a model; None where it has none.
+    """Return the sample time of a model; None if it has none.
 
     Raises
     ------
@@ -297,7 +297,7 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
 
 
 def own_time(block: Block) -> float | None:
-    """Return the sample time that a block, or a part of it, is bound to."""
+    """Return the fixed sample time of a block or one of its parts."""
     if block.sample_time is not None:
         return block.sample_time
     steps = (own_time(part) for part in getattr(block, "parts", ()))
@@ -305,7 +305,7 @@ def own_time(block: Block) -> float | None:
 
 
 def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:
-    """Return what the templates say of a block that is run."""
+    """Return the template values of a block call."""
     block, single, name = call.block, translation.single, f"coefficients_{index}"
     numbers, state = (name, call.coefficients.size), ("state", block.n_states)
     sample, outputs = (
@@ -336,7 +336,7 @@ def _call(call: Call, index: int, translation: Translation) -> dict[str, Any]:
 
 
 def _starts(calls: list[Call]) -> str:
-    """Return how the memory of blocks starts, in words."""
+    """Return a description of the start states of blocks."""
     words = [
         "as the model gives it"
         if call.state is not None

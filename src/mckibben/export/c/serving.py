@@ -1,4 +1,4 @@
-"""What an exported model accepts over a serial line: fixed here, and nowhere on the line."""
+"""Settings of an exported model's serial server, fixed at export."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MOST_MICROSECONDS = 2**32 - 1
 
 @dataclass(frozen=True)
 class Serving:
-    """How a model is served.
+    """Settings of a serial server.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def limits(block: Block, serving: Serving) -> tuple[Array, Array, Array]:
 
 
 def _known(block: Block) -> tuple[Array, Array]:
-    """Return the driven inputs' range as far as the block knows it."""
+    """Return the driven inputs' range, if the block has one."""
     if hasattr(block, "input_range"):
         return np.array([block.input_limits[0]]), np.array([block.input_limits[1]])
     n = len(block.inputs) - len(block.scheduling)
@@ -109,7 +109,7 @@ def _known(block: Block) -> tuple[Array, Array]:
 def served(
     block: Block, content: Mapping[str, Any], serving: Serving, period: float | None
 ) -> dict[str, Any]:
-    """Return what the templates say of a served model, beside what they say of the model.
+    """Return the template values of a served model, in addition to those of the model.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def served(
 
 
 def _port(channel: Mapping[str, str], single: bool) -> dict[str, Any]:
-    """Return a channel as ``link.json`` has it, with the numbers of the device."""
+    """Return a channel as in ``link.json``, with the device's numbers."""
     kind = np.float32 if single else np.float64
     numbers = {key: float(kind(channel[key].rstrip("f"))) for key in ("low", "high", "safe")}
     unit = "" if channel["unit"] == "1" else channel["unit"]
@@ -173,7 +173,7 @@ def _port(channel: Mapping[str, str], single: bool) -> dict[str, Any]:
 
 
 def _ticks(serving: Serving, period: float | None) -> int:
-    """Return after how many silent ticks the watchdog acts."""
+    """Return the number of silent ticks after which the watchdog acts."""
     step = period or 0.0
     longest = 1e-6 * MOST_MICROSECONDS
     require(1 <= 1e6 * step <= MOST_MICROSECONDS, "sample_time", period, f"1e-6 to {longest:.0f} s")
@@ -184,7 +184,7 @@ def _ticks(serving: Serving, period: float | None) -> int:
 
 
 def served_files(content: Mapping[str, Any]) -> dict[str, str]:
-    """Return the files of the server, text by path, beside those of the model."""
+    """Return the files of the server, text by path, in addition to those of the model."""
     name, told = content["name"], content["served"]
     files = {
         f"src/{name}_server.h": "server.h.j2",

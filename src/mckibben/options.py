@@ -1,4 +1,4 @@
-"""What an option of an operation is, for whoever asks a person for it.
+"""Options of operations, for the command line, the workbench and Python.
 
 The options of an operation are a dataclass. Its fields are annotated with an `Option`; the command line
 makes its flags from them, and forms their controls.
@@ -19,7 +19,7 @@ Options = TypeVar("Options")
 
 @dataclass(frozen=True)
 class Option:
-    """How a person is asked for a value.
+    """Declaration of an option: help, metavariable, flag and parser.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def given_options(
     given: Mapping[str, Any],
     others: Sequence[str] = (),
 ) -> Options:
-    """Return options with some fields given by name; ``others`` are names beside, for the remedy.
+    """Return options with some fields given by name; ``others`` are further names for the remedy.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def given_options(
 
 
 def parsed(option: Option, text: str, name: str) -> Any:
-    """Return what an option makes of a text.
+    """Return the value of an option from a text.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def pair(text: str) -> tuple[str, str]:
 
 
 def setting(text: str) -> tuple[str, Any]:
-    """Return name and value of ``NAME=VALUE``, the value as JSON where it is that.
+    """Return name and value of ``NAME=VALUE``, the value parsed as JSON if possible.
 
     >>> setting("n-operators=4"), setting("initial=rest")
     (('n_operators', 4), ('initial', 'rest'))
@@ -140,7 +140,7 @@ def calibration(text: str) -> tuple[str, tuple[str, float, float, str]]:
 
 
 def span(text: str) -> tuple[float, float]:
-    """Return the two numbers of ``START:END``, infinite where they are left out."""
+    """Return the two numbers of ``START:END``, infinite where left out."""
     start, end = text.split(":")
     return float(start or "-inf"), float(end or "inf")
 
@@ -154,7 +154,7 @@ def size(text: str) -> float:
 
 
 def limits(text: str) -> tuple[str, tuple[float | None, ...]]:
-    """Return channel and limits of ``CHANNEL=LOW:HIGH[:RATE]``, None where they are left out.
+    """Return channel and limits of ``CHANNEL=LOW:HIGH[:RATE]``, None where left out.
 
     >>> limits("pressure=1:5.5"), limits("force=::20")
     (('pressure', (1.0, 5.5)), ('force', (None, None, 20.0)))
@@ -319,7 +319,7 @@ class FitOptions:
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """Options of `compare` and `study`: data, models, and how to work."""
+    """Options of `compare` and `study`: data, models and processes."""
 
     inputs: Inputs = None
     outputs: Outputs = None
@@ -349,7 +349,7 @@ class CompareOptions:
 
 @dataclass(frozen=True)
 class StudyOptions(CompareOptions):
-    """Options of `study`: those of `compare`, and what a loop's log and a closed loop need."""
+    """Options of `study`: those of `compare`, and those of a log and a closed loop."""
 
     rig: Annotated[str | None, Option("Several muscles: rig to close a loop on.")] = None
     compensator: Annotated[
@@ -442,7 +442,7 @@ class InvertOptions:
     seed: Seed = 0
 
     def check(self) -> None:
-        """Refuse options that exclude each other, or lack what they are of."""
+        """Raise an error for options that exclude each other, or need another option."""
         ways = {
             "adaptive": self.adaptive,
             "predictive": self.predictive,
@@ -475,7 +475,7 @@ PREDICTIVE = ("horizon", "rate_limit", "pressures", "total_limit", "flow_limit")
 
 @dataclass(frozen=True)
 class PlanOptions:
-    """Options of `plan`: what is driven, how long, within what limits."""
+    """Options of `plan`: driven channels, duration and limits."""
 
     rig: Annotated[Any, Option("Rig that is driven: channels and limits.", "NAME|FILE")] = None
     muscle: Annotated[

@@ -1,4 +1,4 @@
-"""What a person does with the package: fit, study, track, invert, check, plan, review, export.
+"""Operations of users: fit, study, track, invert, check, plan, review, export.
 
 The command line, the workbench and Python call these. Each takes recordings, or files with some, and
 returns a result that has numbers as ``to_dict()``. Parameters that they have in common:
@@ -154,7 +154,7 @@ def _force_error(model: Block, runs: Sequence[Recording]) -> float:
 
 
 def _residuals(base: Block, estimator: Any, runs: list[Recording]) -> list[Recording]:
-    """Return recordings with the output less what a model gives."""
+    """Return recordings with a model's output subtracted."""
     from mckibben.estimators.force.multistate import extract_hysteresis
 
     names = [channel.name for channel in base.outputs]
@@ -252,7 +252,7 @@ def study(
 
 
 def _complete(results: Results) -> None:
-    """Swap the files of a comparison in, and remove its checkpoints."""
+    """Move the files of a comparison to their places, and remove its checkpoints."""
     from mckibben.checkpoints import Checkpoints
 
     results.commit()
@@ -260,7 +260,7 @@ def _complete(results: Results) -> None:
 
 
 def _standing(progress: Progress) -> Any:
-    """Return a progress callback that takes the standing of a comparison."""
+    """Return a progress callback for the progress of a comparison."""
     if not callable(progress):
         return progress
     return lambda standing: progress(standing.share, str(standing))
@@ -277,7 +277,7 @@ def _compared(
     force: bool,
     written: Callable[[Sequence[str]], Sequence[str]],
 ) -> Iterator[tuple[dict[str, Any], Results | None]]:
-    """Claim the files that a comparison will write, read its recordings, and return its arguments."""
+    """Claim the output files of a comparison, read its recordings, and return its arguments."""
     from mckibben.comparison.backends import on_cluster
     from mckibben.estimators.catalogue import settings_of_all
     from mckibben.files.sources import expanded
@@ -319,7 +319,7 @@ def track(
     progress: Progress = None,
     **given: Any,
 ) -> Tracking:
-    """Let a compensator, or a controller with it, follow a reference on a virtual rig or on a model.
+    """Track a reference with a compensator or a controller on a virtual rig or on a model.
 
     ``out`` is the recording of the run, ``controller_out`` the controller, for `export`.
     """
@@ -394,7 +394,7 @@ def _half(tell: Tell | None, start: float) -> Callable[[float], None] | None:
 
 
 def _plant(chosen: TrackOptions, reading: ReadOptions | None) -> Any:
-    """Return what a loop is closed on: a rig, or a model as a twin of the user's muscle."""
+    """Return the plant of a loop: a rig, or a model as a twin of the user's muscle."""
     from mckibben.control import Twin
     from mckibben.rigs import Rig, load_rig
 
@@ -429,7 +429,7 @@ def invert(
     progress: Progress = None,
     **given: Any,
 ) -> Inverse:
-    """Return the compensator of a model: desired output in, input out; or its estimate of force."""
+    """Return the compensator of a model, from desired output to input; or its force estimator."""
     chosen, reading = _chosen(InvertOptions, options, reading, given)
     chosen.check()
     file = _claim(out, _paths(model, chosen.learned), force)
@@ -484,7 +484,7 @@ def check(
     progress: Progress = None,
     **given: Any,
 ) -> Validation:
-    """Test whether a model is right on recordings, and what it misses; see `mckibben.diagnosis.check`.
+    """Check a model on recordings, and its residuals' causes; see `mckibben.diagnosis.check`.
 
     With ``out``, a folder, ``validation.json`` and ``report.html`` are written.
     """
@@ -518,7 +518,7 @@ def plan(
     force: bool = False,
     **given: Any,
 ) -> Plan:
-    """Return what to record next: random motion within limits, and what closes data gaps.
+    """Return a plan of the next recording: random motion within limits, and runs that close data gaps.
 
     With ``out``, its commands are written as a recording.
     """
@@ -547,7 +547,7 @@ def review(
     reading: ReadOptions | None = None,
     **given: Any,
 ) -> Review:
-    """Return how a logged loop followed its reference, and why no better; see `diagnosis.review`.
+    """Return the review of a loop's log: tracking error and its causes; see `diagnosis.review`.
 
     The log has a reference, such as ``reference_displacement``; one of model and compensator is enough.
     """
@@ -648,7 +648,7 @@ def _contents(path: Path) -> list[str]:
 
 
 def _serving(chosen: COptions) -> Any:
-    """Return how exported code is served over a serial line, where it is."""
+    """Return the settings of the serial server of exported code, if it has one."""
     from mckibben.export.c.serving import Serving
 
     if not chosen.link:
@@ -677,7 +677,7 @@ def _chosen(
 
 
 def saved(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
-    """Return a model, also of a file or of `fit` or `invert`, with some of its fields set."""
+    """Return a model, also from a file or a result of `fit` or `invert`, with some fields set."""
     from mckibben.blocks.saving import load
     from mckibben.blocks.setting import with_fields
 
@@ -689,7 +689,7 @@ def saved(model: Any, settings: Mapping[str, Any] | None = None) -> Any:
 
 
 def _paths(*given: Any) -> list[Path]:
-    """Return the files among what is given, in lists too."""
+    """Return the files among arguments, also in lists."""
     found: list[Path] = []
     for one in given:
         if isinstance(one, str | Path):
@@ -702,7 +702,7 @@ def _paths(*given: Any) -> list[Path]:
 def _claim(
     out: str | Path | None, read: Sequence[Path], force: bool, *, recording: bool = False
 ) -> Path | None:
-    """Refuse to write over what is read or the user's, before any work; return the path."""
+    """Raise an error for a path that is an input or a user's file, before any work; return the path."""
     from mckibben.outputs import claim, claim_recording
 
     if out is None:

@@ -1,4 +1,4 @@
-"""Words of headers: how channels, and the two ends of a loop, are called in ten languages. Data only.
+"""Words for channels, references and commands in headers, in ten languages. Data only.
 
 Words are in lower case, several of one name joined by underscores; a header matches whole words.
 """
@@ -67,7 +67,7 @@ ROLES: dict[str, dict[str, str]] = {
 
 
 def words_of(table: dict[str, dict[str, str]]) -> dict[str, str]:
-    """Return what each word of a table means.
+    """Return the meaning of each word of a table.
 
     >>> words_of(CHANNELS)["druck"]
     'pressure'

@@ -1,4 +1,4 @@
-"""From a file to recordings: a table, its channels and units, its time grid."""
+"""Reading files to recordings: table, channels and units, time grid."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def read(
 
 
 def look(path: str | Path, **options: Any) -> tuple[list[Recording], list[Seen]]:
-    """Return the recordings in a file, as `read` does, and its columns, as `columns_of` does, read once.
+    """Return recordings as `read` does, and columns as `columns_of` does, in one pass.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def look(path: str | Path, **options: Any) -> tuple[list[Recording], list[Seen]]
 
 
 def columns_of(path: str | Path, **options: Any) -> list[Seen]:
-    """Return the columns of a file or a folder's recording, and the channel that each is read as.
+    """Return the columns of a file or a folder's recording, with their channels.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def columns_of(path: str | Path, **options: Any) -> list[Seen]:
 
 
 def has_columns(path: Path) -> bool:
-    """Return whether a file holds columns of samples, rather than a model."""
+    """Return whether a file holds columns of samples, not a model."""
     try:
         return bool(columns_of(path))
     except DataError:
@@ -188,7 +188,7 @@ def has_columns(path: Path) -> bool:
 
 
 def _read(path: Path, request: Request) -> tuple[list[Recording], Source]:
-    """Return the recordings of a file, with notes after earlier ones, and the first that it is of."""
+    """Return the recordings of a file, with notes after earlier ones, and their first file."""
     request = replace(request, described=about(path))
     with noted() as notes:
         tables, digest = sources.tables(path, request)
@@ -243,7 +243,7 @@ def _recordings(source: Source, digest: str) -> list[Recording]:
 
 
 def _stated_step(times: Times | None, source: Source) -> float | None:
-    """Return the sample time that the caller or the file states, which the times must not contradict."""
+    """Return the sample time stated by the caller or the file, checked against the times."""
     table, request = source.table, source.request
     step = table.sample_time if request.rate is None else 1.0 / request.rate
     if step is None and times is None and not table.own:

@@ -1,4 +1,4 @@
-"""What the library says of a muscle before it is recorded: a Gaussian over its traits."""
+"""Prior of a muscle from the library: a Gaussian over its traits."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ UNTOLD = 1.0
 
 @dataclass(frozen=True)
 class Prior:
-    """What is likely of a muscle's traits.
+    """Prior of a muscle's traits.
 
     Traits of a name go up and down together by a level, and differ from it by a smooth shape.
 
@@ -71,7 +71,7 @@ class Prior:
         return np.asarray(self.levels[name] ** 2 + curved + FINE**2 * np.eye(len(place)))
 
     def weights(self) -> Array:
-        """Return rows that make independent numbers of deviation 1 of traits less their mean."""
+        """Return rows that normalise deviations of traits from their mean to unit covariance."""
         rows = []
         for name, place in PLACES.items():
             known = np.flatnonzero(np.isfinite(self.mean[place]))
@@ -83,7 +83,7 @@ class Prior:
 
 
 def prior_of(given: str | Path | Sheet, *, without: Sequence[str] = ()) -> Prior:
-    """Return what the library says of a muscle.
+    """Return the prior of a muscle from the library.
 
     Parameters
     ----------
@@ -119,14 +119,14 @@ def prior_of(given: str | Path | Sheet, *, without: Sequence[str] = ()) -> Prior
 
 
 def _with(own: Muscle | None, muscles: list[Muscle], without: Sequence[str]) -> list[Muscle]:
-    """Return the muscles that are asked: a user's own too, unless it is one of them already."""
+    """Return the muscles used: also a user's own, unless it is one of them already."""
     if own is None or own.name in without or any(one.balance == own.balance for one in muscles):
         return muscles
     return [*(one for one in muscles if one.name != own.name), own]
 
 
 def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = None) -> Prior:
-    """Return what some muscles say of one with a data sheet, or of the same make as one of them.
+    """Return the prior by some muscles of one with a data sheet, or of the same make as one of them.
 
     Their traits are taken for a Gaussian process over size, slenderness and braid (kriging): near a
     muscle its own traits are likely, and far from all their mean, with the spread of all.
@@ -156,7 +156,7 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
 
 
 def _shares(shapes: Array, here: Array, spread: float) -> tuple[Array, float]:
-    """Return how much of each muscle's deviation one here has, and the share of spread left."""
+    """Return the weight of each muscle's deviation, and the remaining share of the spread."""
     if not len(shapes):
         return np.zeros(0), 1.0
 
@@ -171,7 +171,7 @@ def _shares(shapes: Array, here: Array, spread: float) -> tuple[Array, float]:
 
 
 def _spreads(table: Array) -> tuple[float, float]:
-    """Return the deviations of muscles' levels, and of shapes from these, as few muscles tell them.
+    """Return the spreads of muscles' levels, and of shapes about these, allowing for few muscles.
 
     A new one's is Student's; the Gaussian with the same middle two thirds is taken.
     """

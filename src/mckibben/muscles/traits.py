@@ -1,4 +1,4 @@
-"""What a balance of forces says of a muscle, whatever its size: numbers to compare muscles by.
+"""Traits of a muscle's force balance, independent of its size, for comparison.
 
 A data sheet gives the scales: the area at rest A and its loss with contraction by the braid's geometry,
 the stroke, the highest pressure P, the force P A. Over these, in logarithms, are taken
@@ -73,7 +73,7 @@ COUNT: int = _ENDS[-1]
 
 
 def traits(balance: Balance, sheet: Sheet, zero: float = 0.0) -> Array:
-    """Return the traits of a muscle, those that it has not as NaN.
+    """Return the traits of a muscle, undetermined ones as NaN.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def _log(values: object, least: float = 1e-6) -> Array:
 
 
 def _straight(powers: Array, balance: Balance, y: Array) -> Array:
-    """Return a polynomial, which goes on straight beyond what is known."""
+    """Return a polynomial with linear extrapolation."""
     inside = np.clip(y, balance.hull[0][0], balance.hull[0][1])
     u = inside / balance.scale
     slope = polynomial.polyval(u, polynomial.polyder(powers)) / balance.scale

@@ -1,4 +1,4 @@
-"""Sentences about results: each is made from the numbers of a result, which stand beside it.
+"""Sentences about results, each made from numbers of the result.
 
 Library functions return numbers. Whatever says something about them to a person is here, in one section
 a room, so that all of it can be read, counted and tested on plants where it is false.
@@ -50,7 +50,7 @@ CAREFUL = "reliable only near the fitted motions, so its error is doubled in the
 
 
 def chosen(board: Leaderboard) -> str:
-    """Return which model is chosen and by what, its test error, and the lowest; empty without any."""
+    """Return the chosen model, its criterion, its test error, and the lowest; empty without any."""
     best, lowest = board.best, board.lowest
     if board.not_recommended is not None and board.constant is not None:
         first = next(row for row in board.rows if row.reason is None)
@@ -70,7 +70,7 @@ def chosen(board: Leaderboard) -> str:
 def not_recommended(
     where: Against, row: Mapping[str, Any], constant: Mapping[str, Any], unit: str
 ) -> str:
-    """Return why a model, the first in the order of the choice, is not recommended.
+    """Return why the model ranked first is not recommended.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def not_recommended(
 
 
 def comparison(board: Leaderboard) -> list[str]:
-    """Return what is to be said of a comparison beside its table."""
+    """Return notes on a comparison."""
     best, said = board.best, list(board.shared)
     if board.loads:
         said.append(f"Further inputs of all models: {', '.join(board.loads)}.")
@@ -113,13 +113,13 @@ def comparison(board: Leaderboard) -> list[str]:
 
 
 def marks(board: Leaderboard) -> list[str]:
-    """Return what marks behind names of models mean, of those that there are."""
+    """Return the meaning of the marks after names of models."""
     careful = any(row.reason is None and row.caution for row in board.rows)
     return [f"≈ {LEVEL}."] * bool(board.level) + [f"* {CAREFUL}."] * careful
 
 
 def not_validated(board: Leaderboard) -> list[str]:
-    """Return which models' validation failed, and why."""
+    """Return the models whose validation failed, and why."""
     return [
         f"{row.model}: not chosen, as its validation failed: {row.validation_failed}"
         for row in board.rows
@@ -131,7 +131,7 @@ def not_validated(board: Leaderboard) -> list[str]:
 
 
 class Quantity(NamedTuple):
-    """A figure of a characterization, with its 95 % interval, unit and meaning."""
+    """A quantity of a characterization, with its 95 % interval, unit and meaning."""
 
     name: str
     value: float | int | str | None
@@ -179,7 +179,7 @@ QUANTITIES = (
 
 
 def quantities(found: Characterization) -> Iterator[Quantity]:
-    """Yield every figure of a characterization."""
+    """Yield every quantity of a characterization."""
     names = {"input": found.input, "output": found.output}
     units = {"u": found.input_unit, "y": found.output_unit}
 
@@ -213,7 +213,7 @@ def quantities(found: Characterization) -> Iterator[Quantity]:
 
 
 def characterization_sentences(found: Characterization) -> list[str]:
-    """Return what a muscle does first of all; the table beside has everything, with intervals."""
+    """Return the main results of a characterization; its table has all, with intervals."""
     u, y = found.input, found.output
     ends = found.output_range[::-1] if found.falls else found.output_range
     slope = f"{found.output_unit}/{found.input_unit}".removesuffix("/")
@@ -256,7 +256,7 @@ def characterization_sentences(found: Characterization) -> list[str]:
 
 
 def _spanning(limits: tuple[float, float], unit: str) -> str:
-    """Return limits to about a percent of their distance, so that noise at 0 is not spelled out."""
+    """Return limits rounded to about a percent of their distance."""
     digits = 2 - math.floor(math.log10(abs(limits[1] - limits[0]) or 1.0))
     low, high = (f"{round(limit, digits) + 0.0:.6g}" for limit in limits)
     return f"{low} to {high} {unit}".rstrip()
@@ -266,12 +266,12 @@ def _spanning(limits: tuple[float, float], unit: str) -> str:
 
 
 def check_verdict(found: Validation, *, sized: bool = True) -> str:
-    """Return what the residual of every output follows first, in a sentence each."""
+    """Return the main finding on every output's residual, one sentence each."""
     return " ".join(_residual(one, sized=sized) for one in found.outputs)
 
 
 def check_sentences(found: Validation) -> list[str]:
-    """Return everything that residuals follow, whether they are white, and one line of advice each."""
+    """Return all findings on residuals, whether they are white, and one line of advice each."""
     said = []
     for one in found.outputs:
         own = [] if one.exact else [_missed(one, each) for each in one.missing]
@@ -283,7 +283,7 @@ def check_sentences(found: Validation) -> list[str]:
 
 
 def check_notes(one: OutputCheck) -> list[str]:
-    """Return whether a residual is white, and what to do about what it follows first."""
+    """Return whether a residual is white, and advice on its main finding."""
     said = []
     if one.whiteness.p_value is not None:
         white = "white" if one.whiteness.p_value > WHITE else "not white"
@@ -294,7 +294,7 @@ def check_notes(one: OutputCheck) -> list[str]:
 
 
 def missed(one: OutputCheck, finding: Finding) -> str:
-    """Return in a few words what a residual follows, and what it may be as well."""
+    """Return the main finding on a residual in a few words, with alternatives."""
     causes = [
         _KINDS[kind].format(channel=channel or "the input")
         for kind, channel in ((finding.kind, finding.channel), *finding.or_causes)
@@ -373,7 +373,7 @@ def _p(value: float) -> str:
 
 
 def probability(value: float | None) -> str:
-    """Return a p-value as it is shown."""
+    """Return a formatted p-value."""
     return "–" if value is None else "< 0.000001" if value < 1e-6 else numeral(value, 2)
 
 
@@ -421,7 +421,7 @@ RUNS = {
 
 
 def gap_sentence(gap: Gap) -> str:
-    """Return what recordings cannot identify, with the number that shows it."""
+    """Return a data gap with its number."""
     return GAPS[gap.what].format(
         channels=listing(gap.channels),
         value=numeral(gap.value, 2),
@@ -432,19 +432,19 @@ def gap_sentence(gap: Gap) -> str:
 
 
 def gap_name(gap: Gap) -> str:
-    """Return what cannot be identified, without its number."""
+    """Return a data gap without its number."""
     return GAPS[gap.what].split(" cannot be ")[0].format(channels=listing(gap.channels)).lower()
 
 
 def gap_run(gap: Gap, ranges: bool = True) -> str:
-    """Return the run that would identify it, perhaps with the ranges recorded so far."""
+    """Return the run that closes a data gap, optionally with the recorded ranges."""
     moved = {name: ends for name, ends in gap.ranges.items() if ends[0] < ends[1] and ranges}
     levels = f" over {_levels(moved)}" if moved else ""
     return RUN.format(what=RUNS[gap.run].format(levels=levels))
 
 
 def plan_sentences(plan: Plan) -> list[str]:
-    """Return what a plan does, what it leaves open, and what of it is extrapolated."""
+    """Return the purpose of a plan, the gaps it leaves, and extrapolations."""
     parts = {step.what for step in plan.steps}
     open_gaps = [gap for gap in plan.gaps if not any(gap.what in one.gaps for one in plan.steps)]
     return [
@@ -466,7 +466,7 @@ def _levels(ranges: Mapping[str, tuple[float, float]]) -> str:
 
 
 def listing(names: Sequence[str]) -> str:
-    """Return names as a sentence has them.
+    """Return names joined by commas and "and".
 
     >>> listing(["a", "b", "c"])
     'a, b and c'
@@ -481,7 +481,7 @@ def listing(names: Sequence[str]) -> str:
 def band_on_test(
     level: float, coverage: Mapping[str, float], width: Mapping[str, float], unit: str
 ) -> list[str]:
-    """Return, an output a sentence, the share of the test's samples inside of a band, and its width."""
+    """Return, one sentence per output, the coverage of a band on the test, and its width."""
     return [
         f"The band for {percent(level, 3)} holds {percent(coverage[name], 3)} of the test's samples "
         f"of {name}; its half width is {numeral(wide / 2, 2)} {unit} on average."
@@ -490,7 +490,7 @@ def band_on_test(
 
 
 def calibrated_on_blocks(found: Calibration) -> str:
-    """Return what a band does not include whose units are blocks of runs."""
+    """Return the limitation of a band whose units are blocks of runs."""
     return (
         f"{found.band.units} blocks of {found.runs} run(s) count as exchangeable, so differences "
         "between runs are not in the band: calibrate on 9 runs or more."
@@ -500,7 +500,7 @@ def calibrated_on_blocks(found: Calibration) -> str:
 def outside_calibration(
     run: str, channel: Channel, share: float, values: Array, ends: tuple[float, float]
 ) -> str:
-    """Return how much of a run is beyond the range of a calibration."""
+    """Return the share of a run beyond the range of a calibration."""
     least, most = numeral(float(values.min()), 3), numeral(float(values.max()), 3)
     low, high = (numeral(end, 3) for end in ends)
     return (
@@ -511,7 +511,7 @@ def outside_calibration(
 
 
 def reviewed(found: Review) -> list[str]:
-    """Return what a log's review found: every output, then delays, limits and the refit."""
+    """Return the results of a log's review: every output, then delays, limits and the refit."""
     given = " of the compensator" if found.judged_by == "compensator" else ""
     said = []
     for one in found.outputs:
@@ -596,12 +596,12 @@ def _record_next(study: Study) -> str:
 
 
 def not_looped(study: Study) -> str:
-    """Return why no loop was closed; empty where one was."""
+    """Return why no loop was closed; empty if one was."""
     return f"No loop was closed: {study.not_looped}" if study.not_looped else ""
 
 
 def tracked(found: Tracking) -> list[str]:
-    """Return on what a reference was followed, and what of it is out of reach."""
+    """Return the plant of a tracked reference, and its part out of reach."""
     one = found.tracked
     unit = one.recording.units[next(iter(one.rmse))]
     kind = "virtual rig" if found.virtual else "model"

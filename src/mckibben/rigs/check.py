@@ -1,4 +1,4 @@
-"""The contract of a rig as laws, to which its author can put it."""
+"""Contract tests of rigs, for authors of new ones."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STEPS = 50
 
 
 def check_rig(rig: Rig, *, seed: int = 0) -> None:
-    """Put a rig to the laws that every rig must obey.
+    """Test a rig against all laws of rigs.
 
     A saved copy is equal; runs are repeatable for a seed, and another seed changes the noise alone;
     stepping gives what running with held commands gives, to the last bit; halving the step of the
@@ -61,7 +61,7 @@ def _demand(rig: Rig, holds: bool, law: str) -> None:
 
 
 def _lively(rig: Rig, seed: int) -> Recording:
-    """Return inputs that move everything, over most of their ranges."""
+    """Return inputs that vary over most of their ranges."""
     time = np.arange(0.0, DURATION, max(rig.sample_time, 0.01))
     channels = {}
     for i, name in enumerate(rig.inputs):

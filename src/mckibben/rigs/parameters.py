@@ -1,4 +1,4 @@
-"""What a rig is made of: every number with its meaning, unit and range.
+"""Parameters of a rig: every number with its meaning, unit and range.
 
 A rig's file (TOML) holds these sections; see `mckibben.rigs.files`.
 """
@@ -29,7 +29,7 @@ EachPositive = Annotated[float, Field(gt=0)]
 
 
 class Section(BaseModel):
-    """One section of a rig's file; frozen, and refuses what it does not know."""
+    """One section of a rig's file; frozen, without unknown fields."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=False
@@ -74,7 +74,7 @@ class Creep(Section):
 
 
 class Heat(Section):
-    """Warming by its own losses, which softens rubber and friction; an option, off by default."""
+    """Warming by internal losses, which softens rubber and friction; off by default."""
 
     softening: float = parameter(
         "stiffness and friction lost per kelvin", "1/K", ge=0, le=0.05, default=0.0
@@ -198,7 +198,7 @@ class Air(Section):
 
 
 class Sensor(Section):
-    """What a sensor adds to what it measures, in the unit of its channel."""
+    """Errors of a sensor, in the unit of its channel."""
 
     noise: float = parameter("standard deviation of white noise", ge=0, default=0.0)
     resolution: float = parameter("resolution", ge=0, default=0.0)
@@ -206,7 +206,7 @@ class Sensor(Section):
 
 
 class Range(Section):
-    """Lowest and highest value of a command that the hardware lets through."""
+    """Lowest and highest value of a command."""
 
     low: float = parameter("lowest", default=0.0)
     high: float = parameter("highest")

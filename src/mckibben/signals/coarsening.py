@@ -1,4 +1,4 @@
-"""Fewer samples for models to be fitted to, without losing a turning point of what drives them."""
+"""Reduction of samples for fitting, without losing turning points of the inputs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STRETCHES = 4
 
 
 def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
-    """Return a recording with one sample for every ``factor``, turning points kept.
+    """Return a recording with one sample per ``factor``, including turning points.
 
     Of every bin the sample at which the channel turns is taken, else the first: levels at turning
     points, on which memory depends, stay as they are, while times are off by less than a bin. Of
@@ -82,14 +82,14 @@ def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
 
 
 def _beyond(u: NDArray[np.float64]) -> bool:
-    """Tell whether the last sample is the highest or the lowest."""
+    """Return whether the last sample is the highest or the lowest."""
     return bool(u[-1] >= u.max() or u[-1] <= u.min())
 
 
 def made_manageable(
     train: Sequence[Recording], test: Sequence[Recording], channel: str, most: int | None = None
 ) -> tuple[list[Recording], list[Recording], tuple[str, ...]]:
-    """Return recordings thinned alike, so that no more than so many samples are fitted or tested on.
+    """Return recordings thinned alike to at most so many samples for fit and test.
 
     Without a number given, huge recordings are thinned no further than leaves their swings in shape; of
     what is then still too much, stretches of samples in a row are taken, each with a start of its own.
@@ -166,13 +166,13 @@ def made_manageable(
 
 
 def _swing(recordings: Sequence[Recording], channel: str) -> int:
-    """Return how many samples the median swing of the input takes."""
+    """Return the samples of the median swing of the input."""
     swings = [np.diff(reversals(recording[channel])) for recording in recordings]
     return int(np.median(np.concatenate(swings)))
 
 
 def _stretches(recordings: Sequence[Recording], most: int) -> list[Recording]:
-    """Return stretches of recordings, evenly spread, together no longer than a limit."""
+    """Return segments of recordings, evenly spaced, with a total length up to a limit."""
     share = most / max(sum(map(len, recordings)), 1)
     if share >= 1:
         return list(recordings)
@@ -190,13 +190,13 @@ def _stretches(recordings: Sequence[Recording], most: int) -> list[Recording]:
 
 
 def _continuing(recording: Recording, others: Sequence[Recording], factor: int) -> Recording:
-    """Return a recording that continues another one without what their common bin has of it."""
+    """Return a recording without the samples of a bin shared with its predecessor."""
     before = next((other for other in others if recording.continues(other)), None)
     skipped = 0 if before is None else -len(before) % factor
     return recording.slice(skipped, len(recording)) if skipped + 2 <= len(recording) else recording
 
 
 def _lost(u: NDArray[np.float64], factor: int) -> int:
-    """Return how many turning points share a bin with another one."""
+    """Return the number of turning points that share a bin with another one."""
     turns = reversals(u)[1:-1]
     return int(turns.size - np.unique(np.maximum(turns // factor, 1)).size)

@@ -1,4 +1,4 @@
-"""Turning points of a signal, told from noise; the branches and cycles between them."""
+"""Turning points of a noisy signal, and the branches and cycles between them."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def third_differences(x: Array) -> tuple[float, float]:
 
 
 def swing_threshold(noise: float, span: float, n: int) -> float:
-    """Return the smallest swing that is a movement: above the noise, and at least 1 % of the range.
+    """Return the smallest significant swing: above the noise, and at least 1 % of the range.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def branches(x: ArrayLike, threshold: float | None = None) -> list[tuple[int, in
 
 
 def branches_between(x: Array, turns: Indices) -> list[tuple[int, int, int]]:
-    """Return the branches between turning points that are known already, as `branches` does."""
+    """Return the branches between known turning points, as `branches` does."""
     ways = np.sign(np.diff(x[turns])).astype(int)
     return [
         (int(start), int(stop) + 1, int(way))
@@ -188,7 +188,7 @@ def cycles(x: ArrayLike, threshold: float | None = None) -> list[slice]:
 
 
 def whole_cycles(x: Array, turns: Indices, whole: float = WHOLE) -> list[slice]:
-    """Return the whole cycles between turning points that are known already.
+    """Return the whole cycles between known turning points.
 
     At either end of the signal, so much of the other branch as ``whole`` says is enough.
     """

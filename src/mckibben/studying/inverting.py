@@ -1,4 +1,4 @@
-"""The inverse of a model, tried on the model itself."""
+"""Check of a model's inverse on the model itself."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NEARLY = 0.01
 
 @dataclass(frozen=True)
 class InverseCheck:
-    """The inverse of a model, tried on the model itself.
+    """Result of an inverse on its own model.
 
     Of one muscle, on a reference it can reach: where nothing is known of that, on what the model makes
     of a recording. Of several, on a measured motion, which it may not reach.
@@ -73,11 +73,11 @@ class InverseCheck:
 
     @property
     def given(self) -> str:
-        """What the inverse gives, in words."""
+        """Label of the inverse's outputs."""
         return ", ".join(channel.name for channel in self.inverse.outputs)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return which model is inverted, and how well."""
+        """Return the inverted model, and the errors."""
         reachable = None if self.reachable is None else list(self.reachable)
         found = {"model": self.model, "error": self.error, "reachable": reachable}
         return found | {"uncompensated_error": self.uncompensated_error}
@@ -105,7 +105,7 @@ def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None
 
 
 def check_inverse(model: str, block: Block, recording: Recording) -> InverseCheck:
-    """Send a reference through the inverse and back through the model.
+    """Pass a reference through the inverse and back through the model.
 
     The reference has minor loops over all that can be reached; where a model does not say what that is,
     it is the output that the model gives for the recording, and of several inputs, the recorded motion.
@@ -191,7 +191,7 @@ def minor_loops(low: float, high: float) -> Array:
 def _without(
     block: Block, recording: Recording, reference: Array, step: float | None
 ) -> Array | None:
-    """Return what a model does where its inputs are read off its own slow rise, shape (n, outputs).
+    """Return a model's outputs for inputs from its own slow rise, shape (n, outputs).
 
     Inputs rise from the lowest to the highest recorded, with what schedules as the recording begins.
     """

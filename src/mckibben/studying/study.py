@@ -1,4 +1,4 @@
-"""The main job: what the muscle does, which model to use, and its inverse."""
+"""Studies: characterization, model choice, and inverse."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from mckibben.system.showing import DrawsItself
 
 @dataclass(frozen=True, repr=False)
 class Study(DrawsItself):
-    """Everything that ``mckibben study`` finds.
+    """Results of ``mckibben study``.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Study(DrawsItself):
         return self.leaderboard.output
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what was found, without the models and what they give."""
+        """Return the results without models and their outputs."""
         known = self.characterization
         return {
             "characterization": None if known is None else known.to_dict(),
@@ -128,7 +128,7 @@ def study(
     compensator: Block | None = None,
     **choices: Any,
 ) -> Study:
-    """Characterize recordings, choose a model by cross-validation, test it, and invert it if it can be.
+    """Characterize recordings, choose a model by cross-validation, test it, and invert it if possible.
 
     Where it cannot, the next in the order of the choice is inverted that can. Where no model is worth
     recommending, none is inverted.
@@ -239,7 +239,7 @@ def study(
 
 
 def _driven(log: Recording) -> Recording:
-    """Return a log with its commands for pressures, where it has none that are measured."""
+    """Return a log with its commands as pressures, if these were not measured."""
     names = [name.removeprefix(COMMAND) for name in log.channels if name.startswith(COMMAND)]
     blind = [name for name in names if name not in log]
     units = {name: log.units[COMMAND + name] for name in blind}

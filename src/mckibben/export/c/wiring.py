@@ -1,4 +1,4 @@
-"""Compositions flattened: which part runs when, on which signals."""
+"""Compositions flattened to calls of blocks on signals, in order."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Sum:
 
 
 class Wiring:
-    """What a model does in a step, in order, as C has it.
+    """The calls of a step, in order, as in the C code.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Wiring:
 
 
 def state_of(block: Block, memory: ArrayLike, sample_time: float | None) -> Array:
-    """Return the state of a block that its C has in memory, without what it only computes in.
+    """Return the state of a block as stored by its C code, without working memory.
 
     Parameters
     ----------

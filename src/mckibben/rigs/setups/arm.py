@@ -27,7 +27,7 @@ from mckibben.rigs.system import Demands, System, Traces
 
 
 class Spread(Section):
-    """How hand-made muscles differ from the one described: a factor for each."""
+    """Differences of hand-made muscles from the nominal one: a factor for each."""
 
     diameter: tuple[EachPositive, ...] = parameter("factor on the diameter of each")
     bladder: tuple[EachPositive, ...] = parameter("factor on the bladder's stiffness of each")

@@ -1,4 +1,4 @@
-"""A muscle fixed at one end that moves a mass with the other, hanging from it or on a rail."""
+"""A muscle fixed at one end, with a mass at the other, hanging or on a rail."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class MovingEnd(Rig):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Pressure or voltage, and force where it may be pulled."""
+        """Pressure or voltage, and force if a load can be applied."""
         return (self.command, "force") if "force" in self.range else (self.command,)
 
     def build(self) -> System:
